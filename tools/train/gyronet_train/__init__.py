@@ -1,0 +1,1 @@
+"""Training of gyronet's networks: recordings in, checkpoint and golden tensors out."""

@@ -1,0 +1,37 @@
+"""Checkpoint and golden tensors as safetensors, with where they came from in the metadata."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import torch
+from safetensors.torch import save_file
+
+from .model import GyroNet
+from .recordings import WINDOW
+
+GOLDEN_WINDOWS = 8
+
+
+def export(model: GyroNet, provenance: dict, folder: Path, stem: str) -> list[Path]:
+    """Write STEM.safetensors and STEM.golden.safetensors; returns the paths."""
+    checkpoint = folder / f"{stem}.safetensors"
+    tensors = {name: t.detach().contiguous() for name, t in model.state_dict().items()}
+    # One metadata value: safetensors does not promise the order of several.
+    save_file(tensors, checkpoint, metadata={"provenance": json.dumps(provenance, sort_keys=True)})
+    golden = folder / f"{stem}.golden.safetensors"
+    save_file(golden_tensors(model), golden, metadata={"made_by": f"torch {torch.__version__}"})
+    return [checkpoint, golden]
+
+
+@torch.no_grad()
+def golden_tensors(model: GyroNet) -> dict[str, torch.Tensor]:
+    """Known answers: synthetic windows (noise about the means, two of them far out, one of
+    zeros) and what every layer makes of them. No recording is in them."""
+    generator = torch.Generator().manual_seed(20)
+    noise = torch.randn(GOLDEN_WINDOWS, WINDOW, 6, generator=generator)
+    gain = torch.tensor([1.0, 1.0, 1.0, 1.0, 1.0, 4.0, 8.0, 0.0]).view(-1, 1, 1)
+    x = model.input_mean + gain * model.input_std * noise
+    x[-1] = 0.0
+    return {"input": x, **{k: v.contiguous() for k, v in model.layers(x).items()}}

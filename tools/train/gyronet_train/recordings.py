@@ -1,0 +1,68 @@
+"""Recordings in the layout of a drive CSV, turned into the windows the network sees.
+
+A drive is sampled at 100 Hz and stands still for its first three seconds. The
+gyro is taken less its own mean over those seconds (static initialisation), in
+rad/s; the accelerometer is taken as it is, in m/s^2.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+RATE_HZ = 100
+STATIC_SAMPLES = 3 * RATE_HZ
+WINDOW = 10
+COLUMNS = ("t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z", "ref_gyr_z")
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One drive: features (T, 6) = specific force xyz, angular rate xyz; label (T,)."""
+
+    name: str
+    sha256: str
+    features: np.ndarray
+    gyro_error: np.ndarray
+    reference_rate: np.ndarray
+
+
+def load_drive(path: Path) -> Drive:
+    """Read one CSV. Raises ValueError that names the file and what is wrong with it."""
+    raw = path.read_bytes()
+    table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
+    missing = [name for name in COLUMNS if name not in (table.dtype.names or ())]
+    if missing:
+        raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
+    values = np.stack([table[name] for name in COLUMNS], axis=1)
+    if not np.isfinite(values).all():
+        row = int(np.argwhere(~np.isfinite(values).all(axis=1))[0, 0])
+        raise ValueError(f"{path}: line {row + 2}: a value is empty or not a number")
+    step = np.diff(values[:, 0])
+    if len(step) < STATIC_SAMPLES or (abs(step - 1 / RATE_HZ) > 1e-3).any():
+        raise ValueError(f"{path}: wants an unbroken 100 Hz recording of more than 3 s")
+    force, gyro, reference = values[:, 1:4], values[:, 4:7], values[:, 7]
+    gyro = gyro - gyro[:STATIC_SAMPLES].mean(axis=0)
+    return Drive(
+        name=path.stem,
+        sha256=hashlib.sha256(raw).hexdigest(),
+        features=np.concatenate([force, gyro], axis=1).astype(np.float32),
+        gyro_error=(gyro[:, 2] - reference).astype(np.float32),
+        reference_rate=reference.astype(np.float32),
+    )
+
+
+def windows(series: np.ndarray, length: int = WINDOW) -> np.ndarray:
+    """All overlapping windows of a series, step one sample: (T, ...) -> (T-length+1, length, ...)."""
+    view = np.lib.stride_tricks.sliding_window_view(series, length, axis=0)
+    return np.moveaxis(view, -1, 1)
+
+
+def mean_1s_error(rate_error: np.ndarray) -> float:
+    """Mean |yaw error| over consecutive, non-overlapping 1 s windows after the static phase, rad."""
+    error = rate_error[STATIC_SAMPLES:]
+    whole = len(error) // RATE_HZ * RATE_HZ
+    return float(np.abs(error[:whole].reshape(-1, RATE_HZ).sum(axis=1) / RATE_HZ).mean())
