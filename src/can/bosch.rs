@@ -1,0 +1,202 @@
+//! The Bosch MM5.10 yaw-rate message, 0x174 at 100 Hz: a drop-in for sensors that are in cars.
+//!
+//! | bytes | signal | scale |
+//! |---|---|---|
+//! | 0-1 | YawRate, u16 LE | 0.005 deg/s, offset -163.84 deg/s |
+//! | 2, low nibble | CLU_STAT | 0 |
+//! | 2, high nibble | YawRate_STAT | bit 0 not available, 1 failure, 2 initialising |
+//! | 3 | TEMP | 1 deg C, offset -50; 0xFF unknown |
+//! | 4-5 | AY, u16 LE | 0.000127465 g, zero at 0x8000 |
+//! | 6, low nibble | MSG_CNT | one up each 10 ms |
+//! | 6, high nibble | AY_STAT | as YawRate_STAT |
+//! | 7 | CRC | SAE J1850 over bytes 0 to 6 |
+//!
+//! Source: Bosch's off_highway_mm7p10 receiver and the MM5.10 layout it shares. The CRC's
+//! polynomial is published nowhere; J1850 is our choice.
+//!
+//! 0.005 deg/s is 18 deg/h: a rounded parked car would seem to turn by up to 9 deg/h for ever.
+//! [`YawRateSignal`] therefore carries each frame's rounding residual into the next one; the
+//! receiver's integral is then never off by more than half an LSB times one period.
+
+use crate::units::{AngularRate, CentiCelsius, SpecificForce};
+use embedded_can::{Frame, StandardId};
+
+/// Identifier of the message that carries yaw rate and lateral acceleration (TX1).
+pub const TX1_ID: StandardId = StandardId::new(0x174).unwrap();
+/// SAE J1850: polynomial 0x1D, start and final XOR 0xFF.
+pub const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
+
+/// Zero rate and zero acceleration.
+const ZERO: i32 = 0x8000;
+/// 0.005 deg/s in 1e-9 deg/s.
+const YAW_RATE_LSB_NANO_DEG: i64 = 5_000_000;
+/// 1e-9 deg/s per rate code (180e9 / pi / 2^27), times 2^20.
+const NANO_DEG_PER_CODE_Q20: i64 = 447_623_277;
+/// Acceleration codes per 2^-20 m/s^2 (1 / (0.000127465 * 9.80665 * 2^20)), times 2^32.
+const AY_PER_CODE_Q32: i64 = 3_276_788;
+
+/// Quality of one signal, as its nibble says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SignalStatus(pub u8);
+
+impl SignalStatus {
+    /// Good.
+    pub const OK: Self = Self(0);
+    /// Not available.
+    pub const NOT_AVAILABLE: Self = Self(1);
+    /// Failed: do not use.
+    pub const FAILURE: Self = Self(2);
+    /// Initialising: do not use yet.
+    pub const INITIALISING: Self = Self(4);
+}
+
+/// TX1 as values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Tx1 {
+    /// Code of the yaw rate.
+    pub yaw_rate: u16,
+    /// Its quality.
+    pub yaw_rate_status: SignalStatus,
+    /// Code of the temperature.
+    pub temperature: u8,
+    /// Code of the lateral acceleration.
+    pub lateral_acceleration: u16,
+    /// Its quality.
+    pub lateral_acceleration_status: SignalStatus,
+    /// 0 to 15.
+    pub counter: u8,
+}
+
+/// Why eight bytes are no good TX1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Tx1Error {
+    /// Not eight bytes.
+    Length(usize),
+    /// The checksum does not fit.
+    Crc {
+        /// Over bytes 0 to 6.
+        computed: u8,
+        /// Byte 7.
+        received: u8,
+    },
+}
+
+impl core::fmt::Display for Tx1Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Length(len) => write!(f, "TX1 has {len} bytes instead of 8"),
+            Self::Crc { computed, received } => {
+                write!(f, "TX1 checksum is {received:02x}, should be {computed:02x}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Tx1Error {}
+
+impl Tx1 {
+    /// The eight bytes.
+    #[must_use]
+    pub fn emit(&self) -> [u8; 8] {
+        let [yaw0, yaw1] = self.yaw_rate.to_le_bytes();
+        let [ay0, ay1] = self.lateral_acceleration.to_le_bytes();
+        let status = self.yaw_rate_status.0 << 4;
+        let counter = (self.counter & 0x0F) | self.lateral_acceleration_status.0 << 4;
+        let mut bytes = [yaw0, yaw1, status, self.temperature, ay0, ay1, counter, 0];
+        bytes[7] = CRC.checksum(&bytes[..7]);
+        bytes
+    }
+
+    /// The frame, in a driver's own type; `None` only if that type cannot hold eight bytes.
+    #[must_use]
+    pub fn frame<F: Frame>(&self) -> Option<F> {
+        F::new(TX1_ID, &self.emit())
+    }
+
+    /// Checks and reads eight bytes.
+    ///
+    /// # Errors
+    /// [`Tx1Error`] for a wrong length or checksum.
+    pub fn parse(bytes: &[u8]) -> Result<Self, Tx1Error> {
+        let &[yaw0, yaw1, status, temperature, ay0, ay1, counter, received] = bytes else {
+            return Err(Tx1Error::Length(bytes.len()));
+        };
+        let computed = CRC.checksum(&bytes[..7]);
+        if computed != received {
+            return Err(Tx1Error::Crc { computed, received });
+        }
+        Ok(Self {
+            yaw_rate: u16::from_le_bytes([yaw0, yaw1]),
+            yaw_rate_status: SignalStatus(status >> 4),
+            temperature,
+            lateral_acceleration: u16::from_le_bytes([ay0, ay1]),
+            lateral_acceleration_status: SignalStatus(counter >> 4),
+            counter: counter & 0x0F,
+        })
+    }
+
+    /// The yaw rate in deg/s.
+    #[must_use]
+    pub fn yaw_rate_deg_per_sec(&self) -> f64 {
+        f64::from(i32::from(self.yaw_rate) - ZERO) * 0.005
+    }
+}
+
+/// The yaw rate's rounding residual.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct YawRateSignal {
+    /// 1e-9 deg/s owed to the receiver.
+    residual: i64,
+}
+
+/// The rate does not fit the signal (+-163.84 deg/s); its code is the nearest limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutOfRange(pub u16);
+
+impl YawRateSignal {
+    /// Code of a rate, the residual of the earlier ones included.
+    ///
+    /// # Errors
+    /// [`OutOfRange`]; the residual is then dropped, since the frame is marked bad.
+    pub fn encode(&mut self, rate: AngularRate) -> Result<u16, OutOfRange> {
+        let wanted = ((i64::from(rate.0) * NANO_DEG_PER_CODE_Q20) >> 20) + self.residual;
+        let code = (wanted + YAW_RATE_LSB_NANO_DEG / 2).div_euclid(YAW_RATE_LSB_NANO_DEG);
+        match u16::try_from(code + i64::from(ZERO)) {
+            Ok(raw) => {
+                self.residual = wanted - code * YAW_RATE_LSB_NANO_DEG;
+                Ok(raw)
+            }
+            Err(_) => {
+                self.residual = 0;
+                Err(OutOfRange(if code < 0 { 0 } else { u16::MAX }))
+            }
+        }
+    }
+}
+
+/// Code of a lateral acceleration, nearest, and whether it fits (+-4.18 g).
+#[must_use]
+pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
+    let code = (i64::from(force.0) * AY_PER_CODE_Q32 + (1 << 31)) >> 32;
+    let raw = code + i64::from(ZERO);
+    match u16::try_from(raw) {
+        Ok(raw) => (raw, SignalStatus::OK),
+        Err(_) => (if raw < 0 { 0 } else { u16::MAX }, SignalStatus::FAILURE),
+    }
+}
+
+/// Code of a temperature: whole degrees from -50, 0xC9 above 150, 0xFF unknown.
+#[must_use]
+pub fn encode_temperature(temperature: Option<CentiCelsius>) -> u8 {
+    match temperature {
+        None => 0xFF,
+        Some(CentiCelsius(centi)) => {
+            let degrees = (i32::from(centi) + 50).div_euclid(100);
+            if degrees > 150 { 0xC9 } else { (degrees + 50).max(0) as u8 }
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! A classic CAN data frame, for where no driver brings its own type.
+
+use embedded_can::{Frame, Id};
+
+/// Identifier and up to eight bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DataFrame {
+    id: Id,
+    data: [u8; 8],
+    len: u8,
+}
+
+impl Frame for DataFrame {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
+        let mut bytes = [0; 8];
+        bytes.get_mut(..data.len())?.copy_from_slice(data);
+        Some(Self { id: id.into(), data: bytes, len: data.len() as u8 })
+    }
+
+    /// Remote frames carry no data and are not supported: always `None`.
+    fn new_remote(_id: impl Into<Id>, _dlc: usize) -> Option<Self> {
+        None
+    }
+
+    fn is_extended(&self) -> bool {
+        matches!(self.id, Id::Extended(_))
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        false
+    }
+
+    fn id(&self) -> Id {
+        self.id
+    }
+
+    fn dlc(&self) -> usize {
+        usize::from(self.len)
+    }
+
+    fn data(&self) -> &[u8] {
+        &self.data[..usize::from(self.len)]
+    }
+}

@@ -1,0 +1,103 @@
+//! CAN over a serial line, the Lawicel way (CAN232 manual): one frame, one line of ASCII.
+
+use embedded_can::{Frame, Id};
+use heapless::Vec;
+
+/// `T`, eight digits of identifier, length, sixteen digits of data, CR.
+pub const MAX_LINE: usize = 27;
+/// A frame as sent.
+pub type Line = Vec<u8, MAX_LINE>;
+
+const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
+
+/// `tIIILDD..` for a standard identifier, `TIIIIIIIILDD..` for an extended one, CR at the end.
+///
+/// `None` for a frame that is no classic data frame (remote, or more than eight bytes).
+#[must_use]
+pub fn emit(frame: &impl Frame) -> Option<Line> {
+    if frame.is_remote_frame() || frame.data().len() > 8 {
+        return None;
+    }
+    let (letter, id, digits) = match frame.id() {
+        Id::Standard(id) => (b't', u32::from(id.as_raw()), 3),
+        Id::Extended(id) => (b'T', id.as_raw(), 8),
+    };
+    let mut line = Line::new();
+    line.push(letter).ok()?;
+    for k in (0..digits).rev() {
+        line.push(DIGITS[(id >> (4 * k)) as usize & 0xF]).ok()?;
+    }
+    line.push(DIGITS[frame.dlc() & 0xF]).ok()?;
+    for byte in frame.data() {
+        line.push(DIGITS[usize::from(byte >> 4)]).ok()?;
+        line.push(DIGITS[usize::from(byte & 0xF)]).ok()?;
+    }
+    line.push(b'\r').ok()?;
+    Some(line)
+}
+
+/// Why a line is no data frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SlcanError {
+    /// The first letter is not `t` or `T`.
+    Kind,
+    /// A character is not a hexadecimal digit.
+    Digit {
+        /// Where in the line.
+        at: usize,
+    },
+    /// The line is shorter or longer than its length digit says.
+    Length,
+    /// The identifier is too large for its kind.
+    Identifier,
+}
+
+impl core::fmt::Display for SlcanError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Kind => f.write_str("not a data frame line"),
+            Self::Digit { at } => write!(f, "no hexadecimal digit at column {at}"),
+            Self::Length => f.write_str("line length does not fit the frame"),
+            Self::Identifier => f.write_str("identifier out of range"),
+        }
+    }
+}
+
+impl core::error::Error for SlcanError {}
+
+/// Reads one data frame line, without its CR.
+///
+/// # Errors
+/// [`SlcanError`] for anything that [`emit`] would not write.
+pub fn parse<F: Frame>(line: &[u8]) -> Result<F, SlcanError> {
+    let digits = match line.first() {
+        Some(b't') => 3,
+        Some(b'T') => 8,
+        _ => return Err(SlcanError::Kind),
+    };
+    let digit = |at: usize| {
+        let c = *line.get(at).ok_or(SlcanError::Length)?;
+        char::from(c).to_digit(16).ok_or(SlcanError::Digit { at })
+    };
+    let mut raw = 0;
+    for at in 1..=digits {
+        raw = raw << 4 | digit(at)?;
+    }
+    let len = digit(digits + 1)? as usize;
+    if len > 8 || line.len() != digits + 2 + 2 * len {
+        return Err(SlcanError::Length);
+    }
+    let mut data = [0; 8];
+    for (k, byte) in data.iter_mut().enumerate().take(len) {
+        let at = digits + 2 + 2 * k;
+        *byte = (digit(at)? << 4 | digit(at + 1)?) as u8;
+    }
+    let id = if digits == 3 {
+        embedded_can::StandardId::new(raw as u16).map(Id::Standard)
+    } else {
+        embedded_can::ExtendedId::new(raw).map(Id::Extended)
+    };
+    F::new(id.ok_or(SlcanError::Identifier)?, &data[..len]).ok_or(SlcanError::Length)
+}

@@ -1,0 +1,15 @@
+#![doc = include_str!("../README.md")]
+#![cfg_attr(not(test), no_std)]
+
+pub mod align;
+pub mod bias;
+pub mod can;
+pub mod compensate;
+pub mod health;
+pub mod model;
+pub mod nn;
+pub mod pipeline;
+pub mod sample;
+pub mod sensor;
+pub mod units;
+pub mod window;

@@ -1,0 +1,31 @@
+//! The networks of the paper, with their topology, on top of [`crate::nn`].
+
+pub mod blob;
+pub mod gyronet;
+pub mod gyronet_f32;
+pub mod weights;
+
+pub use blob::{Blob, BlobError};
+pub use gyronet::GyroNet;
+
+use crate::units::AngularRate;
+use crate::window::{Features, WINDOW};
+
+/// Estimates of the yaw gyro's error, one for each sample of a window, oldest first.
+pub type Corrections = [AngularRate; WINDOW];
+
+/// Whatever turns a window into corrections: the integer network, the f32 reference.
+pub trait WindowNetwork {
+    /// Runs the network over one window.
+    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate;
+}
+
+/// What a network made of a window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Estimate {
+    /// The corrections.
+    pub corrections: Corrections,
+    /// Input values that had to be clamped to the network's range.
+    pub clamped_inputs: u16,
+}

@@ -1,0 +1,12 @@
+//! The weights that come with the library: GyroNet trained on drives of one car.
+//!
+//! Where they come from stands in their provenance ([`super::Blob::provenance`]). An image
+//! that does not use them does not contain them.
+
+use crate::nn::Aligned;
+
+const BYTES: &[u8; include_bytes!("../../tools/weights/gyronet.blob").len()] =
+    include_bytes!("../../tools/weights/gyronet.blob");
+
+/// A weight file, on the boundary that [`super::Blob::new_checked`] wants.
+pub static DEFAULT: Aligned<[u8; BYTES.len()]> = Aligned(*BYTES);

@@ -1,0 +1,49 @@
+//! Recurrent networks in integers, and the f32 reference beside them.
+//!
+//! Weights are immutable slices, apart from the state that the caller owns: one set of weights
+//! can drive many states. The number formats:
+//!
+//! | what | type | format |
+//! |---|---|---|
+//! | weights of a gate row | int8, +-127 | value x row scale |
+//! | network input | int16 | Q10 of the normalised feature, clamped (blob) |
+//! | hidden state `h` | int16 | Q10, +-1024 |
+//! | accumulator of a gate row | int32 | row scale x 2^-10 |
+//! | gate input | 18 bit, saturated | Q14, +-8 |
+//! | gate output | int16 | Q15 ([`activation`]) |
+//! | cell state `c` | int32 | Q20 |
+//!
+//! # Two rows in one multiply
+//! The int8 weights of two gates of a unit share a 16-bit halfword: `256 * high + low`, with
+//! (low, high) = (i, f) and (g, o). A 16 x 16 bit multiply-accumulate over it sums
+//! `256 * high_row + low_row`; a second one over the sign-extended low bytes sums `low_row`;
+//! the difference is 256 times the high row's sum. Two rows thus cost one byte extraction
+//! instead of two. The sum must stay inside 32 bits, so a high row's accumulator is bound to
+//! +-2^23: [`crate::model::Blob`] proves that for every row, for all possible inputs, before
+//! any weight is used ([`lstm::row_bound`]).
+//!
+//! # Rounding
+//! A product is scaled by an arithmetic right shift (towards minus infinity); where half an
+//! LSB matters it is added before: in the row's bias by the quantiser, in `h` by the kernel.
+
+pub mod activation;
+pub mod bilstm;
+pub mod dense;
+pub mod lstm;
+pub mod reference;
+
+/// Fraction bits of network inputs and hidden states.
+pub const HIDDEN_FRACTION_BITS: u32 = 10;
+/// The hidden state's largest magnitude: 1.0.
+pub const HIDDEN_MAX: i32 = 1 << HIDDEN_FRACTION_BITS;
+/// Fraction bits of a gate's input.
+pub const GATE_FRACTION_BITS: u32 = 14;
+/// Fraction bits of the cell state.
+pub const CELL_FRACTION_BITS: u32 = 20;
+/// Gates of an LSTM unit, in PyTorch's order: input, forget, cell candidate, output.
+pub const GATES: usize = 4;
+
+/// An array on a 4-byte boundary, as the word-wide kernels load it.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(4))]
+pub struct Aligned<T>(pub T);

@@ -1,0 +1,71 @@
+//! The networks in plain f32: what the integer code is measured against. Never optimised.
+//!
+//! Equations 7 to 12 of Zhao et al., with the weights as PyTorch lays them out: the rows of
+//! `weight_ih` (4H, I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows
+//! each, and there are two bias vectors (4H).
+
+/// One direction of an LSTM layer, PyTorch layout, row-major.
+#[derive(Debug, Clone, Copy)]
+pub struct LstmWeights<'w> {
+    /// (4H, I)
+    pub weight_ih: &'w [f32],
+    /// (4H, H)
+    pub weight_hh: &'w [f32],
+    /// (4H)
+    pub bias_ih: &'w [f32],
+    /// (4H)
+    pub bias_hh: &'w [f32],
+}
+
+/// Runs one direction over `x` (T, I) from a zero state and writes `h` into columns
+/// `offset..offset + H` of `output` (T, W).
+///
+/// # Panics
+/// When a slice is not of the stated shape.
+pub fn lstm<const I: usize, const H: usize, const W: usize>(
+    weights: &LstmWeights<'_>,
+    x: &[[f32; I]],
+    backward: bool,
+    output: &mut [[f32; W]],
+    offset: usize,
+) {
+    let mut h = [0.0; H];
+    let mut s = [0.0; H];
+    for n in 0..x.len() {
+        let t = if backward { x.len() - 1 - n } else { n };
+        let mut next = [0.0; H];
+        for u in 0..H {
+            let preactivation = |gate: usize| {
+                let row = gate * H + u;
+                let mut sum = weights.bias_ih[row] + weights.bias_hh[row];
+                for k in 0..I {
+                    sum += weights.weight_ih[row * I + k] * x[t][k];
+                }
+                for k in 0..H {
+                    sum += weights.weight_hh[row * H + k] * h[k];
+                }
+                sum
+            };
+            let i = sigmoid(preactivation(0)); // Eq. 8
+            let f = sigmoid(preactivation(1)); // Eq. 9
+            let g = libm::tanhf(preactivation(2)); // Eq. 7
+            let o = sigmoid(preactivation(3)); // Eq. 10
+            s[u] = g * i + s[u] * f; // Eq. 11
+            next[u] = libm::tanhf(s[u]) * o; // Eq. 12
+        }
+        h = next;
+        output[t][offset..offset + H].copy_from_slice(&h);
+    }
+}
+
+/// A fully-connected layer of one output: `weight` (I) and `bias` over `x` (I).
+#[must_use]
+pub fn dense(weight: &[f32], bias: f32, x: &[f32]) -> f32 {
+    weight.iter().zip(x).fold(bias, |sum, (w, x)| sum + w * x)
+}
+
+/// The logistic function.
+#[must_use]
+pub fn sigmoid(x: f32) -> f32 {
+    1.0 / (1.0 + libm::expf(-x))
+}

@@ -1,0 +1,36 @@
+//! What a sensor delivers and what the pipeline works on.
+
+use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
+
+/// Rate of the common grid that the networks see, Hz.
+pub const RATE_HZ: u32 = 100;
+/// One step of the grid, microseconds.
+pub const PERIOD_US: u64 = 1_000_000 / RATE_HZ as u64;
+
+/// One reading of an inertial measurement unit: x forward, y left, z up (FLU).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ImuSample {
+    /// When the part took it, by the part's own clock, unwrapped.
+    pub time: Micros,
+    /// Specific force x, y, z.
+    pub specific_force: [SpecificForce; 3],
+    /// Angular rate about x, y, z.
+    pub angular_rate: [AngularRate; 3],
+    /// Temperature of the part, where it gives one.
+    pub temperature: Option<CentiCelsius>,
+    /// The part says that one of its axes clipped.
+    pub clipped: bool,
+}
+
+/// A sample that has found its place on the 100 Hz grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Frame {
+    /// Number of the grid step, counted from the first sample.
+    pub tick: u32,
+    /// Grid steps before this one that no sample filled.
+    pub missing: u32,
+    /// The sample itself.
+    pub sample: ImuSample,
+}

@@ -1,0 +1,118 @@
+//! Fixed-point physical quantities of the integer pipeline.
+//!
+//! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a
+//! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
+//! and the scaled reading are different methods.
+
+/// Why a reading cannot be taken over into fixed point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum RangeError {
+    /// The reading is NaN or infinite.
+    NotFinite,
+    /// The reading is finite but beyond what any part of this kind can measure.
+    OutOfRange,
+}
+
+impl core::fmt::Display for RangeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NotFinite => "not a finite number",
+            Self::OutOfRange => "out of range",
+        })
+    }
+}
+
+impl core::error::Error for RangeError {}
+
+/// Angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AngularRate(pub i32);
+
+impl AngularRate {
+    /// Fraction bits of the code.
+    pub const FRACTION_BITS: u32 = 27;
+    /// Codes per rad/s.
+    pub const PER_RAD_PER_SEC: f32 = (1u32 << Self::FRACTION_BITS) as f32;
+    /// No rotation.
+    pub const ZERO: Self = Self(0);
+
+    /// Nearest code to a reading in rad/s.
+    ///
+    /// # Errors
+    /// [`RangeError`] when the reading is not finite or not inside +-16 rad/s.
+    pub fn from_rad_per_sec(value: f32) -> Result<Self, RangeError> {
+        to_code(value, Self::PER_RAD_PER_SEC).map(Self)
+    }
+
+    /// The rate in rad/s, for display and evaluation.
+    #[must_use]
+    pub fn rad_per_sec(self) -> f64 {
+        f64::from(self.0) / f64::from(Self::PER_RAD_PER_SEC)
+    }
+}
+
+/// Specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SpecificForce(pub i32);
+
+impl SpecificForce {
+    /// Fraction bits of the code.
+    pub const FRACTION_BITS: u32 = 20;
+    /// Codes per m/s^2.
+    pub const PER_METRE_PER_SEC2: f32 = (1u32 << Self::FRACTION_BITS) as f32;
+
+    /// Nearest code to a reading in m/s^2.
+    ///
+    /// # Errors
+    /// [`RangeError`] when the reading is not finite or not inside +-2048 m/s^2.
+    pub fn from_metre_per_sec2(value: f32) -> Result<Self, RangeError> {
+        to_code(value, Self::PER_METRE_PER_SEC2).map(Self)
+    }
+
+    /// The specific force in m/s^2, for display and evaluation.
+    #[must_use]
+    pub fn metre_per_sec2(self) -> f64 {
+        f64::from(self.0) / f64::from(Self::PER_METRE_PER_SEC2)
+    }
+}
+
+/// Accumulated yaw, signed 64 bit, LSB 2^-27 rad/s x 10 ms: the plain sum of emitted rates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Yaw(pub i64);
+
+impl Yaw {
+    /// The angle in rad, unwrapped.
+    #[must_use]
+    pub fn rad(self) -> f64 {
+        // Exact to 2^53 codes: 2^53 x 7.5e-11 rad is 671,000 rad.
+        self.0 as f64 / (f64::from(AngularRate::PER_RAD_PER_SEC) * f64::from(crate::sample::RATE_HZ))
+    }
+}
+
+/// Temperature of the part, in 1/100 deg C.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CentiCelsius(pub i16);
+
+/// Device time, unwrapped, in microseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Micros(pub u64);
+
+/// Scales by a power of two (exact in f32) and rounds to nearest, ties away from zero.
+fn to_code(value: f32, per_unit: f32) -> Result<i32, RangeError> {
+    if !value.is_finite() {
+        return Err(RangeError::NotFinite);
+    }
+    let code = libm::roundf(value * per_unit);
+    // 2^31 itself is the first f32 that does not fit.
+    if !(-2_147_483_648.0..2_147_483_648.0).contains(&code) {
+        return Err(RangeError::OutOfRange);
+    }
+    Ok(code as i32)
+}

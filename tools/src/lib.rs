@@ -1,0 +1,4 @@
+//! gyronet on a host: read recordings, quantise, replay, evaluate, simulate.
+
+pub mod checkpoint;
+pub mod quantize;
