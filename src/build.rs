@@ -1,14 +1,28 @@
-//! Hands `memory.x` to the linker of the firmware images.
+//! Hands `memory.x` to the linker of the firmware images, and tells the library whether the
+//! processor has the DSP extension: a stable compiler does not show that feature to `cfg`.
 
 use std::{env, fs, path::PathBuf};
 
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rerun-if-changed=src/build.rs");
+    println!("cargo:rustc-check-cfg=cfg(gyronet_dsp)");
+    if has_dsp() {
+        println!("cargo:rustc-cfg=gyronet_dsp");
+    }
     if env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
         // cortex-m-rt's link.x includes memory.x from the search path.
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
         fs::copy("memory.x", out.join("memory.x")).expect("memory.x stands in the package root");
         println!("cargo:rustc-link-search={}", out.display());
     }
+}
+
+/// ARMv7E-M always has it; ARMv8-M mainline where the flags name it or a core that has it.
+fn has_dsp() -> bool {
+    let target = env::var("TARGET").unwrap_or_default();
+    let flags = env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
+    let named = ["+dsp", "cortex-m33", "cortex-m35p", "cortex-m55", "cortex-m85"];
+    target.starts_with("thumbv7em")
+        || target.starts_with("thumbv8m.main") && named.iter().any(|name| flags.contains(name))
 }

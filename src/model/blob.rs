@@ -17,11 +17,11 @@
 //! | ... | i16 x 2H, i32, i32 | output weights, bias, multiplier |
 //! | end - 4 | u32 | CRC-32 (ISO-HDLC, as in zip and Ethernet) of everything before it |
 //!
-//! A direction is i32 x 4H biases, i16 x 4H multipliers, the packed input matrix and the
-//! packed recurrent matrix, in the order of [`crate::nn::lstm`].
+//! A direction is its input records, then its recurrent records, as [`crate::nn::lstm`] lays
+//! them out.
 
-use crate::nn::lstm::{Accumulators, Direction, ROW_LIMIT, row_bound};
-use crate::nn::{GATES, HIDDEN_MAX, bilstm::Layer, dense::Dense};
+use crate::nn::lstm::{Direction, ROW_LIMIT, row_bound};
+use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
 use crate::window::{FEATURES, WINDOW};
 
 /// First bytes of a weight file.
@@ -147,7 +147,7 @@ pub const fn file_len(provenance: usize) -> usize {
 }
 
 const fn direction_len(inputs: usize) -> usize {
-    GATES * HIDDEN * (4 + 2 + inputs + HIDDEN)
+    4 * (Direction::input_words(HIDDEN, inputs) + Direction::recurrent_words(HIDDEN))
 }
 
 impl<'w> Blob<'w> {
@@ -279,11 +279,8 @@ impl<'w> Reader<'w> {
     }
 
     fn direction(&mut self, inputs: usize) -> Result<Direction<'w>, BlobError> {
-        Ok(Direction {
-            bias: self.slice::<Accumulators>(HIDDEN)?,
-            multiplier: self.slice::<[i16; GATES]>(HIDDEN)?,
-            input: self.slice(GATES * HIDDEN * inputs / 2)?,
-            recurrent: self.slice(GATES * HIDDEN * HIDDEN / 2)?,
-        })
+        let input = self.slice(Direction::input_words(HIDDEN, inputs))?;
+        let recurrent = self.slice(Direction::recurrent_words(HIDDEN))?;
+        Direction::new(HIDDEN, inputs, input, recurrent).ok_or(BlobError::Misaligned)
     }
 }

@@ -2,22 +2,36 @@
 
 use super::blob::{Blob, HIDDEN, Normalisation};
 use super::{Estimate, WindowNetwork};
-use crate::nn::bilstm::{self, Way};
-use crate::nn::{Aligned, dense::Dense, lstm::Scratch};
+use crate::nn::bilstm::{self, Pass, Run, Way};
+use crate::nn::lstm::Scratch;
+use crate::nn::{dense::Dense, pack};
 use crate::units::AngularRate;
 use crate::window::{FEATURES, Features, WINDOW};
+
+/// Words of the hidden state of one direction.
+const HIDDEN_WORDS: usize = HIDDEN / 2;
 
 /// Working memory of one window.
 #[derive(Debug, Clone)]
 pub struct GyroNetState {
-    input: Aligned<[i16; WINDOW * FEATURES]>,
-    layer1: Aligned<[i16; WINDOW * 2 * HIDDEN]>,
-    scratch: Scratch<HIDDEN>,
+    input: [u32; WINDOW * FEATURES / 2],
+    layer1: [u32; WINDOW * HIDDEN],
+    scratch: Scratch<HIDDEN, HIDDEN_WORDS>,
+    sums: [i32; WINDOW],
+    clamped_inputs: u16,
+    run: Option<Run>,
 }
 
 impl GyroNetState {
     /// Nothing in it yet; a window leaves nothing for the next one either.
-    pub const ZERO: Self = Self { input: Aligned([0; _]), layer1: Aligned([0; _]), scratch: Scratch::ZERO };
+    pub const ZERO: Self = Self {
+        input: [0; _],
+        layer1: [0; _],
+        scratch: Scratch::ZERO,
+        sums: [0; _],
+        clamped_inputs: 0,
+        run: None,
+    };
 }
 
 /// The integer network: weights in place, state owned.
@@ -40,16 +54,75 @@ impl<'w> GyroNet<'w> {
         &self.blob
     }
 
+    /// Loads a window; [`GyroNet::advance`] then runs it piece by piece. One that was under way
+    /// is dropped.
+    pub fn start(&mut self, window: &[Features; WINDOW]) {
+        self.state.clamped_inputs = self.load(window);
+        self.state.sums = [self.blob.dense.bias; WINDOW];
+        self.state.run = Some(Run::new());
+    }
+
+    /// Does a bounded piece of the window (two steps of one direction, a twentieth of it or
+    /// less); returns the estimate with the last one, `None` before that and when none is
+    /// under way.
+    pub fn advance(&mut self) -> Option<Estimate> {
+        let Self { blob, state } = self;
+        let GyroNetState { input, layer1, scratch, sums, clamped_inputs, run } = state;
+        let (forward, backward) = blob.dense.weights.split_at(HIDDEN);
+        let more = run.as_mut()?.advance(&blob.layers, input, layer1, scratch, |way, step, hidden| {
+            let weights = if way == Way::Forward { forward } else { backward };
+            sums[step] = sums[step].wrapping_add(Dense::partial(weights, hidden));
+        });
+        if more {
+            return None;
+        }
+        *run = None;
+        let corrections = sums.map(|sum| AngularRate(blob.dense.scale(sum)));
+        Some(Estimate { corrections, clamped_inputs: *clamped_inputs })
+    }
+
+    /// The newest sample's correction only, and the clamped inputs. The backward half of layer 2
+    /// needs just its first steps for that, which saves a third of the work; the result is the
+    /// last of [`WindowNetwork::estimate`]'s, bit for bit.
+    pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
+        let clamped_inputs = self.load(window);
+        let Self { blob: Blob { layers: [first, second], dense, .. }, state } = self;
+        let GyroNetState { input, layer1, scratch, .. } = state;
+        for (direction, way, offset) in
+            [(&first.forward, Way::Forward, 0), (&first.backward, Way::Backward, HIDDEN)]
+        {
+            Pass::new(way).finish(direction, input, scratch, |step, hidden| {
+                bilstm::store(layer1, step, offset, 2 * HIDDEN, HIDDEN, hidden);
+            });
+        }
+        let (forward, backward) = dense.weights.split_at(HIDDEN);
+        let mut sum = dense.bias;
+        let mut add = |weights, step, hidden: &[u32]| {
+            if step == WINDOW - 1 {
+                sum = sum.wrapping_add(Dense::partial(weights, hidden));
+            }
+        };
+        Pass::new(Way::Forward)
+            .finish(&second.forward, layer1, scratch, |step, hidden| add(forward, step, hidden));
+        Pass::new(Way::Backward)
+            .advance(&second.backward, layer1, scratch, |step, hidden| add(backward, step, hidden));
+        (AngularRate(dense.scale(sum)), clamped_inputs)
+    }
+
     /// Normalises the window into the first layer's input; counts what had to be clamped.
     fn load(&mut self, window: &[Features; WINDOW]) -> u16 {
         let clamp = i32::from(self.blob.input_clamp);
         let mut clamped = 0;
         for (step, features) in window.iter().enumerate() {
-            for (column, (code, n)) in features.iter().zip(&self.blob.normalisation).enumerate() {
+            let mut values = [0; FEATURES];
+            for ((to, code), n) in values.iter_mut().zip(features).zip(&self.blob.normalisation) {
                 let value = normalise(*code, *n);
                 let inside = value.clamp(-clamp, clamp);
                 clamped += u16::from(inside != value);
-                self.state.input.0[bilstm::interleaved(step, column, FEATURES)] = inside as i16;
+                *to = inside as i16;
+            }
+            for (k, [first, second]) in values.as_chunks::<2>().0.iter().enumerate() {
+                self.state.input[bilstm::word_index(step, 2 * k, FEATURES)] = pack(*first, *second);
             }
         }
         clamped
@@ -58,20 +131,13 @@ impl<'w> GyroNet<'w> {
 
 impl WindowNetwork for GyroNet<'_> {
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
-        let clamped_inputs = self.load(window);
-        let GyroNetState { input, layer1, scratch } = &mut self.state;
-        let Blob { layers: [first, second], dense, .. } = &self.blob;
-        bilstm::run_layer(first, FEATURES, &input.0, scratch, &mut layer1.0);
-        let mut sums = [dense.bias; WINDOW];
-        let (forward, backward) = dense.weights.split_at(HIDDEN);
-        for (direction, way, weights) in
-            [(&second.forward, Way::Forward, forward), (&second.backward, Way::Backward, backward)]
-        {
-            bilstm::run(direction, way, 2 * HIDDEN, &layer1.0, scratch, |step, hidden| {
-                sums[step] = sums[step].wrapping_add(Dense::partial(weights, hidden));
-            });
+        self.start(window);
+        loop {
+            // A run takes 20 pieces, whatever the window holds.
+            if let Some(estimate) = self.advance() {
+                return estimate;
+            }
         }
-        Estimate { corrections: sums.map(|sum| AngularRate(dense.scale(sum))), clamped_inputs }
     }
 }
 

@@ -1,8 +1,11 @@
-//! A bidirectional LSTM layer over a whole sequence.
+//! A bidirectional LSTM layer over a whole sequence, in resumable pieces.
 //!
 //! Steps are taken in pairs: one input projection serves two of them. The backward direction
 //! takes the pairs, and the steps inside a pair, in reverse. Both start from a zero state, so
 //! the first step has no recurrent product.
+//!
+//! A sequence of an even number of steps with K values each lies in `K / 2` words a step; the
+//! two steps of a pair alternate word by word.
 
 use super::lstm::{self, Direction, Scratch};
 
@@ -25,60 +28,133 @@ pub enum Way {
     Backward,
 }
 
-/// Runs one direction over `input` and hands each step's hidden state (Q10) to `emit`.
-///
-/// `input` is the whole sequence, step pairs of `2 * inputs` values interleaved by column pair
-/// ([`interleaved`]); its length says how many steps there are, an even number.
-pub fn run<const H: usize>(
-    direction: &Direction<'_>,
+/// One direction's way through a sequence; [`Pass::advance`] takes it two steps further.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pass {
     way: Way,
-    inputs: usize,
-    input: &[i16],
-    scratch: &mut Scratch<H>,
-    mut emit: impl FnMut(usize, &[i16; H]),
-) {
-    scratch.cell_state = [0; H];
-    let pairs = input.len() / (2 * inputs);
-    let mut first = true;
-    for n in 0..pairs {
-        let pair = if way == Way::Forward { n } else { pairs - 1 - n };
-        let Some(x) = input.chunks_exact(2 * inputs).nth(pair) else { return };
-        lstm::project(direction, x, &mut scratch.projection);
-        for k in 0..2 {
-            let within = if way == Way::Forward { k } else { 1 - k };
-            let [a, b] = &mut scratch.hidden;
-            let (previous, next) = if k == 0 { (&b.0, &mut a.0) } else { (&a.0, &mut b.0) };
-            let previous = (!first).then_some(previous.as_slice());
-            lstm::step(direction, &scratch.projection, within, previous, &mut scratch.cell_state, next);
-            first = false;
-            emit(2 * pair + within, next);
+    done: usize,
+}
+
+impl Pass {
+    /// Before the first step.
+    #[must_use]
+    pub const fn new(way: Way) -> Self {
+        Self { way, done: 0 }
+    }
+
+    /// Takes the next pair of steps and hands each step's number and hidden state (Q10) to
+    /// `emit`; returns whether there are more.
+    ///
+    /// `input` is the whole sequence.
+    pub fn advance<const U: usize, const W: usize>(
+        &mut self,
+        direction: &Direction<'_>,
+        input: &[u32],
+        scratch: &mut Scratch<U, W>,
+        mut emit: impl FnMut(usize, &[u32; W]),
+    ) -> bool {
+        let pairs = input.len() / direction.inputs();
+        if self.done >= pairs {
+            return false;
         }
+        let (pair, order) = match self.way {
+            Way::Forward => (self.done, [0, 1]),
+            Way::Backward => (pairs - 1 - self.done, [1, 0]),
+        };
+        let words = direction.inputs();
+        let Scratch { cell_state, hidden: [even, odd], projection } = scratch;
+        lstm::project(direction, &input[pair * words..(pair + 1) * words], projection);
+        if self.done == 0 {
+            *cell_state = [0; U];
+        }
+        let [first, second] = order;
+        let previous = (self.done > 0).then_some(&*odd);
+        lstm::step(direction, &projection[first], previous, cell_state, even);
+        emit(2 * pair + first, even);
+        lstm::step(direction, &projection[second], Some(even), cell_state, odd);
+        emit(2 * pair + second, odd);
+        self.done += 1;
+        self.done < pairs
+    }
+
+    /// All steps that are left.
+    pub fn finish<const U: usize, const W: usize>(
+        mut self,
+        direction: &Direction<'_>,
+        input: &[u32],
+        scratch: &mut Scratch<U, W>,
+        mut emit: impl FnMut(usize, &[u32; W]),
+    ) {
+        while self.advance(direction, input, scratch, &mut emit) {}
     }
 }
 
-/// Runs both directions and writes their hidden states as the next layer's input: `2 H` values
-/// a step, forward first, interleaved in step pairs.
-pub fn run_layer<const H: usize>(
-    layer: &Layer<'_>,
-    inputs: usize,
-    input: &[i16],
-    scratch: &mut Scratch<H>,
-    output: &mut [i16],
-) {
-    for (direction, way, offset) in [(&layer.forward, Way::Forward, 0), (&layer.backward, Way::Backward, H)] {
-        run(direction, way, inputs, input, scratch, |step, hidden| {
-            for (u, h) in hidden.iter().enumerate() {
-                if let Some(out) = output.get_mut(interleaved(step, offset + u, 2 * H)) {
-                    *out = *h;
-                }
-            }
-        });
-    }
-}
-
-/// Where value `column` of `step` stands in a sequence of `columns` values a step.
+/// Where word `column / 2` of `step` stands in a sequence of `columns` values a step.
 #[inline]
 #[must_use]
-pub fn interleaved(step: usize, column: usize, columns: usize) -> usize {
-    (step / 2) * 2 * columns + (column / 2) * 4 + (step % 2) * 2 + column % 2
+pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
+    (step / 2) * columns + (column / 2) * 2 + step % 2
+}
+
+/// Writes a step's hidden state (`units` of it) into a sequence of `columns` values a step,
+/// from column `offset` on: the next layer's input.
+pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, units: usize, hidden: &[u32]) {
+    let words = sequence.iter_mut().skip(word_index(step, offset, columns)).step_by(2);
+    for (to, from) in words.zip(&hidden[..units / 2]) {
+        *to = *from;
+    }
+}
+
+/// A network of two bidirectional layers at work on one sequence; [`Run::advance`] takes it one
+/// bounded piece further: a pair of steps in one direction of one layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Run {
+    /// 0, 1: layer 1 forward, backward; 2, 3: layer 2.
+    stage: u8,
+    pass: Pass,
+}
+
+impl Run {
+    /// Before the first step.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { stage: 0, pass: Pass::new(Way::Forward) }
+    }
+
+    /// Does the next piece; returns whether there are more.
+    ///
+    /// `input` is the first layer's sequence, `between` takes the second one's. `emit` gets layer
+    /// 2's hidden states: which way, step, state.
+    pub fn advance<const U: usize, const W: usize>(
+        &mut self,
+        layers: &[Layer<'_>; 2],
+        input: &[u32],
+        between: &mut [u32],
+        scratch: &mut Scratch<U, W>,
+        mut emit: impl FnMut(Way, usize, &[u32; W]),
+    ) -> bool {
+        let (way, offset) = if self.stage.is_multiple_of(2) { (Way::Forward, 0) } else { (Way::Backward, U) };
+        let [first, second] = layers.each_ref().map(|layer| match way {
+            Way::Forward => &layer.forward,
+            Way::Backward => &layer.backward,
+        });
+        let more = match self.stage {
+            0 | 1 => self.pass.advance(first, input, scratch, |step, hidden| {
+                store(between, step, offset, 2 * U, U, hidden);
+            }),
+            2 | 3 => self.pass.advance(second, between, scratch, |step, hidden| emit(way, step, hidden)),
+            _ => return false,
+        };
+        if !more {
+            self.stage += 1;
+            self.pass = Pass::new(if self.stage.is_multiple_of(2) { Way::Forward } else { Way::Backward });
+        }
+        self.stage < 4
+    }
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self::new()
+    }
 }

@@ -1,5 +1,7 @@
 //! The fully-connected layer on top: one output a step, from both directions' hidden states.
 
+use super::unpack;
+
 /// Weights of one output over `2 H` hidden values, int16, and how its sum is scaled.
 #[derive(Debug, Clone, Copy)]
 pub struct Dense<'w> {
@@ -17,11 +19,14 @@ impl Dense<'_> {
 
     /// Part of the sum that one direction's hidden state gives; add both and the bias.
     ///
-    /// Sums of up to 2^15 products of 15 and 11 bits stay inside 32 bits for the layer sizes
-    /// here; [`crate::model::Blob`] proves it for the weights at hand.
+    /// `hidden` holds two units a word. The sum stays inside 32 bits: [`crate::model::Blob`]
+    /// proves it for the weights at hand.
     #[must_use]
-    pub fn partial(weights: &[i16], hidden: &[i16]) -> i32 {
-        weights.iter().zip(hidden).map(|(w, h)| i32::from(*w) * i32::from(*h)).fold(0, i32::wrapping_add)
+    pub fn partial(weights: &[i16], hidden: &[u32]) -> i32 {
+        weights.as_chunks::<2>().0.iter().zip(hidden).fold(0, |sum: i32, ([w0, w1], word)| {
+            let (h0, h1) = unpack(*word);
+            sum.wrapping_add(i32::from(*w0) * h0).wrapping_add(i32::from(*w1) * h1)
+        })
     }
 
     /// The scaled output of a whole sum (bias included), rounded to nearest, saturated.

@@ -1,119 +1,232 @@
 //! One LSTM direction in integers: the input projection of two steps, and one recurrent step.
 //!
-//! This portable code is the definition of the result (formats and packing: [`crate::nn`]).
-//! Memory is laid out in the order in which it is read:
+//! The portable code here is the definition of the result (formats and packing: [`crate::nn`]).
+//! Where the processor has a faster way (`nn/simd.rs`), [`project`] and [`step`] take it; the
+//! bits are the same.
 //!
-//! - a matrix of `4 H` gate rows and `K` columns is `H` units x `K/2` column pairs x 4 packed
-//!   halfwords: `(i,f)[j] (i,f)[j+1] (g,o)[j] (g,o)[j+1]`;
-//! - bias and projection are four accumulators a unit: `i`, packed `(i,f)`, `g`, packed `(g,o)`;
-//! - inputs of two consecutive steps are interleaved by column pair: `x0[j] x0[j+1] x1[j] x1[j+1]`.
+//! Weights lie in the order in which they are read. With K inputs and U units:
+//!
+//! - input record of a unit, 4 + K words: the accumulators that its bias starts from, then for
+//!   each pair of columns the packed words of gates (i, f) and (g, o);
+//! - recurrent record of a unit, C + 2 words, C the units rounded up to a multiple of four: the
+//!   packed words for each pair of columns, then the multipliers of (i, f) and (g, o);
+//! - the inputs of two consecutive steps alternate word by word.
 
-use super::{GATES, HIDDEN_FRACTION_BITS, activation};
+use super::{GATES, HIDDEN_FRACTION_BITS, activation, simd, unpack};
 
 /// Accumulators of one unit: row i, rows i and f packed, row g, rows g and o packed.
 pub type Accumulators = [i32; GATES];
 
-/// Weights of one direction, as they lie in the blob.
+/// Words of an input record before its columns.
+const BIAS_WORDS: usize = GATES;
+/// Words of a recurrent record after its columns.
+const MULTIPLIER_WORDS: usize = GATES / 2;
+
+/// Weights of one direction, in place. The lengths are checked once, here; the kernels rely on
+/// them.
 #[derive(Debug, Clone, Copy)]
 pub struct Direction<'w> {
-    /// Rounding and bias of each row, in accumulator units.
-    pub bias: &'w [Accumulators],
-    /// Multiplier of each row: gate input (Q14) = accumulator * multiplier / 2^16.
-    pub multiplier: &'w [[i16; GATES]],
-    /// Packed matrix over the inputs, `4 * units * inputs / 2` halfwords.
-    pub input: &'w [i16],
-    /// Packed matrix over the hidden state, `4 * units * units / 2` halfwords.
-    pub recurrent: &'w [i16],
+    units: usize,
+    inputs: usize,
+    input: &'w [u32],
+    recurrent: &'w [u32],
 }
 
-/// State and scratch of one direction with `H` units.
-#[derive(Debug, Clone)]
-pub struct Scratch<const H: usize> {
-    /// Cell state, Q20.
-    pub cell_state: [i32; H],
-    /// Hidden state before and after a step, Q10; which is which alternates.
-    pub hidden: [super::Aligned<[i16; H]>; 2],
-    /// Input projections of two consecutive steps.
-    pub projection: [[Accumulators; 2]; H],
-}
+impl<'w> Direction<'w> {
+    /// Words of the input records.
+    #[must_use]
+    pub const fn input_words(units: usize, inputs: usize) -> usize {
+        units * (BIAS_WORDS + inputs)
+    }
 
-impl<const H: usize> Scratch<H> {
-    /// All zero.
-    pub const ZERO: Self =
-        Self { cell_state: [0; H], hidden: [super::Aligned([0; H]); 2], projection: [[[0; GATES]; 2]; H] };
-}
+    /// Words of the recurrent records.
+    #[must_use]
+    pub const fn recurrent_words(units: usize) -> usize {
+        units * (Self::padded(units) + MULTIPLIER_WORDS)
+    }
 
-/// Adds the products of one unit's packed rows with `x` to its accumulators.
-///
-/// `rows` holds four halfwords and `x` two values a column pair.
-#[inline]
-fn accumulate<'x>(acc: &mut Accumulators, rows: &[i16], x: impl Iterator<Item = &'x [i16]>) {
-    for (w, x) in rows.chunks_exact(4).zip(x) {
-        let (x0, x1) = (i32::from(x[0]), i32::from(x[1]));
-        for pair in 0..2 {
-            let (w0, w1) = (w[2 * pair], w[2 * pair + 1]);
-            let low = i32::from(w0 as i8) * x0 + i32::from(w1 as i8) * x1;
-            let packed = i32::from(w0) * x0 + i32::from(w1) * x1;
-            acc[2 * pair] = acc[2 * pair].wrapping_add(low);
-            // Wraps on the way; the blob's row bound makes the final difference exact.
-            acc[2 * pair + 1] = acc[2 * pair + 1].wrapping_add(packed);
+    /// Columns of a recurrent record: the units, rounded up to a multiple of four.
+    #[must_use]
+    pub const fn padded(units: usize) -> usize {
+        units.next_multiple_of(4)
+    }
+
+    /// Takes records as they lie in a weight file; `None` unless `units` and `inputs` are even
+    /// and not zero, and the lengths fit them.
+    #[must_use]
+    pub const fn new(units: usize, inputs: usize, input: &'w [u32], recurrent: &'w [u32]) -> Option<Self> {
+        let even = units.is_multiple_of(2) && inputs.is_multiple_of(2) && units > 0 && inputs > 0;
+        if even
+            && input.len() == Self::input_words(units, inputs)
+            && recurrent.len() == Self::recurrent_words(units)
+        {
+            Some(Self { units, inputs, input, recurrent })
+        } else {
+            None
         }
     }
+
+    /// Hidden units.
+    #[must_use]
+    pub const fn units(&self) -> usize {
+        self.units
+    }
+
+    /// Input columns.
+    #[must_use]
+    pub const fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// All input records.
+    #[must_use]
+    pub const fn input(&self) -> &'w [u32] {
+        self.input
+    }
+
+    /// All recurrent records.
+    #[must_use]
+    pub const fn recurrent(&self) -> &'w [u32] {
+        self.recurrent
+    }
+
+    fn input_records(&self) -> impl Iterator<Item = (&'w [u32], &'w [u32])> {
+        self.input.chunks_exact(BIAS_WORDS + self.inputs).map(|record| record.split_at(BIAS_WORDS))
+    }
+
+    fn recurrent_records(&self) -> impl Iterator<Item = (&'w [u32], &'w [u32])> {
+        let columns = Self::padded(self.units);
+        self.recurrent.chunks_exact(columns + MULTIPLIER_WORDS).map(move |record| record.split_at(columns))
+    }
+}
+
+/// State and scratch of one direction with `U` units, in `W` words of hidden state.
+#[derive(Debug, Clone)]
+pub struct Scratch<const U: usize, const W: usize> {
+    /// Cell state, Q20.
+    pub cell_state: [i32; U],
+    /// Hidden state before and after a step, Q10, two units a word; which is which alternates.
+    pub hidden: [[u32; W]; 2],
+    /// Input projections of two consecutive steps.
+    pub projection: [[Accumulators; U]; 2],
+}
+
+impl<const U: usize, const W: usize> Scratch<U, W> {
+    /// All zero.
+    pub const ZERO: Self = {
+        assert!(2 * W == Direction::padded(U), "W is half of U, U rounded up to a multiple of four");
+        Self { cell_state: [0; U], hidden: [[0; W]; 2], projection: [[[0; GATES]; U]; 2] }
+    };
 }
 
 /// Bias and input products of all units for two consecutive steps.
 ///
-/// `x`: the two steps' inputs, interleaved by column pair.
-pub fn project(direction: &Direction<'_>, x: &[i16], projection: &mut [[Accumulators; 2]]) {
-    // Four halfwords for two columns; both steps together are as many values as that.
-    let row_len = x.len();
-    let rows = direction.input.chunks_exact(row_len);
-    for ((rows, bias), out) in rows.zip(direction.bias).zip(projection) {
-        for (step, acc) in out.iter_mut().enumerate() {
-            *acc = *bias;
-            accumulate(acc, rows, x.chunks_exact(4).map(|quad| &quad[2 * step..2 * step + 2]));
-        }
-    }
+/// `x`: the two steps' inputs, word by word in turn, as many words as the direction has inputs.
+///
+/// # Panics
+/// When `x` or `U` does not fit the direction.
+pub fn project<const U: usize>(
+    direction: &Direction<'_>,
+    x: &[u32],
+    projection: &mut [[Accumulators; U]; 2],
+) {
+    assert!(x.len() == direction.inputs && U == direction.units);
+    simd::project(direction, x, projection);
 }
 
 /// One recurrent step of all units: gates, cell state, hidden state.
 ///
-/// `step`: which of the two projected steps. `previous`: the hidden state before it; `None`
-/// for the zero state that a sequence starts from.
-pub fn step(
+/// `projection` belongs to this step. `previous` is the hidden state before it; `None` for the
+/// zero state that a sequence starts from.
+///
+/// # Panics
+/// When `U` or `W` does not fit the direction.
+pub fn step<const U: usize, const W: usize>(
     direction: &Direction<'_>,
-    projection: &[[Accumulators; 2]],
-    step: usize,
-    previous: Option<&[i16]>,
-    cell_state: &mut [i32],
-    hidden: &mut [i16],
+    projection: &[Accumulators; U],
+    previous: Option<&[u32; W]>,
+    cell_state: &mut [i32; U],
+    hidden: &mut [u32; W],
 ) {
-    let row_len = 2 * hidden.len();
-    let units = cell_state.iter_mut().zip(hidden).zip(projection).zip(direction.multiplier).enumerate();
-    for (u, (((c, h), projection), multiplier)) in units {
-        let mut acc = projection[step & 1];
-        if let (Some(previous), Some(rows)) = (previous, direction.recurrent.chunks_exact(row_len).nth(u)) {
-            accumulate(&mut acc, rows, previous.chunks_exact(2));
+    assert!(U == direction.units && 2 * W == Direction::padded(U));
+    simd::step(direction, projection, previous, cell_state, hidden);
+}
+
+/// Adds the products of packed rows with packed columns to accumulators.
+#[inline]
+fn accumulate(acc: &mut Accumulators, rows: &[u32], x: impl Iterator<Item = u32>) {
+    for (rows, x) in rows.as_chunks::<2>().0.iter().zip(x) {
+        let (x0, x1) = unpack(x);
+        for (pair, word) in rows.iter().enumerate() {
+            let (w0, w1) = unpack(*word);
+            let low = i32::from(w0 as i8) * x0 + i32::from(w1 as i8) * x1;
+            acc[2 * pair] = acc[2 * pair].wrapping_add(low);
+            // Wraps on the way; the row bound makes the final difference exact.
+            acc[2 * pair + 1] = acc[2 * pair + 1].wrapping_add(w0 * x0).wrapping_add(w1 * x1);
         }
-        (*c, *h) = update(acc, multiplier, *c);
     }
+}
+
+/// [`project`] as it is defined.
+pub fn project_portable<const U: usize>(
+    direction: &Direction<'_>,
+    x: &[u32],
+    projection: &mut [[Accumulators; U]; 2],
+) {
+    for (step, projection) in projection.iter_mut().enumerate() {
+        for ((bias, rows), acc) in direction.input_records().zip(projection) {
+            *acc = core::array::from_fn(|k| bias[k] as i32);
+            accumulate(acc, rows, x.iter().skip(step).step_by(2).copied());
+        }
+    }
+}
+
+/// [`step`] as it is defined.
+pub fn step_portable<const U: usize, const W: usize>(
+    direction: &Direction<'_>,
+    projection: &[Accumulators; U],
+    previous: Option<&[u32; W]>,
+    cell_state: &mut [i32; U],
+    hidden: &mut [u32; W],
+) {
+    let units = direction.recurrent_records().zip(projection).zip(cell_state).enumerate();
+    for (unit, (((rows, multipliers), projection), cell_state)) in units {
+        let mut acc = *projection;
+        if let Some(previous) = previous {
+            accumulate(&mut acc, rows, previous.iter().copied());
+        }
+        let (cell, h) = update(&acc, &[multipliers[0], multipliers[1]], *cell_state);
+        *cell_state = cell;
+        set_hidden(hidden, unit, h);
+    }
+}
+
+/// Puts one unit's hidden state into its half of the word.
+#[inline]
+pub(super) fn set_hidden(hidden: &mut [u32], unit: usize, h: i16) {
+    let word = &mut hidden[unit / 2];
+    *word = if unit.is_multiple_of(2) {
+        *word & 0xFFFF_0000 | u32::from(h as u16)
+    } else {
+        *word & 0xFFFF | u32::from(h as u16) << 16
+    };
 }
 
 /// Equations 7 to 12 of the paper for one unit: accumulators and cell state to new cell state
 /// and hidden state.
 #[inline]
-fn update(acc: Accumulators, multiplier: &[i16; GATES], cell_state: i32) -> (i32, i16) {
-    let low = |pair: usize| scale(acc[2 * pair], multiplier[2 * pair]);
+pub(super) fn update(acc: &Accumulators, multipliers: &[u32; 2], cell_state: i32) -> (i32, i16) {
+    let low = |pair: usize| scale(acc[2 * pair], unpack(multipliers[pair]).0);
     // 256 times the high row's sum; the shift by 8 comes after the multiplication.
     let high =
-        |pair: usize| scale(acc[2 * pair + 1].wrapping_sub(acc[2 * pair]), multiplier[2 * pair + 1]) >> 8;
+        |pair: usize| scale(acc[2 * pair + 1].wrapping_sub(acc[2 * pair]), unpack(multipliers[pair]).1) >> 8;
     let input_gate = upper(activation::sigmoid(activation::saturate(low(0))));
     let forget_gate = upper(activation::sigmoid(activation::saturate(high(0))));
     let candidate = upper(activation::tanh(activation::saturate(low(1))));
     let output_gate = upper(activation::sigmoid(activation::saturate(high(1))));
 
     // Q20 * Q15 >> 16 is Q19; Q15 * Q15 is Q30.
-    let kept = ((i64::from(cell_state) * i64::from(forget_gate)) >> 16) as i32;
+    let kept = scale(cell_state, forget_gate);
     let added = (input_gate * candidate) >> 10;
     let cell_state = added.saturating_add(kept.saturating_mul(2));
     let squashed = upper(activation::tanh(activation::saturate(cell_state >> 6)));
@@ -123,8 +236,8 @@ fn update(acc: Accumulators, multiplier: &[i16; GATES], cell_state: i32) -> (i32
 
 /// 32 x 16 bit product without its lower 16 bits.
 #[inline]
-fn scale(acc: i32, multiplier: i16) -> i32 {
-    ((i64::from(acc) * i64::from(multiplier)) >> 16) as i32
+fn scale(value: i32, factor: i32) -> i32 {
+    ((i64::from(value) * i64::from(factor)) >> 16) as i32
 }
 
 /// The upper half of a word.
@@ -138,22 +251,22 @@ fn upper(word: i32) -> i32 {
 #[must_use]
 pub fn row_bound(direction: &Direction<'_>, unit: usize, input_max: i32) -> [i64; GATES] {
     let mut bound = [0i64; GATES];
-    let Some(bias) = direction.bias.get(unit) else { return bound };
+    let records = direction.input_records().nth(unit).zip(direction.recurrent_records().nth(unit));
+    let Some(((bias, input), (recurrent, _))) = records else { return bound };
     for pair in 0..2 {
-        let low = bias[2 * pair];
+        let (low, packed) = (bias[2 * pair] as i32, bias[2 * pair + 1] as i32);
         bound[2 * pair] = i64::from(low).abs();
         // 256 times the high row's bias, modulo 2^32: all of it, where it is below 2^23.
-        bound[2 * pair + 1] = i64::from(bias[2 * pair + 1].wrapping_sub(low) >> 8).abs();
+        bound[2 * pair + 1] = i64::from(packed.wrapping_sub(low) >> 8).abs();
     }
-    let units = direction.bias.len();
-    for (matrix, max) in [(direction.input, input_max), (direction.recurrent, super::HIDDEN_MAX)] {
-        let row_len = matrix.len() / units;
-        for quad in matrix[unit * row_len..(unit + 1) * row_len].chunks_exact(4) {
-            for (n, halfword) in quad.iter().enumerate() {
-                let low = i64::from(*halfword as i8);
-                let high = (i64::from(*halfword) - low) >> 8;
-                bound[2 * (n / 2)] += low.abs() * i64::from(max);
-                bound[2 * (n / 2) + 1] += high.abs() * i64::from(max);
+    for (rows, max) in [(input, input_max), (recurrent, super::HIDDEN_MAX)] {
+        for (n, word) in rows.iter().enumerate() {
+            let (first, second) = unpack(*word);
+            for halfword in [first, second] {
+                let low = i32::from(halfword as i8);
+                let high = (halfword - low) >> 8;
+                bound[2 * (n % 2)] += i64::from(low.abs() * max);
+                bound[2 * (n % 2) + 1] += i64::from(high.abs() * max);
             }
         }
     }

@@ -31,6 +31,7 @@ pub mod bilstm;
 pub mod dense;
 pub mod lstm;
 pub mod reference;
+mod simd;
 
 /// Fraction bits of network inputs and hidden states.
 pub const HIDDEN_FRACTION_BITS: u32 = 10;
@@ -43,7 +44,21 @@ pub const CELL_FRACTION_BITS: u32 = 20;
 /// Gates of an LSTM unit, in PyTorch's order: input, forget, cell candidate, output.
 pub const GATES: usize = 4;
 
-/// An array on a 4-byte boundary, as the word-wide kernels load it.
+/// Bytes on a 4-byte boundary, as a weight file must lie.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(4))]
 pub struct Aligned<T>(pub T);
+
+/// Two consecutive columns in one word, as the kernels load them: the first one lower.
+#[inline]
+#[must_use]
+pub const fn pack(first: i16, second: i16) -> u32 {
+    first as u16 as u32 | (second as u16 as u32) << 16
+}
+
+/// The two columns of a word.
+#[inline]
+#[must_use]
+pub const fn unpack(word: u32) -> (i32, i32) {
+    (word as i16 as i32, word as i32 >> 16)
+}

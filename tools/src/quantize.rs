@@ -9,7 +9,7 @@ use crate::checkpoint::Checkpoint;
 use gyronet::model::blob::{self, Blob, HIDDEN};
 use gyronet::nn::lstm::ROW_LIMIT;
 use gyronet::nn::reference::LstmWeights;
-use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, dense::Dense};
+use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, dense::Dense, pack};
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet::window::{FEATURES, WINDOW};
 use serde_json::json;
@@ -80,7 +80,7 @@ pub fn quantize(checkpoint: &Checkpoint) -> Result<(Vec<u8>, Report), QuantizeEr
             let rows = (0..GATES * HIDDEN)
                 .map(|row| quantize_row(&weights, layer, row, inputs, input_max, &mut report))
                 .collect::<Result<Vec<Row>, _>>()?;
-            pack(&mut body, &rows);
+            pack_direction(&mut body, &rows);
         }
     }
     dense(&mut body, checkpoint)?;
@@ -145,7 +145,7 @@ fn quantize_row(
 }
 
 /// Writes one direction in reading order ([`gyronet::nn::lstm`]).
-fn pack(out: &mut Vec<u8>, rows: &[Row]) {
+fn pack_direction(out: &mut Vec<u8>, rows: &[Row]) {
     let unit_rows = |unit: usize| std::array::from_fn::<&Row, GATES, _>(|gate| &rows[gate * HIDDEN + unit]);
     for unit in 0..HIDDEN {
         let [i, f, g, o] = unit_rows(unit).map(|row| row.bias);
@@ -153,20 +153,23 @@ fn pack(out: &mut Vec<u8>, rows: &[Row]) {
         for accumulator in [i, packed(i, f), g, packed(g, o)] {
             out.extend(accumulator.to_le_bytes());
         }
+        pack_columns(out, unit_rows(unit).map(|row| row.input.as_slice()));
     }
     for unit in 0..HIDDEN {
-        out.extend(unit_rows(unit).iter().flat_map(|row| row.multiplier.to_le_bytes()));
+        pack_columns(out, unit_rows(unit).map(|row| row.recurrent.as_slice()));
+        let [i, f, g, o] = unit_rows(unit).map(|row| row.multiplier);
+        for multipliers in [pack(i, f), pack(g, o)] {
+            out.extend(multipliers.to_le_bytes());
+        }
     }
-    for matrix in [|row: &Row| row.input.clone(), |row: &Row| row.recurrent.clone()] {
-        for unit in 0..HIDDEN {
-            let [i, f, g, o] = unit_rows(unit).map(matrix);
-            let packed = |low: i8, high: i8| (i16::from(high) * 256 + i16::from(low)).to_le_bytes();
-            for k in (0..i.len()).step_by(2) {
-                for (low, high) in [(&i, &f), (&g, &o)] {
-                    out.extend(packed(low[k], high[k]));
-                    out.extend(packed(low[k + 1], high[k + 1]));
-                }
-            }
+}
+
+/// Pairs of columns: gates (i, f), then (g, o), the second gate of each in the high byte.
+fn pack_columns(out: &mut Vec<u8>, [i, f, g, o]: [&[i8]; GATES]) {
+    for k in (0..i.len()).step_by(2) {
+        for (low, high) in [(i, f), (g, o)] {
+            let halfword = |k: usize| i16::from(high[k]) * 256 + i16::from(low[k]);
+            out.extend(pack(halfword(k), halfword(k + 1)).to_le_bytes());
         }
     }
 }

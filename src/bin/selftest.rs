@@ -1,0 +1,128 @@
+//! Self-test on the target's own instruction set: the kernels against their portable
+//! definition, bit for bit, and a hash of GyroNet's outputs that a host can recompute.
+//!
+//! Runs in QEMU or on a board with semihosting; the exit status says whether all held.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("this is a firmware image: run it with `cargo selftest`");
+}
+
+#[cfg(target_os = "none")]
+mod support;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use crate::random_records;
+    use crate::support::Numbers;
+    use cortex_m_semihosting::{debug, hprintln};
+    use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+    use gyronet::nn::lstm::{self, Direction, Scratch};
+    use gyronet::window::{FEATURES, Features, WINDOW};
+    use panic_semihosting as _;
+    #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
+    use stm32f4::stm32f405 as _;
+
+    random_records!(SMALL, 4, 2, 127, 1);
+    random_records!(GYRONET_1, 60, 6, 127, 2);
+    random_records!(GYRONET_2, 60, 120, 40, 3);
+    random_records!(FOGNET_1, 90, 10, 80, 4);
+    random_records!(FOGNET_2, 90, 180, 27, 5);
+    random_records!(EXTREME, 60, 2, 127, 6);
+
+    const ROUNDS: u32 = 40;
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        let mut failed = 0;
+        failed += compare::<4, 2>("4 units, 2 inputs", &SMALL.direction(4, 2), 16_384);
+        failed += compare::<60, 30>("60 units, 6 inputs", &GYRONET_1.direction(60, 6), 2_048);
+        failed += compare::<60, 30>("60 units, 120 inputs", &GYRONET_2.direction(60, 120), 1_024);
+        failed += compare::<90, 46>("90 units, 10 inputs", &FOGNET_1.direction(90, 10), 1_024);
+        failed += compare::<90, 46>("90 units, 180 inputs", &FOGNET_2.direction(90, 180), 1_024);
+        failed += compare::<60, 30>("60 units, 2 inputs, far out", &EXTREME.direction(60, 2), 32_767);
+        match hash() {
+            Some(hash) => hprintln!("gyronet hash={:08x}", hash),
+            None => {
+                hprintln!("FAILED: the weight file is refused");
+                failed += 1;
+            }
+        }
+        hprintln!("{}", if failed == 0 { "selftest passed" } else { "selftest FAILED" });
+        debug::exit(if failed == 0 { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+
+    /// Kernel against portable code, over inputs up to +-`limit` and at the ends of the range.
+    fn compare<const U: usize, const W: usize>(name: &str, direction: &Direction<'_>, limit: i32) -> u32 {
+        let mut numbers = Numbers::new(U as u32 + direction.inputs() as u32);
+        let mut differences = 0u32;
+        let mut fast = Scratch::<U, W>::ZERO;
+        let mut plain = Scratch::<U, W>::ZERO;
+        for round in 0..ROUNDS {
+            let mut x = [0; 180];
+            let x = &mut x[..direction.inputs()];
+            for word in x.iter_mut() {
+                let mut value = || match round % 4 {
+                    0 => numbers.within(limit),
+                    1 => [limit, -limit][numbers.next() as usize % 2],
+                    2 => [i32::from(i16::MAX), i32::from(i16::MIN)][numbers.next() as usize % 2],
+                    _ => 0,
+                };
+                *word = gyronet::nn::pack(value() as i16, value() as i16);
+            }
+            lstm::project(direction, x, &mut fast.projection);
+            lstm::project_portable(direction, x, &mut plain.projection);
+            differences += u32::from(fast.projection != plain.projection);
+            for step in 0..2 {
+                let first = round == 0 && step == 0;
+                let (from, to) = (1 - step, step);
+                let previous = fast.hidden[from];
+                let previous = (!first).then_some(&previous);
+                lstm::step(
+                    direction,
+                    &fast.projection[step],
+                    previous,
+                    &mut fast.cell_state,
+                    &mut fast.hidden[to],
+                );
+                lstm::step_portable(
+                    direction,
+                    &fast.projection[step],
+                    previous,
+                    &mut plain.cell_state,
+                    &mut plain.hidden[to],
+                );
+                differences += u32::from(fast.hidden[to] != plain.hidden[to]);
+                differences += u32::from(fast.cell_state != plain.cell_state);
+                plain.cell_state = fast.cell_state;
+                plain.hidden = fast.hidden;
+            }
+        }
+        hprintln!("{}: {} rounds, {} differences", name, ROUNDS, differences);
+        differences
+    }
+
+    /// CRC-32 over the corrections of sixteen random windows.
+    fn hash() -> Option<u32> {
+        let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).ok()?);
+        let mut numbers = Numbers::new(7);
+        let mut digest = gyronet::model::blob::CRC.digest();
+        for _ in 0..16 {
+            let mut window: [Features; WINDOW] = [[0; FEATURES]; WINDOW];
+            for features in &mut window {
+                for (k, value) in features.iter_mut().enumerate() {
+                    // +-10 m/s^2 and +-0.25 rad/s.
+                    *value = numbers.within(if k < 3 { 10 << 20 } else { 1 << 25 });
+                }
+            }
+            for correction in network.estimate(&window).corrections {
+                digest.update(&correction.0.to_le_bytes());
+            }
+        }
+        Some(digest.finalize())
+    }
+}

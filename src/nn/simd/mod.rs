@@ -1,0 +1,14 @@
+//! Which kernel the processor gets. All give the same bits as the portable one.
+
+#[cfg(gyronet_dsp)]
+mod cortex_m;
+#[cfg(gyronet_dsp)]
+pub(super) use cortex_m::{project, step};
+
+#[cfg(not(target_os = "none"))]
+mod host;
+#[cfg(not(target_os = "none"))]
+pub(super) use host::{project, step};
+
+#[cfg(all(target_os = "none", not(gyronet_dsp)))]
+pub(super) use super::lstm::{project_portable as project, step_portable as step};
