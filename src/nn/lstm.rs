@@ -203,7 +203,7 @@ pub fn step_portable<const U: usize, const W: usize>(
 
 /// Puts one unit's hidden state into its half of the word.
 #[inline]
-pub(super) fn set_hidden(hidden: &mut [u32], unit: usize, h: i16) {
+fn set_hidden(hidden: &mut [u32], unit: usize, h: i16) {
     let word = &mut hidden[unit / 2];
     *word = if unit.is_multiple_of(2) {
         *word & 0xFFFF_0000 | u32::from(h as u16)

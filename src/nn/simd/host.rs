@@ -4,7 +4,8 @@
 //! the matching columns copied beside each other, one multiply-add of halfword pairs does all
 //! four packed rows; the low rows take the same words with their low bytes sign-extended.
 
-use crate::nn::lstm::{Accumulators, Direction, set_hidden, update};
+use crate::nn::lstm::{Accumulators, Direction, update};
+use crate::nn::pack;
 use wide::{i16x8, i32x4};
 
 /// Packed and low sums, each (i,f) (g,o) (i,f) (g,o): the two halves are still to be added.
@@ -43,32 +44,47 @@ fn rows(words: [u32; 4]) -> (i16x8, i16x8) {
     (packed, (packed << 8) >> 8)
 }
 
+/// Adds the products of a pair of units with one or two steps' columns.
+#[inline]
+fn accumulate<const STEPS: usize>(
+    sums: &mut [[Sums; STEPS]; 2],
+    units: [&[u32; 4]; 2],
+    columns: [[u32; 4]; STEPS],
+) {
+    for (sums, words) in sums.iter_mut().zip(units) {
+        let (packed, low) = rows(*words);
+        for (sums, x) in sums.iter_mut().zip(columns) {
+            sums.add(packed, low, x);
+        }
+    }
+}
+
 pub(in crate::nn) fn project<const U: usize>(
     direction: &Direction<'_>,
     x: &[u32],
     projection: &mut [[Accumulators; U]; 2],
 ) {
+    let inputs = direction.inputs();
     let [first, second] = projection;
-    let records = direction.input().chunks_exact(4 + direction.inputs());
     let (x_quads, x_tail) = x.as_chunks::<4>();
-    for ((record, first), second) in records.zip(first).zip(second) {
-        let (bias, words) = record.split_at(4);
-        let (quads, tail) = words.as_chunks::<4>();
-        let mut sums = [Sums::ZERO; 2];
-        let mut quad = |words: [u32; 4], [a0, b0, a1, b1]: [u32; 4]| {
-            let (packed, low) = rows(words);
-            sums[0].add(packed, low, [a0, a0, a1, a1]);
-            sums[1].add(packed, low, [b0, b0, b1, b1]);
-        };
-        for (words, x) in quads.iter().zip(x_quads) {
-            quad(*words, *x);
+    // Units come in pairs, so that the columns are laid out once for two of them.
+    let outputs = first.as_chunks_mut::<2>().0.iter_mut().zip(second.as_chunks_mut::<2>().0);
+    for (pair, (first, second)) in direction.input().chunks_exact(2 * (4 + inputs)).zip(outputs) {
+        let (a, b) = pair.split_at(4 + inputs);
+        let ((a_bias, a), (b_bias, b)) = (a.split_at(4), b.split_at(4));
+        let mut sums = [[Sums::ZERO; 2]; 2];
+        let columns = |[a0, b0, a1, b1]: [u32; 4]| [[a0, a0, a1, a1], [b0, b0, b1, b1]];
+        for ((a, b), x) in a.as_chunks().0.iter().zip(b.as_chunks().0).zip(x_quads) {
+            accumulate(&mut sums, [a, b], columns(*x));
         }
-        if let ([r0, r1], [a, b]) = (tail, x_tail) {
-            quad([*r0, *r1, 0, 0], [*a, *b, 0, 0]);
+        if let ([a0, a1], [b0, b1], [x0, x1]) = (a.as_chunks::<4>().1, b.as_chunks::<4>().1, x_tail) {
+            accumulate(&mut sums, [&[*a0, *a1, 0, 0], &[*b0, *b1, 0, 0]], columns([*x0, *x1, 0, 0]));
         }
-        let bias = core::array::from_fn(|k| bias[k] as i32);
-        *first = sums[0].finish(bias);
-        *second = sums[1].finish(bias);
+        for (unit, bias) in [a_bias, b_bias].into_iter().enumerate() {
+            let bias = core::array::from_fn(|k| bias[k] as i32);
+            first[unit] = sums[unit][0].finish(bias);
+            second[unit] = sums[unit][1].finish(bias);
+        }
     }
 }
 
@@ -79,20 +95,27 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
-    let records = direction.recurrent().chunks_exact(2 * W + 2);
-    for (unit, ((record, projection), cell_state)) in records.zip(projection).zip(cell_state).enumerate() {
-        let (words, multipliers) = record.split_at(2 * W);
-        let mut acc = *projection;
+    let projection = projection.as_chunks::<2>().0;
+    let cell_state = cell_state.as_chunks_mut::<2>().0;
+    let pairs = direction.recurrent().chunks_exact(2 * (2 * W + 2));
+    for (((pair, start), cell_state), hidden) in pairs.zip(projection).zip(cell_state).zip(hidden) {
+        let (a, b) = pair.split_at(2 * W + 2);
+        let ((a, a_multipliers), (b, b_multipliers)) = (a.split_at(2 * W), b.split_at(2 * W));
+        let mut acc = *start;
         if let Some(previous) = previous {
-            let mut sums = Sums::ZERO;
-            for (words, [x0, x1]) in words.as_chunks::<4>().0.iter().zip(previous.as_chunks::<2>().0) {
-                let (packed, low) = rows(*words);
-                sums.add(packed, low, [*x0, *x0, *x1, *x1]);
+            let mut sums = [[Sums::ZERO]; 2];
+            let rows = a.as_chunks().0.iter().zip(b.as_chunks().0);
+            for ((a, b), [x0, x1]) in rows.zip(previous.as_chunks::<2>().0) {
+                accumulate(&mut sums, [a, b], [[*x0, *x0, *x1, *x1]]);
             }
-            acc = sums.finish(acc);
+            acc = core::array::from_fn(|unit| sums[unit][0].finish(acc[unit]));
         }
-        let (cell, h) = update(&acc, &[multipliers[0], multipliers[1]], *cell_state);
-        *cell_state = cell;
-        set_hidden(hidden, unit, h);
+        let h: [i16; 2] = core::array::from_fn(|unit| {
+            let multipliers = [a_multipliers, b_multipliers][unit];
+            let (cell, h) = update(&acc[unit], &[multipliers[0], multipliers[1]], cell_state[unit]);
+            cell_state[unit] = cell;
+            h
+        });
+        *hidden = pack(h[0], h[1]);
     }
 }
