@@ -15,6 +15,10 @@ fn main() {
 mod support;
 
 #[cfg(target_os = "none")]
+#[path = "support/checkpoint.rs"]
+mod checkpoint;
+
+#[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "marker instructions and stack painting; each block says why it is sound")]
 mod measure {
     use core::arch::asm;
@@ -194,6 +198,12 @@ mod firmware {
         meter.run("gyronet/piece", || {
             black_box(network.advance());
         });
+        match crate::checkpoint::network() {
+            Some(mut reference) => meter.run("gyronet/f32", || {
+                black_box(reference.estimate(black_box(&window)));
+            }),
+            None => hprintln!("FAILED: the checkpoint is not to be read"),
+        }
     }
 
     fn kernels(meter: &mut Meter) {
