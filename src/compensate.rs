@@ -38,6 +38,9 @@ impl CompensateConfig {
 /// Samples that a window delivered now can still reach.
 const REACH: usize = WINDOW + DELAY as usize - 1;
 
+/// A sample's estimate is settled when this many more samples have come.
+pub const SETTLED_AFTER: u32 = REACH as u32;
+
 /// The best estimate of one sample so far.
 #[derive(Debug, Clone, Copy, Default)]
 struct Best {
@@ -73,15 +76,18 @@ impl Compensator {
         Self { config, best: [Best::default(); REACH], prior: 0, carry: 0 }
     }
 
-    /// Takes in a sample and returns the correction to subtract from its gyro rate.
-    pub fn correction(&mut self) -> AngularRate {
+    /// Takes in a sample and returns the correction to subtract from its gyro rate, and the best
+    /// estimate for the sample [`SETTLED_AFTER`] before it, which no window reaches any more.
+    pub fn correction(&mut self) -> (AngularRate, Option<AngularRate>) {
+        let [oldest, ..] = self.best;
         self.best.rotate_left(1);
         let newest = Best { sum: 0, count: 0, value: self.prior };
         self.best[REACH - 1] = newest;
+        let settled = (oldest.count > 0).then_some(AngularRate(oldest.value));
         let bound = i64::from(self.config.max_carry.0);
         let carried = self.carry.clamp(-bound, bound);
         self.carry -= carried;
-        AngularRate(newest.value.saturating_add(carried as i32))
+        (AngularRate(newest.value.saturating_add(carried as i32)), settled)
     }
 
     /// Revises the samples of the window that ended [`DELAY`] samples before the next one.

@@ -10,7 +10,7 @@
 use crate::align::{AlignError, Aligner};
 use crate::bias::{StaticConfig, StaticError, StaticInit};
 use crate::can::bosch::{self, SignalStatus, Tx1, YawRateSignal};
-use crate::compensate::{CompensateConfig, Compensator, DELAY, HOP, Implausible};
+use crate::compensate::{CompensateConfig, Compensator, DELAY, HOP, Implausible, SETTLED_AFTER};
 use crate::health::{Counters, Status, count};
 use crate::model::Estimate;
 use crate::sample::{Frame, ImuSample};
@@ -48,6 +48,17 @@ pub struct YawRate {
     pub status: Status,
 }
 
+/// The best estimate for an earlier sample, which nothing will revise any more. A user who can
+/// wait 110 ms gets a quieter rate from it than the one that went out at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Settled {
+    /// Tick of the sample.
+    pub tick: u32,
+    /// What the network's estimates take off its gyro rate less bias.
+    pub correction: AngularRate,
+}
+
 /// A window that is due, oldest sample first, and the tick of its newest one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DueWindow {
@@ -64,6 +75,8 @@ pub struct Output {
     pub yaw_rate: YawRate,
     /// The same as the CAN message TX1.
     pub tx1: Tx1,
+    /// The sample whose estimate is final with this one, if windows have covered it.
+    pub settled: Option<Settled>,
     /// Run this through the network and [`Pipeline::deliver`] the estimate before the sample
     /// [`DELAY`] steps on.
     pub window: Option<DueWindow>,
@@ -125,13 +138,19 @@ impl Pipeline {
             self.break_window();
         }
         let implausible = self.use_estimate(frame.tick);
-        let (yaw_rate, refused) = match self.gyro_bias {
-            None => self.initialise(&frame),
-            Some(bias) => (self.correct(&frame, &bias), None),
+        let (yaw_rate, settled, refused) = match self.gyro_bias {
+            None => {
+                let (yaw_rate, refused) = self.initialise(&frame);
+                (yaw_rate, None, refused)
+            }
+            Some(bias) => {
+                let (yaw_rate, settled) = self.correct(&frame, &bias);
+                (yaw_rate, settled, None)
+            }
         };
         let tx1 = self.tx1(&yaw_rate, &sample);
         let window = self.due_window(frame.tick);
-        Ok(Output { yaw_rate, tx1, window, refused, implausible })
+        Ok(Output { yaw_rate, tx1, settled, window, refused, implausible })
     }
 
     /// Takes back the estimate of a window that [`Output::window`] handed out.
@@ -221,9 +240,11 @@ impl Pipeline {
         (YawRate { tick: frame.tick, rate, correction: AngularRate::ZERO, yaw: self.yaw, status }, refused)
     }
 
-    fn correct(&mut self, frame: &Frame, bias: &[AngularRate; 3]) -> YawRate {
+    fn correct(&mut self, frame: &Frame, bias: &[AngularRate; 3]) -> (YawRate, Option<Settled>) {
         let features = window::features(&frame.sample, bias);
-        let correction = self.compensator.correction();
+        let (correction, settled) = self.compensator.correction();
+        let settled =
+            settled.map(|correction| Settled { tick: frame.tick.wrapping_sub(SETTLED_AFTER), correction });
         let [.., yaw_feature] = features;
         let rate = AngularRate(yaw_feature.saturating_sub(correction.0));
         self.yaw = Yaw(self.yaw.0.wrapping_add(i64::from(rate.0)));
@@ -236,7 +257,7 @@ impl Pipeline {
             (false, true) => Status::Ready,
             (false, false) => Status::Degraded,
         };
-        YawRate { tick: frame.tick, rate, correction, yaw: self.yaw, status }
+        (YawRate { tick: frame.tick, rate, correction, yaw: self.yaw, status }, settled)
     }
 
     fn due_window(&mut self, tick: u32) -> Option<DueWindow> {
