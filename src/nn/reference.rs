@@ -37,14 +37,8 @@ pub fn lstm<const I: usize, const H: usize, const W: usize>(
         for u in 0..H {
             let preactivation = |gate: usize| {
                 let row = gate * H + u;
-                let mut sum = weights.bias_ih[row] + weights.bias_hh[row];
-                for k in 0..I {
-                    sum += weights.weight_ih[row * I + k] * x[t][k];
-                }
-                for k in 0..H {
-                    sum += weights.weight_hh[row * H + k] * h[k];
-                }
-                sum
+                let input = dense(&weights.weight_ih[row * I..(row + 1) * I], weights.bias_ih[row], &x[t]);
+                input + dense(&weights.weight_hh[row * H..(row + 1) * H], weights.bias_hh[row], &h)
             };
             let i = sigmoid(preactivation(0)); // Eq. 8
             let f = sigmoid(preactivation(1)); // Eq. 9

@@ -1,0 +1,98 @@
+//! `gyronet bench-target`: instructions and modelled cycles of every kernel and network.
+
+use super::Common;
+use gyronet_tools::image_size::ImageSize;
+use gyronet_tools::target_bench::{self, Count, Counts};
+
+/// Counts instructions and modelled Cortex-M4 cycles of every kernel and network, in QEMU.
+///
+/// Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
+/// `name instructions=N cycles=N stack=BYTES`. Cycles are modelled (zero wait states), not
+/// measured on silicon. Exit status 1 when the count of a window depends on its input.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// CMSIS-NN s8 on the same networks: instructions and modelled cycles (gcc 12.2 -O3).
+const CMSIS_NN_S8: [(&str, u64, u64); 3] = [
+    ("gyronet/window", 3_484_464, 4_382_365),
+    ("gyronet/newest", 2_437_867, 3_060_000),
+    ("fognet/window", 63_790_273, 81_700_000),
+];
+
+/// Runs the command.
+pub fn run(args: &Args, _common: Common) -> super::Result {
+    let workspace = target_bench::workspace();
+    let folder = workspace.join("target/images");
+    let image = target_bench::build(&workspace, "bench", &folder)?;
+    let counts = target_bench::measure(&workspace, &image)?;
+    let coprocessor = ImageSize::read(&target_bench::build(&workspace, "coprocessor", &folder)?)?;
+    if args.json {
+        println!("{}", json(&counts, &coprocessor));
+    } else {
+        print(&counts, &coprocessor);
+        if !counts.exact() {
+            println!("no C compiler or no plugins: instructions from SysTick, +-6; cycles left out");
+        }
+    }
+    if !counts.constant() {
+        return Err("the count of a GyroNet window depends on its input".into());
+    }
+    Ok(())
+}
+
+fn print(counts: &Counts, coprocessor: &ImageSize) {
+    for Count { name, instructions, cycles, stack } in &counts.regions {
+        match cycles {
+            Some(cycles) => println!("{name} instructions={instructions} cycles={cycles} stack={stack}"),
+            None => println!("{name} instructions={instructions} stack={stack}"),
+        }
+    }
+    for (name, bytes) in &counts.sizes {
+        println!("{name} bytes={bytes}");
+    }
+    let ImageSize { flash, kernels, static_ram } = coprocessor;
+    println!("coprocessor/flash bytes={flash}");
+    println!("coprocessor/static_ram bytes={static_ram}");
+    println!("kernels/code bytes={kernels}");
+    for (name, instructions, cycles) in CMSIS_NN_S8 {
+        if let Some(count) = counts.get(name) {
+            let fewer = |peer: u64, ours: u64| peer as f64 / ours.max(1) as f64;
+            print!(
+                "{name} against CMSIS-NN s8: {:.2}x fewer instructions",
+                fewer(instructions, count.instructions)
+            );
+            match count.cycles {
+                Some(ours) => println!(", {:.2}x fewer modelled cycles", fewer(cycles, ours)),
+                None => println!(),
+            }
+        }
+    }
+}
+
+fn json(counts: &Counts, coprocessor: &ImageSize) -> serde_json::Value {
+    let regions: Vec<_> = counts
+        .regions
+        .iter()
+        .map(|count| {
+            serde_json::json!({
+                "name": count.name,
+                "instructions": count.instructions,
+                "cycles": count.cycles,
+                "stack": count.stack,
+            })
+        })
+        .collect();
+    let sizes: serde_json::Map<String, serde_json::Value> =
+        counts.sizes.iter().map(|(name, bytes)| (name.clone(), (*bytes).into())).collect();
+    serde_json::json!({
+        "regions": regions,
+        "sizes": sizes,
+        "flash": coprocessor.flash,
+        "static_ram": coprocessor.static_ram,
+        "kernels": coprocessor.kernels,
+    })
+}

@@ -1,0 +1,71 @@
+//! How much flash and RAM a firmware image takes, read from its ELF file.
+
+use object::{Object, ObjectSection, ObjectSymbol};
+use std::path::Path;
+
+/// Sizes of one image, bytes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ImageSize {
+    /// Vectors, code, constants and the initial values of data.
+    pub flash: u64,
+    /// Of that, the two assembly kernels.
+    pub kernels: u64,
+    /// Statics in RAM.
+    pub static_ram: u64,
+}
+
+/// Why an image cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum SizeError {
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not an object file.
+    #[error("{path}: {source}")]
+    Format {
+        /// The file.
+        path: String,
+        /// What the reader said.
+        source: object::Error,
+    },
+}
+
+impl ImageSize {
+    /// Measures an image.
+    ///
+    /// # Errors
+    /// [`SizeError`] with the file's name.
+    pub fn read(path: &Path) -> Result<Self, SizeError> {
+        let name = || path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|source| SizeError::Io { path: name(), source })?;
+        let file =
+            object::File::parse(&*bytes).map_err(|source| SizeError::Format { path: name(), source })?;
+        let mut size = Self::default();
+        for section in file.sections() {
+            match section.name() {
+                Ok(".vector_table" | ".text" | ".rodata") => size.flash += section.size(),
+                Ok(".data") => {
+                    size.flash += section.size();
+                    size.static_ram += section.size();
+                }
+                Ok(".bss" | ".uninit") => size.static_ram += section.size(),
+                _ => {}
+            }
+        }
+        size.kernels = file
+            .symbols()
+            .filter(|symbol| {
+                symbol
+                    .name()
+                    .is_ok_and(|name| name.contains("project_kernel") || name.contains("step_kernel"))
+            })
+            .map(|symbol| symbol.size())
+            .sum();
+        Ok(size)
+    }
+}

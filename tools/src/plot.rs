@@ -1,0 +1,250 @@
+//! One picture of a drive: the yaw of each method, and below it what each is off by.
+
+use crate::methods::{NAMES, PerMethod, Rates};
+use crate::metrics::DT;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+/// Width and height, pixels.
+const SIZE: (u32, u32) = (1200, 930);
+const TITLE_HEIGHT: u32 = 56;
+const LEGEND_HEIGHT: u32 = 92;
+/// Points of a curve, about one for each pixel.
+const POINTS: usize = 1_200;
+const FONT: &str = "sans-serif";
+const GREY: RGBColor = RGBColor(90, 90, 90);
+
+/// Colours that the colour-blind can tell apart (Okabe and Ito, 2008), and line widths: the
+/// wider is drawn first, so that one curve under another still shows.
+const STYLES: PerMethod<(RGBColor, u32)> = PerMethod {
+    raw: (RGBColor(230, 159, 0), 2),
+    static_init: (RGBColor(0, 114, 178), 2),
+    fir: (RGBColor(204, 121, 167), 2),
+    gyronet_f32: (RGBColor(86, 200, 160), 4),
+    gyronet_int: (RGBColor(190, 60, 0), 2),
+    default: (RGBColor(150, 150, 150), 1),
+};
+
+/// What the plotting library says.
+type Failure = DrawingAreaErrorKind<std::io::Error>;
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// The picture could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot draw the picture: {0}")]
+pub struct PlotError(#[from] Failure);
+
+/// One line of a panel.
+struct Curve {
+    points: Vec<(f64, f64)>,
+    color: RGBColor,
+    width: u32,
+}
+
+/// Draws a drive as SVG.
+///
+/// # Errors
+/// [`PlotError`], when the library refuses.
+pub fn svg(title: &str, rates: &Rates) -> Result<String, PlotError> {
+    let mut svg = String::new();
+    draw(&mut svg, title, rates)?;
+    Ok(svg)
+}
+
+fn draw(svg: &mut String, title: &str, rates: &Rates) -> Result<(), Failure> {
+    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (head, body) = root.split_vertically(TITLE_HEIGHT);
+    head.draw(&Text::new(title.to_owned(), (24, 18), (FONT, 26).into_font()))?;
+    let (legend, body) = body.split_vertically(LEGEND_HEIGHT);
+
+    let yaw = rates.rates.map(|rate| integral(rate));
+    let truth = rates.reference.as_deref().map(integral);
+    let curve = |values: Vec<f64>, (color, width): (RGBColor, u32)| Curve {
+        points: thinned(&rates.seconds, &values),
+        color,
+        width,
+    };
+    let degrees = |values: &Vec<f64>| values.iter().map(|rad| rad.to_degrees()).collect::<Vec<f64>>();
+    let mut curves = paired(&yaw.map(degrees), curve);
+    let Some(truth) = truth else {
+        draw_legend(&legend, &NAMES.map(|name| (*name).to_owned()), false)?;
+        let range = span(curves.iter());
+        panel(&body, "yaw, deg", range, &curves, true)?;
+        return root.present();
+    };
+    curves.push(curve(degrees(&truth), (BLACK, 2)));
+
+    let errors =
+        yaw.map(|yaw| yaw.iter().zip(&truth).map(|(yaw, truth)| (yaw - truth) * 1e3).collect::<Vec<f64>>());
+    let ends = errors.map(|error| error.last().copied().unwrap_or(0.0));
+    let label = |k: usize| format!("{}: ends {:+.1} mrad off", NAMES.each()[k], ends.each()[k]);
+    draw_legend(&legend, &PerMethod::from_each(std::array::from_fn(label)), true)?;
+    let (upper, lower) = body.split_vertically((SIZE.1 - TITLE_HEIGHT - LEGEND_HEIGHT) * 48 / 100);
+    let range = span(curves.iter());
+    panel(&upper, "yaw, deg", range, &curves, false)?;
+
+    // The corrected methods set the scale; what still has its bias may run off it.
+    let error_curves = paired(&errors, curve);
+    let corrected = [&errors.static_init, &errors.gyronet_f32, &errors.gyronet_int, &errors.default];
+    let corrected = corrected.map(|error| curve(error.clone(), (BLACK, 1)));
+    let (bottom, top) = span(corrected.iter());
+    let clipped: Vec<Curve> = error_curves
+        .into_iter()
+        .flat_map(|curve| {
+            let Curve { points, color, width } = curve;
+            inside(&points, bottom, top).into_iter().map(move |points| Curve { points, color, width })
+        })
+        .collect();
+    panel(&lower, "yaw error, mrad", (bottom, top), &clipped, true)?;
+    root.present()
+}
+
+/// Curves of all methods; what was sent at once lies under the others.
+fn paired(values: &PerMethod<Vec<f64>>, curve: impl Fn(Vec<f64>, (RGBColor, u32)) -> Curve) -> Vec<Curve> {
+    let pairs = values.each().into_iter().zip(STYLES.each());
+    let mut curves: Vec<Curve> = pairs.map(|(values, style)| curve(values.clone(), *style)).collect();
+    curves.rotate_right(1);
+    curves
+}
+
+fn panel(
+    area: &Area<'_>,
+    label: &str,
+    (bottom, top): (f64, f64),
+    curves: &[Curve],
+    time_label: bool,
+) -> Result<(), Failure> {
+    let times = || curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.0));
+    let (from, to) = (times().fold(f64::MAX, f64::min), times().fold(f64::MIN, f64::max));
+    let mut chart = ChartBuilder::on(area)
+        .margin_left(14)
+        .margin_right(24)
+        .margin_bottom(8)
+        .x_label_area_size(if time_label { 48 } else { 28 })
+        .y_label_area_size(74)
+        .build_cartesian_2d(from..to, bottom..top)?;
+    let height = |y: &f64| number(*y, top - bottom);
+    let mut mesh = chart.configure_mesh();
+    mesh.y_desc(label)
+        .x_labels(12)
+        .y_labels(8)
+        .max_light_lines(1)
+        .light_line_style(RGBColor(244, 244, 244))
+        .bold_line_style(RGBColor(222, 222, 222))
+        .axis_style(GREY)
+        .label_style((FONT, 15))
+        .axis_desc_style((FONT, 17))
+        .x_label_formatter(&|x| format!("{x:.0}"))
+        .y_label_formatter(&height);
+    if time_label {
+        mesh.x_desc("time, s");
+    }
+    mesh.draw()?;
+    for curve in curves {
+        let style = curve.color.stroke_width(curve.width);
+        chart.draw_series(LineSeries::new(curve.points.iter().copied(), style))?;
+    }
+    Ok(())
+}
+
+/// Rows of three, above the curves.
+fn draw_legend(area: &Area<'_>, labels: &PerMethod<String>, truth: bool) -> Result<(), Failure> {
+    let reference = (String::from("reference"), (BLACK, 2));
+    let methods = labels.each().into_iter().cloned().zip(STYLES.each().into_iter().copied());
+    for (k, (label, (color, width))) in truth.then_some(reference).into_iter().chain(methods).enumerate() {
+        let (x, y) = (88 + 370 * (k as i32 % 3), 8 + 28 * (k as i32 / 3));
+        let line = [(x, y + 8), (x + 34, y + 8)];
+        area.draw(&PathElement::new(line, color.stroke_width(width + 1)))?;
+        area.draw(&Text::new(label, (x + 44, y), (FONT, 17).into_font()))?;
+    }
+    Ok(())
+}
+
+/// Angle after each sample, rad.
+fn integral(rates: &[f64]) -> Vec<f64> {
+    let mut angle = 0.0;
+    rates
+        .iter()
+        .map(|rate| {
+            angle += rate * DT;
+            angle
+        })
+        .collect()
+}
+
+/// Every n-th point, and the last one.
+fn thinned(seconds: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    let step = values.len().div_ceil(POINTS).max(1);
+    let points = seconds.iter().copied().zip(values.iter().copied());
+    let last = points.clone().next_back();
+    points.step_by(step).chain(last).collect()
+}
+
+/// Smallest and largest value with some air around them.
+fn span<'a>(curves: impl Iterator<Item = &'a Curve> + Clone) -> (f64, f64) {
+    let values = || curves.clone().flat_map(|curve| curve.points.iter().map(|point| point.1));
+    let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(f64::MIN, f64::max));
+    let air = 0.06 * (high - low).max(1e-6);
+    (low - air, high + air)
+}
+
+/// The pieces of a curve between two heights, cut exactly at them.
+fn inside(points: &[(f64, f64)], bottom: f64, top: f64) -> Vec<Vec<(f64, f64)>> {
+    let is_inside = |y: f64| (bottom..=top).contains(&y);
+    let mut pieces = vec![Vec::new()];
+    for pair in points.windows(2) {
+        let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+        let edge = if y0.max(y1) > top { top } else { bottom };
+        let cut = (x0 + (x1 - x0) * (edge - y0) / (y1 - y0), edge);
+        let piece: &mut Vec<_> = match pieces.last_mut() {
+            Some(piece) => piece,
+            None => break,
+        };
+        match (is_inside(y0), is_inside(y1)) {
+            (true, true) => piece.extend([(x0, y0), (x1, y1)]),
+            (true, false) => {
+                piece.extend([(x0, y0), cut]);
+                pieces.push(Vec::new());
+            }
+            (false, true) => piece.extend([cut, (x1, y1)]),
+            (false, false) => {}
+        }
+    }
+    pieces.retain(|piece| piece.len() > 1);
+    pieces
+}
+
+/// As many decimals as an axis of that span needs.
+fn number(value: f64, span: f64) -> String {
+    let decimals = if span < 1.0 {
+        2
+    } else if span < 8.0 {
+        1
+    } else {
+        0
+    };
+    format!("{:.decimals$}", value + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_cut_at_the_edge_of_its_panel() {
+        let points = [(0.0, 0.0), (1.0, 2.0), (2.0, 4.0), (3.0, 0.0)];
+        let pieces = inside(&points, -1.0, 3.0);
+        assert_eq!(pieces.len(), 2);
+        assert_eq!(pieces[0].last(), Some(&(1.5, 3.0)));
+        assert_eq!(pieces[1], [(2.25, 3.0), (3.0, 0.0)]);
+    }
+
+    #[test]
+    fn thinning_keeps_the_ends() {
+        let seconds: Vec<f64> = (0..10_000).map(f64::from).collect();
+        let points = thinned(&seconds, &seconds);
+        assert!(points.len() <= POINTS + 1);
+        assert_eq!((points[0], points[points.len() - 1]), ((0.0, 0.0), (9_999.0, 9_999.0)));
+    }
+}

@@ -1,0 +1,64 @@
+//! What quantisation adds: integer network against f32 network, window by window.
+
+use gyronet::model::{Estimate, WindowNetwork};
+use gyronet::window::{Features, WINDOW};
+
+/// Runs two networks on every window, passes on the first one's estimate and sums up how far
+/// they are apart.
+#[derive(Debug)]
+pub struct Both<'n, I, F> {
+    integer: &'n mut I,
+    reference: &'n mut F,
+    error: QuantizationError,
+}
+
+/// Sums over all outputs of all windows.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct QuantizationError {
+    /// Windows compared.
+    pub windows: u64,
+    /// Inputs that the integer network clamped.
+    pub clamped_inputs: u64,
+    squared_difference: f64,
+    squared_reference: f64,
+}
+
+impl QuantizationError {
+    /// RMS of the difference over RMS of the f32 output; zero before the first window.
+    #[must_use]
+    pub fn relative_rms(&self) -> f64 {
+        if self.squared_reference > 0.0 {
+            (self.squared_difference / self.squared_reference).sqrt()
+        } else {
+            0.0
+        }
+    }
+}
+
+impl<'n, I: WindowNetwork, F: WindowNetwork> Both<'n, I, F> {
+    /// Nothing compared yet.
+    pub fn new(integer: &'n mut I, reference: &'n mut F) -> Self {
+        Self { integer, reference, error: QuantizationError::default() }
+    }
+
+    /// What was found so far.
+    #[must_use]
+    pub fn error(&self) -> QuantizationError {
+        self.error
+    }
+}
+
+impl<I: WindowNetwork, F: WindowNetwork> WindowNetwork for Both<'_, I, F> {
+    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
+        let integer = self.integer.estimate(window);
+        let reference = self.reference.estimate(window);
+        self.error.windows += 1;
+        self.error.clamped_inputs += u64::from(integer.clamped_inputs);
+        for (ours, theirs) in integer.corrections.iter().zip(&reference.corrections) {
+            let (ours, theirs) = (ours.rad_per_sec(), theirs.rad_per_sec());
+            self.error.squared_difference += (ours - theirs) * (ours - theirs);
+            self.error.squared_reference += theirs * theirs;
+        }
+        integer
+    }
+}

@@ -1,0 +1,156 @@
+//! Recorded drives: a CSV with a header, one row for each 10 ms.
+//!
+//! Columns are found by their name, in any order; others are passed over.
+//!
+//! | column | unit | |
+//! |---|---|---|
+//! | `t_s` | s | device time, rising |
+//! | `acc_x`, `acc_y`, `acc_z` | m/s^2 | specific force: x forward, y left, z up |
+//! | `gyr_x`, `gyr_y`, `gyr_z` | rad/s | angular rate |
+//! | `ref_gyr_z` | rad/s | optional: the true yaw rate; an empty field is a value not known |
+//! | `wheel1_rate` .. `wheel4_rate` | rad/s | optional: an empty field is a value not recorded |
+//!
+//! Values become the codes of [`gyronet::units`] by way of f32 and time by way of 10 kHz ticks,
+//! as they do on the sensor's own wire: a recording read from here and the same recording
+//! parsed from MTData2 bytes are the same samples to the last bit.
+
+mod error;
+mod reader;
+
+pub use error::{RecordingError, ValueError};
+pub use reader::Reader;
+
+use gyronet::bias::STATIC_SAMPLES;
+use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
+use std::fs::File;
+use std::path::Path;
+
+/// Wheels that a recording can have.
+pub const WHEELS: usize = 4;
+/// A wheel that turns faster than this, on average over a second of static initialisation, is
+/// rolling, rad/s. A rate sensor on a standing wheel shows up to 0.04.
+pub const WHEEL_STANDS: f64 = 0.3;
+/// Largest departure of the median sample period from 10 ms, microseconds.
+const PERIOD_TOLERANCE_US: u64 = 2_000;
+
+/// One row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Line of the file, the header being line 1.
+    pub line: u64,
+    /// What the sensor said.
+    pub sample: ImuSample,
+    /// The true yaw rate, rad/s.
+    pub reference: Option<f64>,
+    /// Rates of the wheels, rad/s.
+    pub wheels: [Option<f64>; WHEELS],
+}
+
+/// A whole drive, fit to be run: at least 3 s long, at 100 Hz, with its wheels at rest in the
+/// first 3 s where it has any.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// The file, for messages.
+    pub path: String,
+    /// In order of time.
+    pub rows: Vec<Row>,
+    /// Rows that are missing between others.
+    pub missing: u64,
+}
+
+impl Recording {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`RecordingError`], which names the file and, where there is one, the line.
+    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|source| RecordingError::Io { path: name.clone(), source })?;
+        Self::parse(&name, file)
+    }
+
+    /// Reads from anything; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`RecordingError`] with that path.
+    pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, RecordingError> {
+        let rows = Reader::new(path, input)?.collect::<Result<Vec<Row>, _>>()?;
+        let mut recording = Self { path: path.to_owned(), rows, missing: 0 };
+        recording.check_length()?;
+        recording.check_period()?;
+        recording.check_wheels()?;
+        recording.missing = recording
+            .periods()
+            .map(|us| (us + PERIOD_US / 2) / PERIOD_US)
+            .fold(0, |missing, steps| missing + steps.saturating_sub(1));
+        Ok(recording)
+    }
+
+    /// The file's name without folder and extension, for tables.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        Path::new(&self.path).file_stem().and_then(|stem| stem.to_str()).unwrap_or(&self.path)
+    }
+
+    /// From the first sample to the end of the last one, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        let [first, last] =
+            [self.rows.first(), self.rows.last()].map(|row| row.map_or(0, |row| row.sample.time.0));
+        (last - first + PERIOD_US) as f64 * 1e-6
+    }
+
+    /// Times between neighbouring rows, microseconds.
+    fn periods(&self) -> impl Iterator<Item = u64> {
+        self.rows.windows(2).map(|pair| pair[1].sample.time.0 - pair[0].sample.time.0)
+    }
+
+    fn check_length(&self) -> Result<(), RecordingError> {
+        if self.rows.is_empty() {
+            return Err(RecordingError::Empty { path: self.path.clone() });
+        }
+        let seconds = self.seconds();
+        let needed = f64::from(STATIC_SAMPLES) / f64::from(RATE_HZ);
+        if seconds < needed {
+            return Err(RecordingError::TooShort { path: self.path.clone(), seconds, needed });
+        }
+        Ok(())
+    }
+
+    fn check_period(&self) -> Result<(), RecordingError> {
+        let mut periods: Vec<u64> = self.periods().collect();
+        periods.sort_unstable();
+        let Some(median) = periods.get(periods.len() / 2) else { return Ok(()) };
+        if median.abs_diff(PERIOD_US) > PERIOD_TOLERANCE_US {
+            return Err(RecordingError::Rate { path: self.path.clone(), hz: 1e6 / *median as f64 });
+        }
+        Ok(())
+    }
+
+    /// Second by second, so that a car which pulls away late in the three is caught too.
+    fn check_wheels(&self) -> Result<(), RecordingError> {
+        let still = self.rows.get(..STATIC_SAMPLES as usize).unwrap_or(&self.rows);
+        for second in still.chunks(RATE_HZ as usize) {
+            for wheel in 0..WHEELS {
+                let rates = || second.iter().filter_map(|row| row.wheels[wheel]);
+                let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
+                if mean.abs() <= WHEEL_STANDS {
+                    continue;
+                }
+                let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
+                // Some rate is above the limit, or the mean would not be.
+                let line = second.iter().find(turns).map_or(0, |row| row.line);
+                return Err(RecordingError::Moving {
+                    path: self.path.clone(),
+                    line,
+                    wheel: wheel + 1,
+                    rate: mean,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,189 @@
+//! A recording row by row, holding one row at a time.
+
+use super::{RecordingError, Row, ValueError, WHEELS};
+use csv::StringRecord;
+use gyronet::sample::ImuSample;
+use gyronet::units::{AngularRate, Micros, SpecificForce};
+use std::str::FromStr;
+
+const TIME: &str = "t_s";
+const FORCE: [&str; 3] = ["acc_x", "acc_y", "acc_z"];
+const RATE: [&str; 3] = ["gyr_x", "gyr_y", "gyr_z"];
+const REFERENCE: &str = "ref_gyr_z";
+const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
+
+/// Device time on the wire: 10 kHz.
+const TICKS_PER_SECOND: f64 = 1e4;
+const MICROS_PER_TICK: u64 = 100;
+
+/// A named column and where it is.
+type Column = (&'static str, usize);
+
+/// Where the columns are.
+#[derive(Debug, Clone)]
+struct Columns {
+    time: Column,
+    force: [Column; 3],
+    rate: [Column; 3],
+    reference: Option<Column>,
+    wheels: [Option<Column>; WHEELS],
+}
+
+impl Columns {
+    fn find(path: &str, header: &StringRecord) -> Result<Self, RecordingError> {
+        let optional = |name: &'static str| {
+            // Spreadsheets begin a file with a byte order mark.
+            let at = header.iter().position(|field| field.trim_start_matches('\u{feff}') == name)?;
+            Some((name, at))
+        };
+        let needed = |column| {
+            optional(column).ok_or_else(|| RecordingError::MissingColumn { path: path.to_owned(), column })
+        };
+        let three = |names: [&'static str; 3]| {
+            let [x, y, z] = names.map(needed);
+            Ok([x?, y?, z?])
+        };
+        Ok(Self {
+            time: needed(TIME)?,
+            force: three(FORCE)?,
+            rate: three(RATE)?,
+            reference: optional(REFERENCE),
+            wheels: WHEEL.map(optional),
+        })
+    }
+}
+
+/// Rows of a recording, each checked by itself and against the time of the one before. What
+/// takes the whole drive to tell, [`super::Recording`] checks.
+pub struct Reader<R> {
+    path: String,
+    columns: Columns,
+    records: csv::StringRecordsIntoIter<R>,
+    fields: usize,
+    last: Option<Micros>,
+}
+
+impl<R: std::io::Read> Reader<R> {
+    /// Reads the header; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`RecordingError`]: no header, or not the columns that are needed.
+    pub fn new(path: &str, input: R) -> Result<Self, RecordingError> {
+        let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
+        let header = csv.headers().map_err(|error| csv_error(path, error))?;
+        if header.is_empty() {
+            return Err(RecordingError::Empty { path: path.to_owned() });
+        }
+        let columns = Columns::find(path, header)?;
+        let fields = header.len();
+        Ok(Self { path: path.to_owned(), columns, records: csv.into_records(), fields, last: None })
+    }
+
+    fn row(&mut self, record: &StringRecord) -> Result<Row, RecordingError> {
+        let line = record.position().map_or(0, csv::Position::line);
+        let Columns { time, force, rate, reference, wheels } = self.columns.clone();
+        let fields = Fields { path: &self.path, line, record };
+        let time = fields.time(time)?;
+        if let Some(last) = self.last
+            && time <= last
+        {
+            let [last_s, at_s] = [last, time].map(|time| time.0 as f64 * 1e-6);
+            return Err(RecordingError::Time { path: self.path.clone(), line, last_s, at_s });
+        }
+        let force = force.map(|column| fields.quantity(column, SpecificForce::from_metre_per_sec2));
+        let rate = rate.map(|column| fields.quantity(column, AngularRate::from_rad_per_sec));
+        let ([fx, fy, fz], [wx, wy, wz]) = (force, rate);
+        let optional = |column: Option<Column>| column.map_or(Ok(None), |column| fields.optional(column));
+        let [w1, w2, w3, w4] = wheels.map(optional);
+        let sample = ImuSample {
+            time,
+            specific_force: [fx?, fy?, fz?],
+            angular_rate: [wx?, wy?, wz?],
+            temperature: None,
+            clipped: false,
+        };
+        let reference = optional(reference)?;
+        let wheels = [w1?, w2?, w3?, w4?];
+        self.last = Some(time);
+        Ok(Row { line, sample, reference, wheels })
+    }
+}
+
+impl<R: std::io::Read> Iterator for Reader<R> {
+    type Item = Result<Row, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        Some(match self.records.next()? {
+            Ok(record) => self.row(&record),
+            Err(error) => Err(match *error.kind() {
+                csv::ErrorKind::UnequalLengths { ref pos, len, .. } => RecordingError::Fields {
+                    path: self.path.clone(),
+                    line: pos.as_ref().map_or(0, csv::Position::line),
+                    found: len as usize,
+                    expected: self.fields,
+                },
+                _ => csv_error(&self.path, error),
+            }),
+        })
+    }
+}
+
+/// The fields of one row.
+struct Fields<'a> {
+    path: &'a str,
+    line: u64,
+    record: &'a StringRecord,
+}
+
+impl Fields<'_> {
+    fn error(&self, (column, at): Column, error: ValueError) -> RecordingError {
+        let text = self.record.get(at).unwrap_or_default().to_owned();
+        RecordingError::Value { path: self.path.to_owned(), line: self.line, column, text, error }
+    }
+
+    /// The number, which may yet be NaN or infinite; `None` for an empty field.
+    fn number<T: FromStr>(&self, column: Column) -> Result<Option<T>, RecordingError> {
+        match self.record.get(column.1).unwrap_or_default() {
+            "" => Ok(None),
+            text => text.parse().map(Some).map_err(|_| self.error(column, ValueError::NotANumber)),
+        }
+    }
+
+    fn optional(&self, column: Column) -> Result<Option<f64>, RecordingError> {
+        match self.number::<f64>(column)? {
+            Some(value) if !value.is_finite() => Err(self.error(column, ValueError::NotFinite)),
+            value => Ok(value),
+        }
+    }
+
+    fn quantity<T>(
+        &self,
+        column: Column,
+        code: impl Fn(f32) -> Result<T, gyronet::units::RangeError>,
+    ) -> Result<T, RecordingError> {
+        let value = self.number(column)?.ok_or_else(|| self.error(column, ValueError::Empty))?;
+        code(value).map_err(|error| self.error(column, error.into()))
+    }
+
+    fn time(&self, column: Column) -> Result<Micros, RecordingError> {
+        let seconds = self.optional(column)?.ok_or_else(|| self.error(column, ValueError::Empty))?;
+        let ticks = (seconds * TICKS_PER_SECOND).round();
+        // Up to 2^53 a tick is exact.
+        if !(0.0..9.0e15).contains(&ticks) {
+            return Err(self.error(column, ValueError::OutOfRange));
+        }
+        Ok(Micros(ticks as u64 * MICROS_PER_TICK))
+    }
+}
+
+fn csv_error(path: &str, error: csv::Error) -> RecordingError {
+    let path = path.to_owned();
+    if !error.is_io_error() {
+        return RecordingError::Csv { path, source: error };
+    }
+    match error.into_kind() {
+        csv::ErrorKind::Io(source) => RecordingError::Io { path, source },
+        // Said to be one a moment ago.
+        other => RecordingError::Io { path, source: std::io::Error::other(format!("{other:?}")) },
+    }
+}

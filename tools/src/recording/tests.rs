@@ -1,0 +1,169 @@
+//! Every typed error, from a recording made for it.
+
+use super::*;
+use std::fmt::Write;
+
+const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel1_rate,wheel3_rate,remark";
+
+/// A car that stands still; `edit` may change a line before it is written (line 2 is the first).
+fn standing(rows: usize, edit: impl Fn(usize, String) -> String) -> String {
+    let mut text = format!("{HEADER}\n");
+    for k in 0..rows {
+        let row = format!("{:.6},0.1,-0.2,9.8,0.001,0.002,0.003,0.0005,0.01,,x", 12.0 + 0.01 * k as f64);
+        writeln!(text, "{}", edit(k + 2, row)).unwrap();
+    }
+    text
+}
+
+fn unedited(rows: usize) -> String {
+    standing(rows, |_, row| row)
+}
+
+fn parse(text: &str) -> Result<Recording, RecordingError> {
+    Recording::parse("drives/a.csv", text.as_bytes())
+}
+
+/// The message for a good recording in which `line` had `from` replaced by `to`.
+fn message(line: usize, from: &str, to: &str) -> String {
+    let text = standing(400, |at, row| if at == line { row.replacen(from, to, 1) } else { row });
+    parse(&text).unwrap_err().to_string()
+}
+
+#[test]
+fn reads_what_is_there() {
+    let recording = parse(&unedited(400)).unwrap();
+    assert_eq!(recording.name(), "a");
+    assert_eq!(recording.rows.len(), 400);
+    assert_eq!(recording.missing, 0);
+    assert!((recording.seconds() - 4.0).abs() < 1e-9);
+    let row = recording.rows[1];
+    assert_eq!(row.line, 3);
+    assert_eq!(row.sample.time.0, 12_010_000);
+    assert_eq!(row.sample.angular_rate[2].0, (0.003f32 * 134_217_728.0).round() as i32);
+    assert_eq!(row.sample.specific_force[1].0, (-0.2f32 * 1_048_576.0).round() as i32);
+    assert_eq!(row.reference, Some(0.0005));
+    assert_eq!(row.wheels, [Some(0.01), None, None, None]);
+}
+
+#[test]
+fn columns_go_by_name_in_any_order() {
+    let mut text = String::from("\u{feff}gyr_z, gyr_y ,gyr_x,acc_z,acc_y,acc_x,t_s\r\n");
+    for k in 0..300 {
+        write!(text, "3,2,1,6,5, 4 ,{:.2}\r\n", 0.01 * f64::from(k)).unwrap();
+    }
+    let row = parse(&text).unwrap().rows[0];
+    assert_eq!(row.sample.angular_rate.map(|rate| rate.rad_per_sec()), [1.0, 2.0, 3.0]);
+    assert_eq!(row.sample.specific_force.map(|force| force.metre_per_sec2()), [4.0, 5.0, 6.0]);
+    assert_eq!(row.reference, None);
+}
+
+#[test]
+fn a_missing_column_is_named() {
+    for column in ["t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"] {
+        let text = unedited(400).replacen(column, "other", 1);
+        let error = parse(&text).unwrap_err();
+        assert_eq!(error.to_string(), format!("drives/a.csv: column {column} is missing"));
+    }
+}
+
+#[test]
+fn a_bad_value_is_named_with_line_column_and_text() {
+    let gyr_z = ",0.003,";
+    let at = "drives/a.csv: line 40, column gyr_z: ";
+    assert_eq!(message(40, gyr_z, ",fast,"), format!("{at}\"fast\" is not a number"));
+    assert_eq!(message(40, gyr_z, ",,"), format!("{at}\"\" is empty"));
+    assert_eq!(message(40, gyr_z, ",NaN,"), format!("{at}\"NaN\" is not finite"));
+    assert_eq!(message(40, gyr_z, ",-inf,"), format!("{at}\"-inf\" is not finite"));
+    assert_eq!(message(40, gyr_z, ",1e39,"), format!("{at}\"1e39\" is not finite"));
+    assert_eq!(message(40, gyr_z, ",17,"), format!("{at}\"17\" is out of range"));
+    assert_eq!(message(2, "12.000000", "-1"), "drives/a.csv: line 2, column t_s: \"-1\" is out of range");
+    assert_eq!(
+        message(7, ",0.01,", ",?,"),
+        "drives/a.csv: line 7, column wheel1_rate: \"?\" is not a number"
+    );
+    assert_eq!(
+        message(7, ",0.0005,", ",nan,"),
+        "drives/a.csv: line 7, column ref_gyr_z: \"nan\" is not finite"
+    );
+}
+
+#[test]
+fn a_row_cut_short_is_named() {
+    assert_eq!(message(401, ",0.01,,x", ""), "drives/a.csv: line 401: 8 fields, the header has 11");
+}
+
+#[test]
+fn time_must_rise() {
+    assert_eq!(
+        message(50, "12.480000", "12.460000"),
+        "drives/a.csv: line 50: time goes backwards from 12.4700 s to 12.4600 s"
+    );
+    assert_eq!(
+        message(50, "12.480000", "12.47"),
+        "drives/a.csv: line 50: time goes nowhere from 12.4700 s to 12.4700 s"
+    );
+}
+
+#[test]
+fn a_gap_is_counted() {
+    let text: String = unedited(400)
+        .lines()
+        .enumerate()
+        .filter(|(k, _)| !(350..357).contains(k))
+        .fold(String::new(), |text, (_, line)| text + line + "\n");
+    let recording = parse(&text).unwrap();
+    assert_eq!((recording.rows.len(), recording.missing), (393, 7));
+}
+
+#[test]
+fn too_short_says_how_long() {
+    assert!(parse(&unedited(300)).is_ok());
+    assert_eq!(
+        parse(&unedited(299)).unwrap_err().to_string(),
+        "drives/a.csv: is 2.99 s long, static initialisation alone needs 3 s"
+    );
+}
+
+#[test]
+fn nothing_at_all() {
+    assert!(matches!(parse(""), Err(RecordingError::Empty { .. })));
+    assert!(matches!(parse(&unedited(0)), Err(RecordingError::Empty { .. })));
+}
+
+#[test]
+fn another_rate_is_refused() {
+    let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
+    for k in 0..200 {
+        writeln!(text, "{:.2},0,0,9.8,0,0,0", 0.02 * f64::from(k)).unwrap();
+    }
+    assert_eq!(
+        parse(&text).unwrap_err().to_string(),
+        "drives/a.csv: is sampled at 50.0 Hz, should be 100 Hz"
+    );
+}
+
+#[test]
+fn a_turning_wheel_is_named() {
+    let text = standing(400, |at, row| if at >= 250 { row.replacen(",,x", ",-2.5,x", 1) } else { row });
+    assert_eq!(
+        parse(&text).unwrap_err().to_string(),
+        "drives/a.csv: starts moving: line 250, wheel 3 turns at -2.50 rad/s in the first 3 s"
+    );
+    let later = standing(400, |at, row| if at >= 302 { row.replacen(",,x", ",-2.5,x", 1) } else { row });
+    assert!(parse(&later).is_ok());
+}
+
+#[test]
+fn an_unreadable_file_is_named() {
+    let error = Recording::read(Path::new("no/such/drive.csv")).unwrap_err();
+    assert!(error.to_string().starts_with("no/such/drive.csv: "), "{error}");
+    assert!(matches!(error, RecordingError::Io { .. }));
+}
+
+#[test]
+fn bytes_that_are_no_text() {
+    let mut bytes = unedited(400).into_bytes();
+    let at = bytes.len() - 2;
+    bytes[at] = 0xFF;
+    assert!(matches!(Recording::parse("a", &bytes[..]), Err(RecordingError::Csv { .. })));
+}

@@ -1,0 +1,181 @@
+//! A simulated drive: a car that stands, pulls away, bends, turns and stops, seen by a MEMS
+//! part with errors of known size. Its yaw rate is known exactly.
+//!
+//! [`route`] says where the driver wants to go, [`car`] moves on a plane with grade, bank and
+//! suspension, [`vibration`] shakes the part, [`mems`] adds the part's own errors, [`csv`]
+//! writes the recording. The truth is what a perfect part at the same place would say were the
+//! car not shaking: vibration turns the car nowhere and counts as an error.
+//!
+//! What it is not: a model of one make of part or car. It shows that everything works, and
+//! how well static initialisation does on it; whether a network helps on a real car only a
+//! recording of that car shows.
+//!
+//! The same seed gives the same bytes on every machine: the random numbers are ChaCha8's and
+//! the transcendental functions are libm's, in Rust.
+
+pub mod car;
+pub mod csv;
+pub mod mems;
+mod random;
+pub mod route;
+pub mod vibration;
+
+use car::Car;
+use mems::Mems;
+use vibration::Vibration;
+
+/// What to simulate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    /// Length, s.
+    pub seconds: u32,
+    /// Which route, road and part.
+    pub seed: u64,
+    /// The car.
+    pub car: car::Config,
+    /// How it shakes.
+    pub vibration: vibration::Config,
+    /// The part.
+    pub mems: mems::Config,
+}
+
+impl Config {
+    /// 90 s; car, shaking and part of the kind that the recordings show.
+    pub const DEFAULT: Self = Self {
+        seconds: 90,
+        seed: 1,
+        car: car::Config::DEFAULT,
+        vibration: vibration::Config::DEFAULT,
+        mems: mems::Config::DEFAULT,
+    };
+}
+
+/// One sample of a simulated drive: x forward, y left, z up, but for the part's tilt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Since the start, s.
+    pub seconds: f64,
+    /// As measured, m/s^2.
+    pub specific_force: [f64; 3],
+    /// As measured, rad/s.
+    pub angular_rate: [f64; 3],
+    /// The truth, rad/s.
+    pub reference: [f64; 3],
+    /// Front right, rear right, front left, rear left, rad/s.
+    pub wheels: [f64; 4],
+    /// Forward, m/s.
+    pub speed: f64,
+}
+
+/// Samples of a drive, without end.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    car: Car,
+    vibration: Vibration,
+    mems: Mems,
+    tick: u32,
+}
+
+impl Simulation {
+    /// At rest.
+    #[must_use]
+    pub fn new(config: &Config) -> Self {
+        Self {
+            car: Car::new(&config.car, config.seed),
+            vibration: Vibration::new(&config.vibration, config.seed),
+            mems: Mems::new(&config.mems, config.seed),
+            tick: 0,
+        }
+    }
+}
+
+impl Iterator for Simulation {
+    type Item = Sample;
+
+    fn next(&mut self) -> Option<Sample> {
+        let seconds = f64::from(self.tick) * DT;
+        self.tick += 1;
+        let motion = self.car.step();
+        let shake = self.vibration.step(motion.speed);
+        // A tilted part sees everything tilted; so would the perfect one beside it.
+        let reference = self.mems.tilt(motion.angular_rate);
+        let force = add(self.mems.tilt(motion.specific_force), shake.specific_force);
+        let (specific_force, angular_rate) = self.mems.measure(force, add(reference, shake.angular_rate));
+        Some(Sample {
+            seconds,
+            specific_force,
+            angular_rate,
+            reference,
+            wheels: self.car.wheels(&motion),
+            speed: motion.speed,
+        })
+    }
+}
+
+/// Seconds of one sample.
+const DT: f64 = crate::metrics::DT;
+
+fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| a[axis] + b[axis])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn std(values: &[f64]) -> f64 {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n).sqrt()
+    }
+
+    fn samples(seed: u64, seconds: usize) -> Vec<Sample> {
+        Simulation::new(&Config { seed, ..Config::DEFAULT }).take(seconds * 100).collect()
+    }
+
+    #[test]
+    fn same_seed_same_drive() {
+        assert_eq!(samples(7, 30), samples(7, 30));
+        assert_ne!(samples(7, 30), samples(8, 30));
+    }
+
+    #[test]
+    fn shakes_as_the_recordings_do() {
+        for seed in 0..5 {
+            let samples = samples(seed, 300);
+            let still: Vec<&Sample> = samples[..500].iter().collect();
+            assert!(still.iter().all(|sample| sample.speed == 0.0));
+            let moving: Vec<&Sample> = samples.iter().filter(|sample| sample.speed > 8.0).collect();
+            assert!(moving.len() > 5_000);
+            for axis in 0..3 {
+                let gyro = |set: &[&Sample]| {
+                    std(&set.iter().map(|s| s.angular_rate[axis] - s.reference[axis]).collect::<Vec<_>>())
+                };
+                let accel =
+                    |set: &[&Sample]| std(&set.iter().map(|s| s.specific_force[axis]).collect::<Vec<_>>());
+                assert!((0.004..0.010).contains(&gyro(&still)), "{axis} {}", gyro(&still));
+                assert!((0.05..0.6).contains(&accel(&still)), "{axis} {}", accel(&still));
+                assert!((0.008..0.05).contains(&gyro(&moving)), "{axis} {}", gyro(&moving));
+                assert!((0.3..1.5).contains(&accel(&moving)), "{axis} {}", accel(&moving));
+            }
+        }
+    }
+
+    #[test]
+    fn drives_like_a_car() {
+        for seed in 0..20 {
+            let samples = samples(seed, 120);
+            let rate = |of: fn(f64, f64) -> f64| samples.iter().map(|s| s.reference[2]).fold(0.0, of);
+            assert!(rate(f64::max) > 0.12 && rate(f64::min) < -0.12, "turns both ways");
+            assert!(rate(f64::max) < 0.4 && rate(f64::min) > -0.4);
+            let speed = samples.iter().map(|s| s.speed).fold(0.0, f64::max);
+            assert!((10.0..20.0).contains(&speed), "{speed}");
+            let stands = samples[1_000..].iter().filter(|s| s.speed == 0.0).count();
+            assert!(stands > 200, "stops on the way: {stands}");
+            for pair in samples.windows(2) {
+                assert!((pair[1].speed - pair[0].speed).abs() < 0.05, "at most 5 m/s^2");
+                assert!((pair[1].reference[2] - pair[0].reference[2]).abs() < 0.02);
+            }
+        }
+    }
+}

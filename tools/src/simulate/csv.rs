@@ -1,0 +1,53 @@
+//! A simulated drive in the layout of [`crate::recording`].
+
+use super::{Config, Sample, Simulation};
+use gyronet::sample::RATE_HZ;
+use std::io::{self, Write};
+
+/// The header.
+pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_x,ref_gyr_y,ref_gyr_z,\
+                          wheel1_rate,wheel2_rate,wheel3_rate,wheel4_rate";
+
+/// Writes a whole drive; returns the number of samples.
+///
+/// # Errors
+/// What the writer says.
+pub fn write(config: &Config, mut out: impl Write) -> io::Result<u32> {
+    writeln!(out, "{HEADER}")?;
+    let samples = config.seconds * RATE_HZ;
+    for sample in Simulation::new(config).take(samples as usize) {
+        row(&sample, &mut out)?;
+    }
+    out.flush()?;
+    Ok(samples)
+}
+
+fn row(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
+    write!(out, "{:.2}", sample.seconds)?;
+    let Sample { specific_force, angular_rate, reference, wheels, .. } = sample;
+    for value in specific_force.iter().chain(angular_rate).chain(reference).chain(wheels) {
+        // Adding zero makes a rounded -0 a 0.
+        write!(out, ",{:.6}", (value * 1e6).round() / 1e6 + 0.0)?;
+    }
+    writeln!(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+
+    #[test]
+    fn what_is_written_can_be_read() {
+        let mut bytes = Vec::new();
+        let config = Config { seconds: 20, seed: 4, ..Config::DEFAULT };
+        assert_eq!(write(&config, &mut bytes).unwrap(), 2_000);
+        let recording = Recording::parse("a.csv", &bytes[..]).unwrap();
+        assert_eq!((recording.rows.len(), recording.missing), (2_000, 0));
+        let sample = Simulation::new(&config).nth(1_234).unwrap();
+        let row = recording.rows[1_234];
+        assert!((row.sample.angular_rate[2].rad_per_sec() - sample.angular_rate[2]).abs() < 1e-6);
+        assert!((row.reference.unwrap() - sample.reference[2]).abs() < 1e-6);
+        assert!((row.wheels[3].unwrap() - sample.wheels[3]).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,155 @@
+//! The errors of the part: bias that wanders, white noise, scale, misalignment.
+//!
+//! This is the paper's sensor model (equations 1 and 2) with scale and misalignment added. No
+//! error of the gyro depends on acceleration.
+
+use super::DT;
+use super::car::turned_in;
+use super::random::{Purpose, Random};
+
+/// Sizes of a part's errors. Those marked sigma are drawn anew for each seed and axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    /// White noise, rad/s/sqrt(Hz): the Xsens MTi of the KAIST drives as OpenVINS has it
+    /// (`config/kaist/kalibr_imu_chain.yaml`).
+    pub gyro_noise: f64,
+    /// Bias random walk, rad/s^2/sqrt(Hz): the same file. Over a minute it comes to 16 deg/h,
+    /// the class of some 10 deg/h that the paper names for MEMS (section III-C).
+    pub gyro_walk: f64,
+    /// White noise, m/s^2/sqrt(Hz): the same file.
+    pub accel_noise: f64,
+    /// Bias random walk, m/s^3/sqrt(Hz): the same file.
+    pub accel_walk: f64,
+    /// Bias at power-on, sigma, rad/s: the recordings' part shows 0.004 to 0.018.
+    pub gyro_bias: f64,
+    /// Bias at power-on, sigma, m/s^2: some milli-g, common for MEMS.
+    pub accel_bias: f64,
+    /// Scale error, sigma: the recordings' part is off by 0.001 against their reference.
+    pub scale: f64,
+    /// Misalignment of each axis, sigma, rad: 0.05 deg, the class of a part calibrated at the
+    /// factory.
+    pub misalignment: f64,
+    /// How the part is mounted, pitch and roll, rad: the recordings' part leans to one side so
+    /// that y sees about -0.8 m/s^2 at rest.
+    pub mount: [f64; 2],
+}
+
+impl Config {
+    /// A good MEMS part.
+    pub const DEFAULT: Self = Self {
+        gyro_noise: 1.7453e-4,
+        gyro_walk: 1e-5,
+        accel_noise: 5.886e-3,
+        accel_walk: 1e-4,
+        gyro_bias: 0.008,
+        accel_bias: 0.03,
+        scale: 0.001,
+        misalignment: 0.000_87,
+        mount: [0.015, -0.085],
+    };
+}
+
+/// Errors of three axes of one kind.
+#[derive(Debug, Clone, Copy)]
+struct Triad {
+    /// What the axes make of a vector.
+    matrix: [[f64; 3]; 3],
+    bias: [f64; 3],
+    /// Standard deviations per sample.
+    noise: f64,
+    walk: f64,
+}
+
+impl Triad {
+    fn new(config: &Config, noise: f64, walk: f64, bias: f64, random: &mut Random) -> Self {
+        let matrix = std::array::from_fn(|row| {
+            std::array::from_fn(|column| {
+                let deviation = random.normal();
+                if row == column { 1.0 + config.scale * deviation } else { config.misalignment * deviation }
+            })
+        });
+        let bias = random.normals().map(|n| bias * n);
+        // A density over the 50 Hz that 100 samples a second can show.
+        Self { matrix, bias, noise: noise / DT.sqrt(), walk: walk * DT.sqrt() }
+    }
+
+    fn measure(&mut self, truth: [f64; 3], random: &mut Random) -> [f64; 3] {
+        let (noise, walk) = (random.normals(), random.normals());
+        std::array::from_fn(|axis| {
+            self.bias[axis] += self.walk * walk[axis];
+            let seen: f64 = self.matrix[axis].iter().zip(truth).map(|(m, t)| m * t).sum();
+            seen + self.bias[axis] + self.noise * noise[axis]
+        })
+    }
+}
+
+/// A part with the errors of its seed.
+#[derive(Debug, Clone)]
+pub struct Mems {
+    random: Random,
+    gyro: Triad,
+    accel: Triad,
+    mount: [f64; 2],
+}
+
+impl Mems {
+    /// Another part for each seed.
+    #[must_use]
+    pub fn new(config: &Config, seed: u64) -> Self {
+        let mut random = Random::new(seed, Purpose::Mems);
+        let gyro = Triad::new(config, config.gyro_noise, config.gyro_walk, config.gyro_bias, &mut random);
+        let accel = Triad::new(config, config.accel_noise, config.accel_walk, config.accel_bias, &mut random);
+        Self { random, gyro, accel, mount: config.mount }
+    }
+
+    /// A vector of the car, seen from the part's nominal axes.
+    #[must_use]
+    pub fn tilt(&self, vector: [f64; 3]) -> [f64; 3] {
+        let [pitch, roll] = self.mount;
+        turned_in(vector, pitch, roll)
+    }
+
+    /// Specific force and angular rate as the part says them.
+    pub fn measure(&mut self, force: [f64; 3], rate: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+        (self.accel.measure(force, &mut self.random), self.gyro.measure(rate, &mut self.random))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_and_bias_are_as_configured() {
+        let config = Config { gyro_walk: 0.0, ..Config::DEFAULT };
+        let mut biases = Vec::new();
+        for seed in 0..200 {
+            let mut mems = Mems::new(&config, seed);
+            let rates: Vec<f64> = (0..1_000).map(|_| mems.measure([0.0; 3], [0.0; 3]).1[2]).collect();
+            let mean = rates.iter().sum::<f64>() / 1_000.0;
+            let variance = rates.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / 1_000.0;
+            assert!((variance.sqrt() / 1.7453e-3 - 1.0).abs() < 0.12);
+            biases.push(mean);
+        }
+        let rms = (biases.iter().map(|b| b * b).sum::<f64>() / 200.0).sqrt();
+        assert!((rms / config.gyro_bias - 1.0).abs() < 0.2, "{rms}");
+    }
+
+    #[test]
+    fn a_part_without_errors_tells_the_truth() {
+        let nothing = Config {
+            gyro_noise: 0.0,
+            gyro_walk: 0.0,
+            accel_noise: 0.0,
+            accel_walk: 0.0,
+            gyro_bias: 0.0,
+            accel_bias: 0.0,
+            scale: 0.0,
+            misalignment: 0.0,
+            mount: [0.0; 2],
+        };
+        let mut mems = Mems::new(&nothing, 5);
+        let truth = ([0.5, -1.0, 9.8], [0.01, 0.02, 0.3]);
+        assert_eq!(mems.measure(mems.tilt(truth.0), mems.tilt(truth.1)), truth);
+    }
+}

@@ -1,0 +1,43 @@
+//! Random numbers: one stream for each purpose, so that a change to one leaves the others be.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+
+/// What the numbers are for.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Purpose {
+    Route,
+    Road,
+    Wheels,
+    Vibration,
+    Mems,
+}
+
+/// A stream of random numbers.
+#[derive(Debug, Clone)]
+pub(super) struct Random(ChaCha8Rng);
+
+impl Random {
+    pub fn new(seed: u64, purpose: Purpose) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(purpose as u64);
+        Self(rng)
+    }
+
+    /// Mean 0, variance 1.
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+
+    /// Three of them.
+    pub fn normals(&mut self) -> [f64; 3] {
+        [self.normal(), self.normal(), self.normal()]
+    }
+
+    /// Even between two numbers.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        let unit: f64 = StandardUniform.sample(&mut self.0);
+        low + (high - low) * unit
+    }
+}

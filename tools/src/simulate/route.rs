@@ -1,0 +1,98 @@
+//! Where the driver wants to go: streets with bends, wide corners and stops, one after another.
+//!
+//! The car turns by at most some 0.3 rad/s, as in the recordings; nobody parks.
+
+use super::random::{Purpose, Random};
+use std::f64::consts::FRAC_PI_2;
+
+/// A piece of the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Leg {
+    /// Waiting.
+    Stand {
+        /// For so long.
+        seconds: f64,
+    },
+    /// Driving.
+    Road {
+        /// Length.
+        metres: f64,
+        /// As fast as this, m/s.
+        speed: f64,
+        /// Change of heading on the way, left positive, rad.
+        turn: f64,
+    },
+}
+
+impl Leg {
+    /// Highest speed in it, m/s.
+    #[must_use]
+    pub fn speed(&self) -> f64 {
+        match *self {
+            Self::Stand { .. } => 0.0,
+            Self::Road { speed, .. } => speed,
+        }
+    }
+
+    /// 1/m at a place of the leg: the wheel is turned in and back smoothly, as sine squared.
+    #[must_use]
+    pub fn curvature(&self, along: f64) -> f64 {
+        match *self {
+            Self::Stand { .. } => 0.0,
+            Self::Road { metres, turn, .. } => {
+                let sine = libm::sin(std::f64::consts::PI * (along / metres).clamp(0.0, 1.0));
+                2.0 * turn / metres * sine * sine
+            }
+        }
+    }
+}
+
+/// A route without end.
+#[derive(Debug, Clone)]
+pub struct Route {
+    random: Random,
+    legs: u32,
+    /// +1: the next corner is a left one.
+    side: f64,
+}
+
+impl Route {
+    /// Another one for each seed.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed, Purpose::Route);
+        let side = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
+        Self { random, legs: 0, side }
+    }
+}
+
+impl Iterator for Route {
+    type Item = Leg;
+
+    /// It begins with standing; then street, corner, street with a bend, stop, and again.
+    fn next(&mut self) -> Option<Leg> {
+        let between = |random: &mut Random, low, high| random.between(low, high);
+        let random = &mut self.random;
+        let place = self.legs % 6;
+        self.legs += 1;
+        Some(match place {
+            0 if self.legs == 1 => Leg::Stand { seconds: between(random, 5.5, 7.0) },
+            0 => Leg::Stand { seconds: between(random, 3.0, 6.0) },
+            1 | 3 => Leg::Road {
+                metres: between(random, 60.0, 110.0),
+                speed: between(random, 10.0, 15.0),
+                turn: 0.0,
+            },
+            2 | 5 => {
+                let turn = self.side * between(random, 0.85, 1.1) * FRAC_PI_2;
+                self.side = -self.side;
+                Leg::Road { metres: between(random, 55.0, 75.0), speed: between(random, 4.5, 6.0), turn }
+            }
+            _ => {
+                let way = if between(random, 0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
+                let turn = way * between(random, 0.25, 0.7);
+                Leg::Road { metres: between(random, 90.0, 140.0), speed: between(random, 10.0, 14.0), turn }
+            }
+        })
+    }
+}

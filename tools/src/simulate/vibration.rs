@@ -1,0 +1,193 @@
+//! How the part is shaken: the idling engine, and the road.
+//!
+//! Each source is a narrow band of noise (a damped oscillator driven by white noise) that moves
+//! all axes at once, each with its own size and phase. The angle is what shakes; the rate is
+//! its change from sample to sample. So the shaking rate adds up to nothing, as it does on a
+//! car, and what it does to a yaw taken after one second is an angle of about rate / (2 pi f).
+
+use super::DT;
+use super::random::{Purpose, Random};
+use std::f64::consts::{PI, TAU};
+
+/// One source of shaking.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    /// Middle of its band, Hz.
+    pub hz: f64,
+    /// Width of its band, Hz.
+    pub bandwidth: f64,
+    /// Standard deviation of the angular rate, rad/s.
+    pub angular_rate: [f64; 3],
+    /// Standard deviation of the specific force, m/s^2.
+    pub specific_force: [f64; 3],
+}
+
+/// All sources. The sizes are those of the recordings: standing 0.006 to 0.009 rad/s and 0.1
+/// to 0.45 m/s^2, moving about 0.02 rad/s and 0.5 m/s^2; the bands are those that stand out in
+/// their spectra.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    /// The engine, at the same strength whether the car stands or not.
+    pub engine: Source,
+    /// What comes from the road at [`Config::road_speed`]; in proportion at other speeds.
+    pub road: [Source; 3],
+    /// m/s.
+    pub road_speed: f64,
+}
+
+impl Config {
+    /// A small diesel on town roads.
+    pub const DEFAULT: Self = Self {
+        engine: Source {
+            hz: 23.4,
+            bandwidth: 0.8,
+            angular_rate: [0.0062, 0.0075, 0.0055],
+            specific_force: [0.40, 0.09, 0.10],
+        },
+        road: [
+            // Body on its springs.
+            Source {
+                hz: 1.6,
+                bandwidth: 0.8,
+                angular_rate: [0.010, 0.010, 0.0004],
+                specific_force: [0.10, 0.15, 0.25],
+            },
+            // Wheels on their tyres.
+            Source {
+                hz: 17.0,
+                bandwidth: 3.0,
+                angular_rate: [0.020, 0.022, 0.011],
+                specific_force: [0.20, 0.20, 0.20],
+            },
+            // Floor panels.
+            Source {
+                hz: 30.0,
+                bandwidth: 4.0,
+                angular_rate: [0.008, 0.008, 0.008],
+                specific_force: [0.25, 0.20, 0.35],
+            },
+        ],
+        road_speed: 10.0,
+    };
+}
+
+/// Shaking of one moment.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Shake {
+    /// m/s^2.
+    pub specific_force: [f64; 3],
+    /// rad/s.
+    pub angular_rate: [f64; 3],
+}
+
+/// A narrow band of noise: a phasor that turns and forgets. Both parts have variance 1.
+#[derive(Debug, Clone, Copy)]
+struct Band {
+    re: f64,
+    im: f64,
+}
+
+impl Band {
+    fn step(&mut self, source: &Source, random: &mut Random) {
+        let keep = libm::exp(-PI * source.bandwidth * DT);
+        let (sin, cos) = (libm::sin(TAU * source.hz * DT), libm::cos(TAU * source.hz * DT));
+        let fresh = (1.0 - keep * keep).sqrt();
+        let (re, im) = (self.re * cos - self.im * sin, self.re * sin + self.im * cos);
+        self.re = keep * re + fresh * random.normal();
+        self.im = keep * im + fresh * random.normal();
+    }
+
+    /// The band with a phase for each axis.
+    fn axes(&self, phase: f64) -> [f64; 3] {
+        // Three phases that are far from each other.
+        [phase, phase + 2.0, phase + 4.2].map(|p| self.re * libm::cos(p) + self.im * libm::sin(p))
+    }
+}
+
+/// A source at work.
+#[derive(Debug, Clone, Copy)]
+struct Shaker {
+    source: Source,
+    band: Band,
+    angle: [f64; 3],
+}
+
+impl Shaker {
+    fn new(source: Source, random: &mut Random) -> Self {
+        Self { source, band: Band { re: random.normal(), im: random.normal() }, angle: [0.0; 3] }
+    }
+
+    fn step(&mut self, strength: f64, random: &mut Random, shake: &mut Shake) {
+        self.band.step(&self.source, random);
+        // A sine of this rate moves by so much more than its angle in one sample.
+        let angle_per_rate = DT / (2.0 * libm::sin(PI * self.source.hz * DT));
+        let (turn, push) = (self.band.axes(0.0), self.band.axes(1.0));
+        for axis in 0..3 {
+            let angle = strength * self.source.angular_rate[axis] * angle_per_rate * turn[axis];
+            shake.angular_rate[axis] += (angle - self.angle[axis]) / DT;
+            shake.specific_force[axis] += strength * self.source.specific_force[axis] * push[axis];
+            self.angle[axis] = angle;
+        }
+    }
+}
+
+/// Everything that shakes.
+#[derive(Debug, Clone)]
+pub struct Vibration {
+    random: Random,
+    engine: Shaker,
+    road: [Shaker; 3],
+    road_speed: f64,
+}
+
+impl Vibration {
+    /// With the engine running.
+    #[must_use]
+    pub fn new(config: &Config, seed: u64) -> Self {
+        let mut random = Random::new(seed, Purpose::Vibration);
+        let engine = Shaker::new(config.engine, &mut random);
+        let road = config.road.map(|source| Shaker::new(source, &mut random));
+        let mut vibration = Self { random, engine, road, road_speed: config.road_speed };
+        // The first angle comes from nowhere: no sample is made of it.
+        vibration.step(0.0);
+        vibration
+    }
+
+    /// Ten milliseconds on, at a speed in m/s.
+    pub fn step(&mut self, speed: f64) -> Shake {
+        let mut shake = Shake::default();
+        self.engine.step(1.0, &mut self.random, &mut shake);
+        for shaker in &mut self.road {
+            shaker.step(speed / self.road_speed, &mut self.random, &mut shake);
+        }
+        shake
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shaking_turns_the_car_nowhere() {
+        let mut vibration = Vibration::new(&Config::DEFAULT, 1);
+        let mut yaw = 0.0f64;
+        for _ in 0..100_000 {
+            let [.., rate] = vibration.step(10.0).angular_rate;
+            yaw += rate * DT;
+            assert!(yaw.abs() < 0.002, "{yaw}");
+        }
+    }
+
+    #[test]
+    fn sizes_are_as_configured() {
+        let mut vibration = Vibration::new(&Config::DEFAULT, 2);
+        let shakes: Vec<Shake> = (0..200_000).map(|_| vibration.step(0.0)).collect();
+        let rms = |of: fn(&Shake) -> f64| {
+            (shakes.iter().map(|s| of(s) * of(s)).sum::<f64>() / shakes.len() as f64).sqrt()
+        };
+        let engine = Config::DEFAULT.engine;
+        assert!((rms(|s| s.angular_rate[2]) / engine.angular_rate[2] - 1.0).abs() < 0.05);
+        assert!((rms(|s| s.specific_force[0]) / engine.specific_force[0] - 1.0).abs() < 0.05);
+    }
+}

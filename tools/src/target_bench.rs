@@ -1,0 +1,189 @@
+//! Runs the bench image in the emulator and turns what it prints into counts.
+//!
+//! With a C compiler at hand, QEMU's plugin `tools/bench/m4count.c` counts instructions exactly
+//! and models Cortex-M4 cycles. Without one, instructions come from the image's own SysTick
+//! under `-icount shift=0`, where an instruction takes a nanosecond: good to 6 instructions.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// SysTick of the emulated STM32F405, ticks per 1000 instructions (168 MHz, 1 instruction/ns).
+const TICKS_PER_1000: u64 = 168;
+/// The marker regions end here, and so does a hung image.
+const TIMEOUT_S: &str = "600";
+/// The emulated board.
+pub const MACHINE: &str = "netduinoplus2";
+/// The image's target.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// Why the bench could not be run.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// A program could not be started.
+    #[error("{program} cannot be started: {source}")]
+    Start {
+        /// The program.
+        program: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A program ended with an error.
+    #[error("{program} failed:\n{output}")]
+    Failed {
+        /// The program.
+        program: String,
+        /// Its error output.
+        output: String,
+    },
+    /// The image printed something else than expected.
+    #[error("the bench image printed an unexpected line: {0}")]
+    Line(String),
+}
+
+/// What was counted for one region of the image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Count {
+    /// As the image names it.
+    pub name: String,
+    /// Executed instructions.
+    pub instructions: u64,
+    /// Modelled Cortex-M4 cycles, with the plugin.
+    pub cycles: Option<u64>,
+    /// Bytes of stack below the caller.
+    pub stack: u64,
+}
+
+/// All counts of one run, and the sizes that the image reports of itself.
+#[derive(Debug, Clone, Default)]
+pub struct Counts {
+    /// In the order in which they ran.
+    pub regions: Vec<Count>,
+    /// Name and bytes.
+    pub sizes: Vec<(String, u64)>,
+}
+
+impl Counts {
+    /// The first region of a name.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&Count> {
+        self.regions.iter().find(|count| count.name == name)
+    }
+
+    /// Whether instructions were counted one by one; else they are good to six.
+    #[must_use]
+    pub fn exact(&self) -> bool {
+        self.regions.iter().all(|count| count.cycles.is_some())
+    }
+
+    /// All GyroNet windows, which must cost the same whatever they hold.
+    #[must_use]
+    pub fn constant(&self) -> bool {
+        let tolerance = if self.exact() { 0 } else { 12 };
+        let mut windows = self.starting_with("gyronet/window").map(|count| count.instructions);
+        let first = windows.next();
+        windows.all(|other| first.is_some_and(|first| first.abs_diff(other) <= tolerance))
+    }
+
+    /// All regions whose name begins so.
+    pub fn starting_with(&self, prefix: &str) -> impl Iterator<Item = &Count> {
+        self.regions.iter().filter(move |count| count.name.starts_with(prefix))
+    }
+}
+
+/// The root of the workspace that this crate was built in: images are built from there.
+#[must_use]
+pub fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Builds an image of the firmware under `folder` and returns where it lies.
+///
+/// # Errors
+/// [`BenchError`] with the compiler's output.
+pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
+    let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
+    cargo.current_dir(workspace).args(["build", "--release", "--quiet", "-p", "gyronet", "--bin", image]);
+    cargo.args(["--features", "firmware", "--target", TARGET, "--target-dir"]).arg(folder);
+    run(&mut cargo)?;
+    Ok(folder.join(TARGET).join("release").join(image))
+}
+
+/// Runs the bench image with the instruction counter, or without where it is not to be had.
+///
+/// # Errors
+/// [`BenchError`].
+pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
+    match plugin(workspace) {
+        // An emulator built without plugins refuses the argument.
+        Some(plugin) => count(image, Some(&plugin)).or_else(|_| count(image, None)),
+        None => count(image, None),
+    }
+}
+
+/// Compiles the instruction counter; `None` where there is no C compiler.
+fn plugin(workspace: &Path) -> Option<PathBuf> {
+    let library = workspace.join("target").join("m4count.so");
+    let source = workspace.join("tools/bench/m4count.c");
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
+    let mut cc = Command::new(compiler);
+    cc.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&library).arg(source);
+    run(&mut cc).is_ok().then_some(library)
+}
+
+/// Runs the bench image and pairs its lines with what was counted.
+fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
+    let (stdout, stderr) = match plugin {
+        Some(plugin) => emulate(image, &["-plugin", &plugin.display().to_string()])?,
+        None => emulate(image, &["-icount", "shift=0"])?,
+    };
+    let mut regions = stderr.lines().filter(|line| line.starts_with("REGION"));
+    let mut counts = Counts::default();
+    for line in stdout.lines() {
+        let unexpected = || BenchError::Line(line.to_owned());
+        let (name, _) = line.split_once(' ').ok_or_else(unexpected)?;
+        if let Some(bytes) = field(line, "bytes=") {
+            counts.sizes.push((name.to_owned(), bytes));
+            continue;
+        }
+        let stack = field(line, "stack=").ok_or_else(unexpected)?;
+        let (instructions, cycles) = if plugin.is_some() {
+            let region = regions.next().ok_or_else(unexpected)?;
+            let instructions = field(region, "insns=").ok_or_else(unexpected)?;
+            (instructions, Some(field(region, "m4cycles~").ok_or_else(unexpected)?))
+        } else {
+            (field(line, "ticks=").ok_or_else(unexpected)? * 1000 / TICKS_PER_1000, None)
+        };
+        counts.regions.push(Count { name: name.to_owned(), instructions, cycles, stack });
+    }
+    Ok(counts)
+}
+
+/// Runs an image that ends by itself; what it printed, and what the emulator did.
+///
+/// # Errors
+/// [`BenchError`], also when the image reports a failure.
+pub fn emulate(image: &Path, arguments: &[&str]) -> Result<(String, String), BenchError> {
+    let mut qemu = Command::new("timeout");
+    qemu.args([TIMEOUT_S, "qemu-system-arm", "-machine", MACHINE, "-nographic", "-monitor", "none"]);
+    qemu.args(["-serial", "none", "-semihosting-config", "enable=on,target=native"]);
+    run(qemu.args(arguments).arg("-kernel").arg(image))
+}
+
+/// The number behind `key` in a line.
+fn field(line: &str, key: &str) -> Option<u64> {
+    let (_, rest) = line.split_once(key)?;
+    rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+}
+
+/// Runs a program to its end; its output, or its error output as an error.
+fn run(command: &mut Command) -> Result<(String, String), BenchError> {
+    let program = command.get_program().to_string_lossy().into_owned();
+    let output = command.output().map_err(|source| BenchError::Start { program: program.clone(), source })?;
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    if output.status.success() {
+        Ok((text(&output.stdout), text(&output.stderr)))
+    } else {
+        Err(BenchError::Failed { program, output: text(&output.stderr) })
+    }
+}

@@ -1,0 +1,107 @@
+//! A weight file (`.blob`) from disk, on the boundary that the library wants.
+
+use gyronet::model::{Blob, BlobError};
+use std::path::Path;
+
+/// Why a weight file cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WeightFileError {
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The library refuses it.
+    #[error("{path}: {source}")]
+    Blob {
+        /// The file.
+        path: String,
+        /// Why.
+        source: BlobError,
+    },
+}
+
+/// The bytes of a weight file that has passed all of the library's checks.
+#[derive(Debug, Clone)]
+pub struct WeightFile {
+    path: String,
+    /// Whole words, for their alignment; the last one may be padded.
+    words: Vec<u32>,
+    len: usize,
+}
+
+impl WeightFile {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// [`WeightFileError`], which names the file.
+    pub fn read(path: &Path) -> Result<Self, WeightFileError> {
+        let name = path.display().to_string();
+        let bytes =
+            std::fs::read(path).map_err(|source| WeightFileError::Io { path: name.clone(), source })?;
+        Self::parse(&name, &bytes)
+    }
+
+    /// Checks bytes; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`WeightFileError::Blob`] with that path.
+    pub fn parse(path: &str, bytes: &[u8]) -> Result<Self, WeightFileError> {
+        let mut words = vec![0u32; bytes.len().div_ceil(4)];
+        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+        let file = Self { path: path.to_owned(), words, len: bytes.len() };
+        file.blob()?;
+        Ok(file)
+    }
+
+    /// The weights.
+    ///
+    /// # Errors
+    /// [`WeightFileError::Blob`]; never, once [`WeightFile::parse`] has succeeded.
+    pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
+        let bytes: &[u8] = bytemuck::cast_slice(&self.words);
+        Blob::new_checked(&bytes[..self.len])
+            .map_err(|source| WeightFileError::Blob { path: self.path.clone(), source })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyronet::model::weights::DEFAULT;
+
+    fn refused(edit: impl Fn(&mut Vec<u8>)) -> String {
+        let mut bytes = DEFAULT.0.to_vec();
+        edit(&mut bytes);
+        WeightFile::parse("w.blob", &bytes).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_default_weights_pass() {
+        let file = WeightFile::parse("w.blob", &DEFAULT.0).unwrap();
+        assert_eq!(file.blob().unwrap().crc, Blob::new_checked(&DEFAULT.0).unwrap().crc);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_the_name() {
+        for (message, start) in [
+            (refused(|bytes| bytes[0] = b'X'), "w.blob: weight file: magic"),
+            (refused(|bytes| bytes[4] = 9), "w.blob: weight file: format version 9"),
+            (refused(|bytes| bytes.truncate(70_001)), "w.blob: weight file: 70001 bytes"),
+            (refused(Vec::clear), "w.blob: weight file: "),
+            (refused(|bytes| bytes[90_000] ^= 1), "w.blob: weight file: checksum"),
+        ] {
+            assert!(message.starts_with(start), "{message}");
+        }
+    }
+
+    #[test]
+    fn an_unreadable_file_is_named() {
+        let error = WeightFile::read(Path::new("no/such.blob")).unwrap_err();
+        assert!(error.to_string().starts_with("no/such.blob: "), "{error}");
+    }
+}
