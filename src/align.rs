@@ -99,11 +99,12 @@ impl Aligner {
             return Err(AlignError::Backwards { last, at });
         }
         let elapsed = at.0 - last.0;
-        let steps = (elapsed + PERIOD_US / 2) / PERIOD_US;
-        if steps > u64::from(MAX_GAP) + 1 {
+        let longest = (u64::from(MAX_GAP) + 1) * PERIOD_US + TOLERANCE_US;
+        if elapsed > longest {
             self.last = Some((at, tick));
             return Err(AlignError::Jump { last, at });
         }
+        let steps = (elapsed + PERIOD_US / 2) / PERIOD_US;
         if steps == 0 || elapsed.abs_diff(steps * PERIOD_US) > TOLERANCE_US {
             return Err(AlignError::OffGrid { last, at });
         }

@@ -75,8 +75,6 @@ pub enum StaticError {
         /// Its mean.
         mean: f32,
     },
-    /// A wheel turned.
-    WheelsTurn,
 }
 
 impl core::fmt::Display for StaticError {
@@ -97,7 +95,6 @@ impl core::fmt::Display for StaticError {
             Self::GyroBias { axis, mean } => {
                 write!(f, "gyro {} shows a steady {mean:.4} rad/s", name(axis))
             }
-            Self::WheelsTurn => f.write_str("a wheel turns"),
         }
     }
 }
