@@ -32,7 +32,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--stem", default="gyronet", help="name of the files")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NN")
     parser.add_argument("--validate", default="08", metavar="NN")
-    parser.add_argument("--epochs", type=int, default=14)
+    parser.add_argument("--epochs", type=int, default=20)
     parser.add_argument("--batch", type=int, default=512)
     parser.add_argument("--lr", type=float, default=0.0015)
     parser.add_argument("--seed", type=int, default=1)
