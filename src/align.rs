@@ -99,8 +99,7 @@ impl Aligner {
             return Err(AlignError::Backwards { last, at });
         }
         let elapsed = at.0 - last.0;
-        let longest = (u64::from(MAX_GAP) + 1) * PERIOD_US + TOLERANCE_US;
-        if elapsed > longest {
+        if elapsed >= (u64::from(MAX_GAP) + 1) * PERIOD_US + PERIOD_US / 2 {
             self.last = Some((at, tick));
             return Err(AlignError::Jump { last, at });
         }

@@ -112,6 +112,11 @@ impl Compensator {
         Ok(())
     }
 
+    /// No estimate came: the last one is not held on to.
+    pub fn forget(&mut self) {
+        self.prior = 0;
+    }
+
     /// After a gap no window may reach back across it; the carry stays owed.
     pub fn break_window(&mut self) {
         self.best = [Best::default(); REACH];

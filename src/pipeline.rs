@@ -213,6 +213,7 @@ impl Pipeline {
         let Some(estimate) = estimate else {
             count(&mut self.counters.late, 1);
             self.believed = false;
+            self.compensator.forget();
             return None;
         };
         count(&mut self.counters.windows, 1);
@@ -224,7 +225,9 @@ impl Pipeline {
     }
 
     fn initialise(&mut self, frame: &Frame) -> (YawRate, Option<StaticError>) {
-        let refused = match self.static_init.process(&frame.sample) {
+        // A clipped reading says nothing about the bias; the gap it leaves has restarted it.
+        let judged = if frame.sample.clipped { None } else { self.static_init.process(&frame.sample) };
+        let refused = match judged {
             Some(Ok(bias)) => {
                 self.gyro_bias = Some(bias);
                 None

@@ -28,8 +28,8 @@ pub const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
 
 /// Zero rate and zero acceleration.
 const ZERO: i32 = 0x8000;
-/// 0.005 deg/s in 1e-9 deg/s.
-const YAW_RATE_LSB_NANO_DEG: i64 = 5_000_000;
+/// 0.005 deg/s in 1e-9 deg/s x 2^-20.
+const YAW_RATE_LSB: i64 = 5_000_000 << 20;
 /// 1e-9 deg/s per rate code (180e9 / pi / 2^27), times 2^20.
 const NANO_DEG_PER_CODE_Q20: i64 = 447_623_277;
 /// Acceleration codes per 2^-20 m/s^2 (1 / (0.000127465 * 9.80665 * 2^20)), times 2^32.
@@ -149,7 +149,7 @@ impl Tx1 {
 /// The yaw rate's rounding residual.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct YawRateSignal {
-    /// 1e-9 deg/s owed to the receiver.
+    /// Owed to the receiver, 1e-9 deg/s x 2^-20: fine enough that nothing is ever rounded away.
     residual: i64,
 }
 
@@ -163,11 +163,11 @@ impl YawRateSignal {
     /// # Errors
     /// [`OutOfRange`]; the residual is then dropped, since the frame is marked bad.
     pub fn encode(&mut self, rate: AngularRate) -> Result<u16, OutOfRange> {
-        let wanted = ((i64::from(rate.0) * NANO_DEG_PER_CODE_Q20) >> 20) + self.residual;
-        let code = (wanted + YAW_RATE_LSB_NANO_DEG / 2).div_euclid(YAW_RATE_LSB_NANO_DEG);
+        let wanted = i64::from(rate.0) * NANO_DEG_PER_CODE_Q20 + self.residual;
+        let code = (wanted + YAW_RATE_LSB / 2).div_euclid(YAW_RATE_LSB);
         match u16::try_from(code + i64::from(ZERO)) {
             Ok(raw) => {
-                self.residual = wanted - code * YAW_RATE_LSB_NANO_DEG;
+                self.residual = wanted - code * YAW_RATE_LSB;
                 Ok(raw)
             }
             Err(_) => {
