@@ -1,1 +1,13 @@
-//! Harness.
+//! What the host tests share: how a test gets QEMU or the recordings or says that it is skipped,
+//! the emulated board and its image, bytes, samples, streams and weights made for the purpose.
+
+pub mod image;
+pub mod noise;
+pub mod packing;
+pub mod qemu;
+pub mod recordings;
+pub mod replay;
+pub mod require;
+pub mod stream;
+pub mod synthetic;
+pub mod wire;

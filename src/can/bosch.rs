@@ -24,7 +24,7 @@ use embedded_can::{Frame, StandardId};
 /// Identifier of the message that carries yaw rate and lateral acceleration (TX1).
 pub const TX1_ID: StandardId = StandardId::new(0x174).unwrap();
 /// SAE J1850: polynomial 0x1D, start and final XOR 0xFF.
-pub const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
+pub static CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
 
 /// Zero rate and zero acceleration.
 const ZERO: i32 = 0x8000;

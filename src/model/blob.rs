@@ -35,7 +35,7 @@ pub const HIDDEN: usize = 60;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = 28 + 8 * FEATURES;
 /// CRC-32 as in zip and Ethernet.
-pub const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 #[cfg(target_endian = "big")]
 compile_error!("weights are read in place as little-endian words");

@@ -1,0 +1,74 @@
+//! The recordings of real drives. They are not part of the repository: their licence does not
+//! allow it.
+
+use crate::require::{self, Need};
+use std::path::{Path, PathBuf};
+
+/// Points at the folder that holds `wid_car/`.
+pub const VARIABLE: &str = "GYRONET_DATA";
+
+/// The repository's root.
+#[must_use]
+pub fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("host-tests lies in the workspace")
+}
+
+/// Where the recordings are looked for: [`VARIABLE`], from the repository's root if relative,
+/// else `shared/data` beside the repository.
+#[must_use]
+pub fn folder() -> PathBuf {
+    let beside = || workspace().parent().unwrap_or(workspace()).join("shared/data");
+    std::env::var_os(VARIABLE).map_or_else(beside, |folder| workspace().join(folder))
+}
+
+/// One drive of `wid_car`, for a test that is skipped (aloud) without it.
+#[must_use]
+pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
+    let path = folder().join(format!("wid_car/trial{number:02}_100hz.csv"));
+    let found = if path.is_file() {
+        Ok(path)
+    } else {
+        Err(format!("no recording {} ({VARIABLE} names another folder)", path.display()))
+    };
+    require::wants(test, Need::Data, found)
+}
+
+/// One row of a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Seconds.
+    pub time: f64,
+    /// m/s^2.
+    pub acceleration: [f32; 3],
+    /// rad/s.
+    pub rate_of_turn: [f32; 3],
+    /// The reference gyro's z axis, rad/s.
+    pub reference: f64,
+}
+
+/// The rows of a recording: a reader of the tests' own, to hold the tools' one against.
+///
+/// # Panics
+/// When the file is not of the layout of `wid_car`.
+#[must_use]
+pub fn rows(path: &Path) -> Vec<Row> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let column = |name: &str| header.iter().position(|column| *column == name).expect(name);
+    let vector = |prefix: &str| ["x", "y", "z"].map(|axis| column(&format!("{prefix}_{axis}")));
+    let (time, acceleration, rate) = (column("t_s"), vector("acc"), vector("gyr"));
+    let reference = column("ref_gyr_z");
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        let f32 = |column: usize| fields[column].parse::<f32>().expect("a number");
+        let f64 = |column: usize| fields[column].parse::<f64>().expect("a number");
+        Row {
+            time: f64(time),
+            acceleration: acceleration.map(f32),
+            rate_of_turn: rate.map(f32),
+            reference: f64(reference),
+        }
+    };
+    lines.map(row).collect()
+}

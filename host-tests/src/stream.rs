@@ -1,0 +1,58 @@
+//! A pipeline fed with samples, and a network of the test's own behind it.
+
+use crate::synthetic::{rate, turning};
+use gyronet::health::Status;
+use gyronet::model::Estimate;
+use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
+use gyronet::sample::ImuSample;
+use gyronet::window::WINDOW;
+
+/// First tick after static initialisation, where nothing disturbs it.
+pub const KNOWN: u64 = 300;
+
+/// A pipeline with its defaults.
+#[must_use]
+pub fn new() -> Pipeline {
+    Pipeline::new(PipelineConfig::DEFAULT)
+}
+
+/// Standing, then turning from tick [`KNOWN`] on.
+pub fn drive(ticks: impl IntoIterator<Item = u64>) -> impl Iterator<Item = ImuSample> {
+    ticks.into_iter().map(|tick| turning(tick, rate(if tick < KNOWN { 0.001 } else { 0.25 })))
+}
+
+/// A network that always says the same, rad/s.
+pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
+    move |_| Some(Estimate { corrections: [rate(correction); WINDOW], clamped_inputs: 0 })
+}
+
+/// Runs samples through a pipeline; estimates are delivered at once, `None` never.
+///
+/// # Panics
+/// When a sample has no place on the grid.
+pub fn run(
+    pipeline: &mut Pipeline,
+    samples: impl IntoIterator<Item = ImuSample>,
+    mut network: impl FnMut(&DueWindow) -> Option<Estimate>,
+) -> Vec<Output> {
+    let mut outputs = Vec::new();
+    for sample in samples {
+        let output = pipeline.process(sample).expect("a place on the grid");
+        if let Some(due) = &output.window
+            && let Some(estimate) = network(due)
+        {
+            pipeline.deliver(due.end, estimate);
+        }
+        outputs.push(output);
+    }
+    outputs
+}
+
+/// Runs of equal status: which, and how many samples.
+#[must_use]
+pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
+    outputs
+        .chunk_by(|a, b| a.yaw_rate.status == b.yaw_rate.status)
+        .map(|run| (run[0].yaw_rate.status, run.len()))
+        .collect()
+}

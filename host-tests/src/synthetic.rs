@@ -1,0 +1,51 @@
+//! Samples of a vehicle that stands, turns or shakes, in the codes of the pipeline.
+
+use crate::noise::Noise;
+use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
+use gyronet::units::{AngularRate, Micros, SpecificForce};
+
+/// rad/s to a code.
+///
+/// # Panics
+/// Beyond +-16 rad/s.
+#[must_use]
+pub fn rate(rad_per_sec: f64) -> AngularRate {
+    AngularRate::from_rad_per_sec(rad_per_sec as f32).expect("a gyro's range")
+}
+
+/// m/s^2 to a code.
+///
+/// # Panics
+/// Beyond +-2048 m/s^2.
+#[must_use]
+pub fn force(metre_per_sec2: f64) -> SpecificForce {
+    SpecificForce::from_metre_per_sec2(metre_per_sec2 as f32).expect("an accelerometer's range")
+}
+
+/// A level vehicle at grid step `tick` that turns by `yaw_rate` and does nothing else.
+#[must_use]
+pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
+    ImuSample {
+        time: Micros(tick * PERIOD_US),
+        specific_force: [SpecificForce(0), SpecificForce(0), force(9.81)],
+        angular_rate: [AngularRate(0), AngularRate(0), yaw_rate],
+        temperature: None,
+        clipped: false,
+    }
+}
+
+/// A vehicle that stands with its engine running: a 27 Hz shake and its overtone on every axis,
+/// with some noise; `bias` (rad/s) on every gyro axis.
+#[must_use]
+pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
+    let phase = std::f64::consts::TAU * 27.0 * tick as f64 / f64::from(RATE_HZ);
+    let mut shake = |axis: usize| {
+        (phase + axis as f64).sin() + 0.3 * (2.0 * phase + axis as f64).sin() + 0.2 * noise.normal()
+    };
+    let mut sample = turning(tick, AngularRate(0));
+    for axis in 0..3 {
+        sample.angular_rate[axis] = rate(bias + 0.02 * shake(axis));
+        sample.specific_force[axis].0 += force(0.8 * shake(axis)).0;
+    }
+    sample
+}

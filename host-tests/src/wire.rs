@@ -1,0 +1,60 @@
+//! Bytes of an Xsens MTi, and what the part at the end of the cable delivers for them.
+
+use gyronet::sample::ImuSample;
+use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
+
+/// Bytes written in hexadecimal, with blanks between them.
+///
+/// # Panics
+/// When they are not.
+#[must_use]
+pub fn bytes(hex: &str) -> Vec<u8> {
+    hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("hex")).collect()
+}
+
+/// A frame of a real MTi with 98 bytes of payload.
+#[must_use]
+pub fn real_frame() -> Vec<u8> {
+    bytes(
+        "fa ff 36 62 10 20 02 a9 86 10 60 04 03 14 ed 53 10 10 0c 07 44 0b e0 07 e3 01 14 0d 2f 18 37 e0 20 04 01 \
+         80 00 07 40 20 0c bc 8e 54 66 c0 e8 2f 10 bf 9a d2 9e 40 10 0c b9 35 26 9f bd 94 99 30 bc 46 23 46 80 20 \
+         0c bb 42 5c 34 3b 10 68 df 3a e1 c7 e5 80 30 10 3f 80 00 01 b7 78 c7 f0 37 38 d8 27 37 10 7f ee f7",
+    )
+}
+
+/// A made-up one: az 9.81 m/s^2, gz 10 deg/s, counter 1, time 100, status 3.
+#[must_use]
+pub fn synthetic_frame() -> Vec<u8> {
+    bytes(
+        "fa ff 36 31 10 20 02 00 01 10 60 04 00 00 00 64 40 20 0c 00 00 00 00 00 00 00 00 41 1c f5 c3 80 20 0c 00 \
+         00 00 00 00 00 00 00 3e 32 b8 c2 e0 20 04 00 00 00 03 71",
+    )
+}
+
+/// A message whose readings differ with its time (10 kHz).
+#[must_use]
+pub fn message(time: u32) -> MtData2 {
+    MtData2 {
+        packet_counter: Some(time as u16),
+        sample_time_fine: Some(time),
+        acceleration: Some([0.5, -0.25, 9.81]),
+        rate_of_turn: Some([0.0, 0.125, (time % 1_000) as f32 * 1e-3]),
+        temperature: None,
+        status: Some(3),
+    }
+}
+
+/// What a part delivers for these bytes.
+pub fn feed(mti: &mut Mti, bytes: impl IntoIterator<Item = u8>) -> Vec<Result<ImuSample, XsensError>> {
+    let mut samples = Vec::new();
+    for byte in bytes {
+        mti.push(byte);
+        samples.extend(std::iter::from_fn(|| mti.next_sample()));
+    }
+    samples
+}
+
+/// [`feed`] from the start.
+pub fn feed_new(bytes: impl IntoIterator<Item = u8>) -> Vec<Result<ImuSample, XsensError>> {
+    feed(&mut Mti::new(), bytes)
+}

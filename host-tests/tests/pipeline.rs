@@ -1,0 +1,149 @@
+//! The pipeline on made-up streams: status from initialisation to a corrected rate, and what a
+//! gap, clipping, motion or a jumping clock does to it.
+
+use gyronet::can::bosch::SignalStatus;
+use gyronet::compensate::{DELAY, HOP};
+use gyronet::health::Status::{Clipped, Degraded, Init, Ready};
+use gyronet::sample::ImuSample;
+use gyronet::units::AngularRate;
+use gyronet::window::WINDOW;
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::stream::{KNOWN, constant, drive, new, run, statuses};
+use gyronet_host_tests::synthetic::{rate, turning};
+
+/// First tick that a window covers: ten samples, then the delay.
+const COVERED: u64 = KNOWN + WINDOW as u64 - 1 + DELAY as u64;
+
+#[test]
+fn init_then_degraded_then_ready() {
+    let mut pipeline = new();
+    let outputs = run(&mut pipeline, drive(0..400), constant(0.002));
+    assert_eq!(
+        statuses(&outputs),
+        [(Init, 300), (Degraded, (COVERED - KNOWN) as usize), (Ready, 400 - COVERED as usize)]
+    );
+    assert_eq!(pipeline.gyro_bias(), Some([AngularRate(0), AngularRate(0), rate(0.001)]));
+    let at = |tick: u64| outputs[tick as usize].yaw_rate;
+    assert_eq!((at(0).rate, at(299).yaw.0), (rate(0.001), 0), "raw, and nothing summed yet");
+    let less_bias = AngularRate(rate(0.25).0 - rate(0.001).0);
+    assert_eq!(at(COVERED - 1).rate, less_bias);
+    assert_eq!(at(399).rate, AngularRate(less_bias.0 - rate(0.002).0));
+    for output in &outputs {
+        let status =
+            if output.yaw_rate.status == Init { SignalStatus::INITIALISING } else { SignalStatus::OK };
+        assert_eq!(output.tx1.yaw_rate_status, status);
+        assert_eq!(u32::from(output.tx1.counter), output.yaw_rate.tick % 16);
+    }
+    // The first window ends with the tenth sample, the others follow every fifth.
+    let ends: Vec<u32> = outputs.iter().filter_map(|output| Some(output.window?.end)).collect();
+    assert_eq!(ends, (309..400).step_by(HOP as usize).collect::<Vec<u32>>());
+    assert_eq!(pipeline.counters().windows, 18, "the one that ended at 399 is still out");
+}
+
+#[test]
+fn windows_hold_the_features_oldest_first() {
+    let samples =
+        (0..KNOWN + 40).map(|tick| turning(tick, AngularRate(if tick < KNOWN { 5 } else { tick as i32 })));
+    for due in run(&mut new(), samples, constant(0.0)).iter().filter_map(|output| output.window) {
+        for (features, tick) in due.features.iter().zip(due.end + 1 - WINDOW as u32..) {
+            assert_eq!(
+                features,
+                &[0, 0, turning(0, AngularRate(0)).specific_force[2].0, 0, 0, tick as i32 - 5]
+            );
+        }
+    }
+}
+
+#[test]
+fn a_gap_degrades_and_heals() {
+    let mut pipeline = new();
+    let ticks = (0..400).chain(403..500);
+    let outputs = run(&mut pipeline, drive(ticks), constant(0.0));
+    let broken = WINDOW - 1 + DELAY as usize;
+    assert_eq!(
+        statuses(&outputs),
+        [(Init, 300), (Degraded, 11), (Ready, 89), (Degraded, broken), (Ready, 97 - broken)]
+    );
+    let counters = [&outputs[399], &outputs[400]].map(|output| u32::from(output.tx1.counter));
+    assert_eq!(counters, [399 % 16, 403 % 16], "a receiver sees what is missing");
+    assert_eq!((pipeline.counters().missing, pipeline.counters().samples), (3, 497));
+}
+
+#[test]
+fn a_gap_restarts_static_initialisation() {
+    let outputs = run(
+        &mut new(),
+        drive((0..200).chain(210..290)).chain((290..700).map(|t| turning(t, rate(0.001)))),
+        constant(0.0),
+    );
+    assert_eq!(statuses(&outputs)[0], (Init, 500));
+}
+
+#[test]
+fn clipping_is_a_failure_until_it_is_over() {
+    let mut pipeline = new();
+    let samples = drive(0..500)
+        .map(|sample| ImuSample { clipped: (4_000_000..4_030_000).contains(&sample.time.0), ..sample });
+    let outputs = run(&mut pipeline, samples, constant(0.001));
+    assert_eq!(
+        statuses(&outputs),
+        [(Init, 300), (Degraded, 11), (Ready, 89), (Clipped, 3), (Degraded, 11), (Ready, 86)]
+    );
+    for output in &outputs[400..403] {
+        assert_eq!(output.tx1.yaw_rate_status, SignalStatus::FAILURE);
+    }
+    assert_eq!(pipeline.counters().clipped, 3);
+}
+
+#[test]
+fn a_clipped_sample_is_no_part_of_the_bias() {
+    let samples = (0..400).map(|tick| ImuSample {
+        clipped: tick == 0,
+        ..turning(tick, rate(if tick == 0 { 0.06 } else { 0.001 }))
+    });
+    let mut pipeline = new();
+    let outputs = run(&mut pipeline, samples, constant(0.0));
+    assert_eq!(statuses(&outputs)[..2], [(Clipped, 1), (Init, 300)]);
+    assert_eq!(pipeline.gyro_bias(), Some([AngularRate(0), AngularRate(0), rate(0.001)]));
+}
+
+#[test]
+fn a_vehicle_that_moves_is_refused_and_tried_again() {
+    let mut pipeline = new();
+    let samples = (0..700).map(|tick| turning(tick, rate(if tick < 150 { 0.3 } else { 0.001 })));
+    let outputs = run(&mut pipeline, samples, constant(0.0));
+    assert!(outputs[299].refused.is_some());
+    assert_eq!(outputs.iter().filter(|output| output.refused.is_some()).count(), 1);
+    assert_eq!((statuses(&outputs)[0], pipeline.counters().moving), ((Init, 600), 1));
+}
+
+#[test]
+fn misplaced_samples_change_nothing() {
+    let clean = run(&mut new(), drive(0..600), constant(0.004));
+    let (mut pipeline, mut noise) = (new(), Noise::new(6));
+    let mut outputs = Vec::new();
+    for sample in drive(0..600) {
+        outputs.extend(run(&mut pipeline, [sample], constant(0.004)));
+        for _ in 0..noise.int(0, 2) {
+            let mut misplaced = turning(0, rate(3.0));
+            misplaced.time.0 =
+                sample.time.0.saturating_sub(noise.int(0, 900_000) as u64) + noise.int(0, 1) as u64 * 5_000;
+            misplaced.time.0 = misplaced.time.0.min(sample.time.0 + 5_000);
+            assert!(pipeline.process(misplaced).is_err());
+        }
+    }
+    assert_eq!(outputs, clean);
+    assert!(pipeline.counters().misplaced > 400);
+}
+
+#[test]
+fn a_clock_jump_is_counted_and_survived() {
+    let mut pipeline = new();
+    run(&mut pipeline, drive(0..400), constant(0.0));
+    let later = |tick: u64| tick + 1_000_000;
+    assert!(pipeline.process(drive([later(0)]).next().unwrap()).is_err());
+    let outputs = run(&mut pipeline, drive((1..100).map(later)), constant(0.0));
+    assert_eq!(statuses(&outputs), [(Degraded, 11), (Ready, 88)]);
+    assert_eq!((pipeline.counters().clock_jumps, pipeline.counters().missing), (1, 0));
+    assert_eq!(outputs[0].yaw_rate.tick, 400);
+}

@@ -1,0 +1,165 @@
+//! CAN frames as lines: the published example, round trips, and damaged lines.
+
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::slcan::{self, SlcanError};
+use gyronet_host_tests::noise::cases;
+use proptest::prelude::*;
+
+fn standard(id: u16, data: &[u8]) -> DataFrame {
+    DataFrame::new(StandardId::new(id).expect("11 bits"), data).expect("eight bytes at most")
+}
+
+fn extended(id: u32, data: &[u8]) -> DataFrame {
+    DataFrame::new(ExtendedId::new(id).expect("29 bits"), data).expect("eight bytes at most")
+}
+
+fn parse(line: &[u8]) -> Result<DataFrame, SlcanError> {
+    slcan::parse(line)
+}
+
+/// Frames and their lines.
+fn examples() -> [(DataFrame, &'static [u8]); 5] {
+    let tx1 = [0xD0, 0x87, 0x00, 0x4B, 0x11, 0x83, 0x01, 0x00];
+    [
+        (standard(0x174, &tx1), b"t1748D087004B11830100\r"),
+        (standard(0, &[]), b"t0000\r"),
+        (standard(0x7FF, &[0xA5]), b"t7FF1A5\r"),
+        (extended(0x18F0_0980, &[0x06, 0x83]), b"T18F0098020683\r"),
+        (extended(0x1FFF_FFFF, &[0xFF; 8]), b"T1FFFFFFF8FFFFFFFFFFFFFFFF\r"),
+    ]
+}
+
+#[test]
+fn examples_both_ways() {
+    for (frame, line) in examples() {
+        assert_eq!(slcan::emit(&frame).as_deref(), Some(line));
+        assert_eq!(parse(&line[..line.len() - 1]), Ok(frame));
+        assert_eq!(
+            parse(&line[..line.len() - 1].to_ascii_lowercase()).ok(),
+            (line[0] == b't').then_some(frame)
+        );
+    }
+}
+
+#[test]
+fn refusals_say_why() {
+    for (line, error, message) in [
+        (&b""[..], SlcanError::Kind, "not a data frame line"),
+        (b"r1740", SlcanError::Kind, "not a data frame line"),
+        (b"t1g40", SlcanError::Digit { at: 2 }, "no hexadecimal digit at column 2"),
+        (b"t17410x", SlcanError::Digit { at: 6 }, "no hexadecimal digit at column 6"),
+        (b"t1742AA", SlcanError::Length, "line length does not fit the frame"),
+        (b"t1749112233445566778899", SlcanError::Length, "line length does not fit the frame"),
+        (b"t8000", SlcanError::Identifier, "identifier out of range"),
+        (b"T200000000", SlcanError::Identifier, "identifier out of range"),
+    ] {
+        assert_eq!(parse(line), Err(error), "{:?}", line.escape_ascii().to_string());
+        assert_eq!(error.to_string(), message);
+    }
+}
+
+#[test]
+fn truncations_are_refused() {
+    for (_, line) in examples() {
+        for len in 0..line.len() - 1 {
+            assert!(parse(&line[..len]).is_err(), "{len} bytes of {}", line.escape_ascii());
+        }
+        assert!(parse(line).is_err(), "CR is not part of a line");
+    }
+}
+
+#[test]
+fn substitutions_are_refused_or_mean_what_they_say() {
+    for (_, line) in examples() {
+        let line = &line[..line.len() - 1];
+        for at in 0..line.len() {
+            for byte in 0..=u8::MAX {
+                let mut changed = line.to_vec();
+                changed[at] = byte;
+                let Ok(frame) = parse(&changed) else { continue };
+                let again = slcan::emit(&frame).expect("a data frame");
+                // Lower-case digits are read, upper-case ones written.
+                let (kind, digits) = changed.split_at(1);
+                assert_eq!(
+                    (&again[..1], &again[1..]),
+                    (kind, &[&digits.to_ascii_uppercase()[..], b"\r"].concat()[..])
+                );
+            }
+        }
+    }
+}
+
+/// A frame that no data line can carry.
+struct Other {
+    remote: bool,
+    data: [u8; 12],
+}
+
+impl Frame for Other {
+    fn new(_: impl Into<Id>, _: &[u8]) -> Option<Self> {
+        None
+    }
+    fn new_remote(_: impl Into<Id>, _: usize) -> Option<Self> {
+        None
+    }
+    fn is_extended(&self) -> bool {
+        false
+    }
+    fn is_remote_frame(&self) -> bool {
+        self.remote
+    }
+    fn id(&self) -> Id {
+        Id::Standard(StandardId::ZERO)
+    }
+    fn dlc(&self) -> usize {
+        self.data().len()
+    }
+    fn data(&self) -> &[u8] {
+        if self.remote { &[] } else { &self.data }
+    }
+}
+
+#[test]
+fn what_is_no_classic_data_frame_gives_no_line() {
+    assert_eq!(slcan::emit(&Other { remote: true, data: [0; 12] }), None);
+    assert_eq!(slcan::emit(&Other { remote: false, data: [0; 12] }), None);
+    assert_eq!(
+        slcan::parse::<Other>(b"t1740").err(),
+        Some(SlcanError::Length),
+        "a driver that refuses the frame"
+    );
+    assert_eq!(DataFrame::new(StandardId::ZERO, &[0; 9]), None);
+    assert_eq!(DataFrame::new_remote(StandardId::ZERO, 0), None);
+}
+
+proptest! {
+    #![proptest_config(cases(256))]
+
+    #[test]
+    fn round_trip_standard(id in 0u16..=0x7FF, data in prop::collection::vec(any::<u8>(), 0..=8)) {
+        let frame = standard(id, &data);
+        let line = slcan::emit(&frame).expect("a data frame");
+        prop_assert_eq!(parse(line.strip_suffix(b"\r").expect("a CR")), Ok(frame));
+    }
+
+    #[test]
+    fn round_trip_extended(id in 0u32..=0x1FFF_FFFF, data in prop::collection::vec(any::<u8>(), 0..=8)) {
+        let frame = extended(id, &data);
+        let line = slcan::emit(&frame).expect("a data frame");
+        prop_assert_eq!(parse(line.strip_suffix(b"\r").expect("a CR")), Ok(frame));
+    }
+
+    #[test]
+    fn any_bytes(line in prop::collection::vec(any::<u8>(), 0..40)) {
+        let _ = parse(&line);
+    }
+
+    #[test]
+    fn almost_a_line(line in "[tT][0-9A-Fa-f]{3,9}[0-9][0-9A-Fa-f]{0,18}") {
+        if let Ok(frame) = parse(line.as_bytes()) {
+            let again = slcan::emit(&frame).expect("a data frame");
+            prop_assert_eq!(again[1..again.len() - 1].to_vec(), line.as_bytes()[1..].to_ascii_uppercase());
+        }
+    }
+}

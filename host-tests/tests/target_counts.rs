@@ -1,0 +1,91 @@
+//! What the kernels cost on the target, counted in the emulator, against the bars that the
+//! project has set itself; and that they are right there. Instructions are exact where a C
+//! compiler is found (QEMU plugin), else good to six; modelled cycles need the compiler.
+
+use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+use gyronet::window::{Features, WINDOW};
+use gyronet_host_tests::{image, qemu};
+use gyronet_tools::image_size::ImageSize;
+use gyronet_tools::target_bench;
+
+struct Bar {
+    name: &'static str,
+    instructions: u64,
+    cycles: u64,
+}
+
+/// CMSIS-NN s8 takes 3,484,464 instructions and 4,382,365 modelled cycles for a whole window.
+const BARS: [Bar; 3] = [
+    Bar { name: "gyronet/window", instructions: 1_200_000, cycles: 1_500_000 },
+    Bar { name: "gyronet/newest", instructions: 850_000, cycles: 1_100_000 },
+    Bar { name: "fognet/window", instructions: 23_500_000, cycles: 30_000_000 },
+];
+
+#[test]
+fn counts_and_sizes() {
+    let test = "counts_and_sizes";
+    let Some(()) = qemu::available(test) else { return };
+    let Some(bench) = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "bench") else { return };
+    let counts = target_bench::measure(&target_bench::workspace(), &bench).expect("the bench image runs");
+    for Bar { name, instructions, cycles } in BARS {
+        let count = counts.get(name).expect(name);
+        println!("{name} instructions={} cycles={:?}", count.instructions, count.cycles);
+        assert!(count.instructions <= instructions, "{count:?}");
+        assert!(count.cycles.is_none_or(|counted| counted <= cycles), "{count:?}");
+    }
+    // Ten random windows, zeros, the ends of the range: the same work to the instruction.
+    assert_eq!(counts.starting_with("gyronet/window").count(), 12);
+    assert!(counts.constant(), "{counts:?}");
+
+    let size = |name: &str| counts.sizes.iter().find(|(n, _)| n == name).expect("the image prints it").1;
+    assert!(size("gyronet/weights") <= 126_000);
+    assert!(size("gyronet/state") <= 6_000);
+    assert!(size("fognet/state") <= 36_000);
+    let stack = counts.get("gyronet/window").expect("measured").stack;
+    assert!(stack <= 1_024, "{stack} bytes of stack for a window");
+}
+
+#[test]
+fn coprocessor_size() {
+    let Some(elf) = image::firmware("coprocessor_size", env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
+        return;
+    };
+    let size = ImageSize::read(&elf).expect("an ELF file");
+    println!("{size:?}");
+    assert!(size.kernels > 0 && size.kernels <= 8 * 1024, "{size:?}");
+    assert!(size.flash <= 640 * 1024, "{size:?}");
+    assert!(size.static_ram <= 48 * 1024, "{size:?}");
+}
+
+/// The kernels on the target equal their portable definition, and GyroNet's outputs there
+/// equal this host's.
+#[test]
+fn selftest() {
+    let Some(()) = qemu::available("selftest") else { return };
+    let Some(elf) = image::firmware("selftest", env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
+    let (printed, _) = target_bench::emulate(&elf, &[]).unwrap_or_else(|error| panic!("{error}"));
+    println!("{printed}");
+    assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
+}
+
+/// What the self-test computes: CRC-32 over the corrections of sixteen random windows.
+fn hash() -> u32 {
+    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
+    let mut digest = gyronet::model::blob::CRC.digest();
+    let mut state = 7u32;
+    for _ in 0..16 {
+        let window: [Features; WINDOW] = std::array::from_fn(|_| {
+            std::array::from_fn(|k| {
+                state ^= state << 13;
+                state ^= state >> 17;
+                state ^= state << 5;
+                let limit = if k < 3 { 10 << 20 } else { 1 << 25 };
+                (state >> 1) as i32 % (2 * limit + 1) - limit
+            })
+        });
+        for correction in network.estimate(&window).corrections {
+            digest.update(&correction.0.to_le_bytes());
+        }
+    }
+    digest.finalize()
+}
