@@ -1,8 +1,12 @@
 //! The vehicle bus: message layouts, their checks, and ways to carry them.
 
 pub mod bosch;
+pub mod carry;
 pub mod e2e;
 pub mod frame;
+pub mod j1939;
 pub mod slcan;
+pub mod yaw;
+pub mod yaw_feed;
 
 pub use frame::DataFrame;
