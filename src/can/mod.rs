@@ -2,9 +2,12 @@
 
 pub mod bosch;
 pub mod carry;
+pub mod config;
 pub mod e2e;
+pub mod feeds;
 pub mod frame;
 pub mod j1939;
+pub mod load;
 pub mod slcan;
 pub mod yaw;
 pub mod yaw_feed;
