@@ -8,7 +8,9 @@ pub mod feeds;
 pub mod frame;
 pub mod j1939;
 pub mod load;
+pub mod signal;
 pub mod slcan;
+pub mod wheel;
 pub mod yaw;
 pub mod yaw_feed;
 
