@@ -165,10 +165,10 @@ fn checksums_and_counters() {
     let j1850 = |data: &[u8]| gyronet::can::bosch::CRC.checksum(&data[..7]);
     let xor = |data: &[u8]| data[..7].iter().fold(0, |sum, byte| sum ^ byte);
     let sum = |data: &[u8]| data[..7].iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
-    let kinds: [(Checksum, &dyn Fn(&[u8]) -> u8); 3] = [
-        (Checksum::J1850 { at: 7 }, &j1850),
-        (Checksum::Xor { at: 7 }, &xor),
-        (Checksum::Sum { at: 7 }, &sum),
+    let kinds = [
+        (Checksum::J1850 { at: 7 }, j1850 as fn(&[u8]) -> u8),
+        (Checksum::Xor { at: 7 }, xor),
+        (Checksum::Sum { at: 7 }, sum),
     ];
     for (checksum, compute) in kinds {
         let mut receiver = WheelReceiver::new(settings(two_wheels(checksum))).expect("checked");

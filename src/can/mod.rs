@@ -8,6 +8,7 @@ pub mod feeds;
 pub mod frame;
 pub mod j1939;
 pub mod load;
+pub mod queue;
 pub mod signal;
 pub mod slcan;
 pub mod wheel;

@@ -37,7 +37,7 @@ impl WheelSignal {
         }
         let value = self.field.value(data).ok_or(short)?;
         // 2^32 x 2^31 at most, and the offset.
-        let code = (value * i64::from(self.factor_q16) >> 16) + i64::from(self.offset.0);
+        let code = ((value * i64::from(self.factor_q16)) >> 16) + i64::from(self.offset.0);
         i32::try_from(code).map(WheelSpeed).map_err(|_| WheelError::Invalid { wheel: self.wheel })
     }
 }
