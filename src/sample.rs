@@ -1,6 +1,6 @@
 //! What a sensor delivers and what the pipeline works on.
 
-use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
+use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce, WheelSpeed};
 
 /// Rate of the common grid that the networks see, Hz.
 pub const RATE_HZ: u32 = 100;
@@ -33,4 +33,32 @@ pub struct Frame {
     pub missing: u32,
     /// The sample itself.
     pub sample: ImuSample,
+}
+
+/// Wheels of a vehicle: front left, front right, rear left, rear right.
+pub const WHEELS: usize = 4;
+
+/// Whether the wheels stand still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Standstill {
+    /// Not known: wheels are silent, or have only just become slow.
+    #[default]
+    Unknown,
+    /// They turn.
+    Moving,
+    /// All of them have stood still for long enough.
+    Still,
+}
+
+/// What is known of the wheels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WheelSample {
+    /// When, by the caller's clock.
+    pub time: Micros,
+    /// Speed of each wheel, where one is known.
+    pub speeds: [Option<WheelSpeed>; WHEELS],
+    /// Whether the vehicle stands.
+    pub standstill: Standstill,
 }

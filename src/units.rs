@@ -94,6 +94,22 @@ impl Yaw {
     }
 }
 
+/// Speed of a wheel over ground, signed 32 bit, LSB 2^-16 m/s, range +-32768 m/s.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WheelSpeed(pub i32);
+
+impl WheelSpeed {
+    /// Fraction bits of the code.
+    pub const FRACTION_BITS: u32 = 16;
+
+    /// The speed in m/s, for display and evaluation.
+    #[must_use]
+    pub fn metre_per_sec(self) -> f64 {
+        f64::from(self.0) / f64::from(1u32 << Self::FRACTION_BITS)
+    }
+}
+
 /// Temperature of the part, in 1/100 deg C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -9,6 +9,7 @@ pub mod fir;
 pub mod image_size;
 pub mod methods;
 pub mod metrics;
+pub mod monitor;
 pub mod plot;
 pub mod quantization_error;
 pub mod quantize;

@@ -11,12 +11,18 @@
 //! | 6, high nibble | AY_STAT | as YawRate_STAT |
 //! | 7 | CRC | SAE J1850 over bytes 0 to 6 |
 //!
+//! The other two messages of the set have the same shape: [`LAYOUTS`].
+//!
 //! Source: Bosch's off_highway_mm7p10 receiver and the MM5.10 layout it shares. The CRC's
 //! polynomial is published nowhere; J1850 is our choice.
 //!
 //! 0.005 deg/s is 18 deg/h: a rounded parked car would seem to turn by up to 9 deg/h for ever.
 //! [`YawRateSignal`] therefore carries each frame's rounding residual into the next one; the
 //! receiver's integral is then never off by more than half an LSB times one period.
+
+mod set;
+
+pub use set::{LAYOUTS, Layout, Message, Motion, SetEncoder};
 
 use crate::units::{AngularRate, CentiCelsius, SpecificForce};
 use embedded_can::{Frame, StandardId};

@@ -1,5 +1,9 @@
 //! CAN over a serial line, the Lawicel way (CAN232 manual): one frame, one line of ASCII.
 
+pub mod assembler;
+pub mod host;
+
+use crate::units::Micros;
 use embedded_can::{Frame, Id};
 use heapless::Vec;
 
@@ -7,6 +11,13 @@ use heapless::Vec;
 pub const MAX_LINE: usize = 27;
 /// A frame as sent.
 pub type Line = Vec<u8, MAX_LINE>;
+
+/// The same and four digits of time stamp.
+pub const MAX_STAMPED_LINE: usize = MAX_LINE + 4;
+/// A frame as sent, with a time stamp.
+pub type StampedLine = Vec<u8, MAX_STAMPED_LINE>;
+/// Time stamps count to a minute, in milliseconds.
+const STAMP_MODULUS: u64 = 60_000;
 
 const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
 
@@ -29,11 +40,30 @@ pub fn emit(frame: &impl Frame) -> Option<Line> {
     }
     line.push(DIGITS[frame.dlc() & 0xF]).ok()?;
     for byte in frame.data() {
-        line.push(DIGITS[usize::from(byte >> 4)]).ok()?;
-        line.push(DIGITS[usize::from(byte & 0xF)]).ok()?;
+        line.extend_from_slice(&hex(*byte)).ok()?;
     }
     line.push(b'\r').ok()?;
     Some(line)
+}
+
+/// As [`emit`], with milliseconds modulo a minute in four digits behind the data, as a host
+/// asks for with `Z1`.
+#[must_use]
+pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
+    let line = emit(frame)?;
+    let (_, frame) = line.split_last()?;
+    let mut stamped = StampedLine::from_slice(frame).ok()?;
+    let stamp = (time.0 / 1000 % STAMP_MODULUS) as u16;
+    for byte in stamp.to_be_bytes() {
+        stamped.extend_from_slice(&hex(byte)).ok()?;
+    }
+    stamped.push(b'\r').ok()?;
+    Some(stamped)
+}
+
+/// Two digits.
+fn hex(byte: u8) -> [u8; 2] {
+    [DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 0xF)]]
 }
 
 /// Why a line is no data frame.
@@ -66,6 +96,22 @@ impl core::fmt::Display for SlcanError {
 }
 
 impl core::error::Error for SlcanError {}
+
+/// Reads one data frame line with a time stamp, without its CR; gives the frame and its
+/// milliseconds.
+///
+/// # Errors
+/// [`SlcanError`] for anything that [`emit_stamped`] would not write.
+pub fn parse_stamped<F: Frame>(line: &[u8]) -> Result<(F, u16), SlcanError> {
+    let at = line.len().saturating_sub(4);
+    let (line, digits) = line.split_at(at);
+    let mut stamp = 0;
+    for (k, c) in digits.iter().enumerate() {
+        let digit = char::from(*c).to_digit(16).ok_or(SlcanError::Digit { at: at + k })?;
+        stamp = stamp << 4 | digit as u16;
+    }
+    Ok((parse(line)?, stamp))
+}
 
 /// Reads one data frame line, without its CR.
 ///

@@ -1,0 +1,224 @@
+//! AUTOSAR E2E: published vectors, and the sequence judgement.
+
+use gyronet::can::e2e::{
+    Checker, DataIdMode, Fault, P01, P02, P05, P11, P11Mode, Profile, Protector, Verdict,
+};
+use proptest::prelude::*;
+
+const ZEROS: [u8; 6] = [0; 6];
+const ONE_TO_SIX: [u8; 6] = [1, 2, 3, 4, 5, 6];
+const TWO_TO_SEVEN: [u8; 6] = [2, 3, 4, 5, 6, 7];
+
+fn p01(mode: DataIdMode) -> Profile {
+    Profile::P01(P01 { data_id: 0x123, mode })
+}
+
+fn p11(mode: P11Mode) -> Profile {
+    Profile::P11(P11 { data_id: 0x123, mode })
+}
+
+fn p02(first: u8, step: u8) -> Profile {
+    Profile::P02(P02 { data_ids: core::array::from_fn(|k| first + step * k as u8) })
+}
+
+fn p05() -> Profile {
+    Profile::P05(P05 { data_id: 0x1234 })
+}
+
+fn all() -> [Profile; 9] {
+    use DataIdMode::{Alternating, Both, Low, Nibble};
+    [
+        p01(Both),
+        p01(Alternating),
+        p01(Low),
+        p01(Nibble),
+        p02(0, 0),
+        p02(1, 1),
+        p05(),
+        p11(P11Mode::Both),
+        p11(P11Mode::Nibble),
+    ]
+}
+
+#[test]
+fn vectors_of_the_two_byte_headers() {
+    use DataIdMode::{Alternating, Both, Low, Nibble};
+    let vectors = [
+        (p01(Both), 0, ZEROS, [0xCC, 0x00]),
+        (p01(Both), 1, ZEROS, [0x91, 0x01]),
+        (p11(P11Mode::Both), 0, ZEROS, [0xCC, 0x00]),
+        (p11(P11Mode::Both), 1, ZEROS, [0x91, 0x01]),
+        (p01(Alternating), 0, ZEROS, [0xCE, 0x00]),
+        (p01(Alternating), 1, ZEROS, [0x02, 0x01]),
+        (p01(Low), 0, ZEROS, [0xCE, 0x00]),
+        (p01(Low), 1, ZEROS, [0x93, 0x01]),
+        (p01(Nibble), 0, ZEROS, [0x2A, 0x10]),
+        (p01(Nibble), 1, ZEROS, [0x77, 0x11]),
+        (p11(P11Mode::Nibble), 0, ZEROS, [0x2A, 0x10]),
+        (p11(P11Mode::Nibble), 1, ZEROS, [0x77, 0x11]),
+        (p11(P11Mode::Both), 1, ONE_TO_SIX, [0x90, 0x01]),
+        (p11(P11Mode::Nibble), 1, ONE_TO_SIX, [0x76, 0x11]),
+        (p02(0, 0), 1, ZEROS, [0x45, 0x01]),
+        (p02(0, 1), 1, ZEROS, [0x6A, 0x01]),
+        (p02(0, 1), 2, TWO_TO_SEVEN, [0xBC, 0x02]),
+        (p02(0, 1), 1, TWO_TO_SEVEN, [0x61, 0x01]),
+        (p02(1, 1), 0, ZEROS, [0x0E, 0x00]),
+    ];
+    for (profile, counter, payload, header) in vectors {
+        let mut data = [0; 8];
+        data[2..].copy_from_slice(&payload);
+        profile.protect(&mut data, counter).expect("eight bytes");
+        assert_eq!(data[..2], header, "{profile:?} counter {counter}");
+        assert_eq!(data[2..], payload);
+        assert_eq!(profile.check(&data), Ok(counter));
+    }
+}
+
+#[test]
+fn vectors_of_profile_5() {
+    for (counter, header) in [(0, [0x1C, 0xCA, 0x00]), (1, [0xCF, 0x8D, 0x01])] {
+        let mut data = [0; 8];
+        p05().protect(&mut data, counter).expect("eight bytes");
+        assert_eq!(data[..3], header);
+        assert_eq!(p05().check(&data), Ok(counter));
+    }
+}
+
+#[test]
+fn crcs_have_the_published_check_values() {
+    let inputs: [&[u8]; 4] = [b"123456789", &[0; 4], &[0xF2, 0x01, 0x83], &[0x0F, 0xAA, 0x00, 0x55]];
+    for (input, j1850) in inputs.into_iter().zip([0x4B, 0x59, 0x37, 0x79]) {
+        assert_eq!(gyronet::can::bosch::CRC.checksum(input), j1850);
+    }
+    // The CRC of profile 2 takes in byte 1.. and an identifier: put the input's last byte there.
+    for (input, h2f) in inputs.into_iter().zip([0xDF, 0x12, 0xC2, 0xC6]) {
+        let (id, rest) = input.split_last().expect("not empty");
+        let mut data = vec![h2f];
+        data.extend(rest);
+        let profile = Profile::P02(P02 { data_ids: [*id; 16] });
+        assert_eq!(profile.check(&data), Ok(rest[0] & 0x0F));
+    }
+    // Profile 5 takes in byte 2.. and two bytes of identifier.
+    for (input, ccitt) in inputs.into_iter().zip([0x29B1_u16, 0x84C0, 0xD374, 0x2023]) {
+        let (rest, id) = input.split_at(input.len() - 2);
+        let mut data = ccitt.to_le_bytes().to_vec();
+        data.extend(rest);
+        let profile = Profile::P05(P05 { data_id: u16::from_le_bytes([id[0], id[1]]) });
+        assert_eq!(profile.check(&data), Ok(rest[0]));
+    }
+    // The Mercedes frame of the open DBC files.
+    assert_eq!(gyronet::can::bosch::CRC.checksum(&[0x00, 0xC0, 0xDF, 0xAC, 0xAA, 0x07, 0x40]), 0x6C);
+}
+
+#[test]
+fn lengths_and_counters_that_cannot_be() {
+    for profile in all() {
+        for len in (0..profile.header_len()).chain([65]) {
+            let mut data = vec![0; len];
+            assert_eq!(profile.protect(&mut data, 0), Err(Fault::Length(len)), "{profile:?}");
+            assert_eq!(profile.check(&data), Err(Fault::Length(len)), "{profile:?}");
+        }
+    }
+    assert_eq!(p01(DataIdMode::Both).protect(&mut [0; 8], 15), Err(Fault::Counter(15)));
+    assert_eq!(p02(0, 0).protect(&mut [0; 8], 16), Err(Fault::Counter(16)));
+    // Counter 15 behind a CRC that fits. The CRC is linear: the difference of the two messages
+    // has as its CRC the difference of their CRCs.
+    let mut data = [0; 8];
+    p01(DataIdMode::Both).protect(&mut data, 14).expect("eight bytes");
+    let linear = crc::Crc::<u8>::new(&crc::Algorithm { xorout: 0, init: 0, ..crc::CRC_8_SAE_J1850 });
+    data[0] ^= linear.checksum(&[14 ^ 15, 0, 0, 0, 0, 0, 0]);
+    data[1] = 15;
+    assert_eq!(p01(DataIdMode::Both).check(&data), Err(Fault::Counter(15)));
+}
+
+#[test]
+fn a_foreign_identifier_is_noticed() {
+    for profile in all() {
+        let foreign = match profile {
+            Profile::P01(p) => Profile::P01(P01 { data_id: p.data_id ^ 0x301, ..p }),
+            Profile::P02(p) => Profile::P02(P02 { data_ids: p.data_ids.map(|id| id ^ 1) }),
+            Profile::P05(p) => Profile::P05(P05 { data_id: p.data_id ^ 0x301 }),
+            Profile::P11(p) => Profile::P11(P11 { data_id: p.data_id ^ 0x301, ..p }),
+        };
+        for counter in 0..14 {
+            let mut data = [0x5A; 8];
+            foreign.protect(&mut data, counter).expect("eight bytes");
+            assert!(profile.check(&data).is_err(), "{profile:?} counter {counter}");
+        }
+    }
+    // Same low byte, other nibble, the CRC made to fit: the nibble itself is compared.
+    let mut data = [0; 8];
+    Profile::P01(P01 { data_id: 0x423, mode: DataIdMode::Nibble })
+        .protect(&mut data, 0)
+        .expect("eight bytes");
+    assert_eq!(p01(DataIdMode::Nibble).check(&data), Err(Fault::DataId { received: 4 }));
+}
+
+/// `count` messages in order.
+fn messages(profile: Profile, count: usize) -> Vec<[u8; 8]> {
+    let mut protector = Protector::new(profile);
+    (0..count)
+        .map(|k| {
+            let mut data = [k as u8; 8];
+            protector.protect(&mut data).expect("eight bytes");
+            data
+        })
+        .collect()
+}
+
+#[test]
+fn sequence_is_judged_as_the_profiles_say() {
+    for profile in all() {
+        let sent = messages(profile, 600);
+        let mut checker = Checker::new(profile, 3);
+        assert_eq!(checker.check(&sent[0]), Ok(Verdict::First));
+        for data in &sent[1..300] {
+            assert_eq!(checker.check(data), Ok(Verdict::Ok), "{profile:?}");
+        }
+        assert_eq!(checker.check(&sent[299]), Ok(Verdict::Repeated));
+        assert_eq!(checker.check(&sent[302]), Ok(Verdict::Lost(2)));
+        assert_eq!(checker.check(&sent[306]), Ok(Verdict::WrongSequence { delta: 4 }));
+        assert_eq!(checker.check(&sent[307]), Ok(Verdict::Ok));
+        let mut damaged = sent[308];
+        damaged[7] ^= 0x10;
+        assert!(matches!(checker.check(&damaged), Err(Fault::Crc { .. })));
+        assert_eq!(checker.check(&sent[309]), Ok(Verdict::Lost(1)));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever is lost, doubled or exchanged: the verdict where it shows is not Ok.
+    #[test]
+    fn every_lost_repeated_and_reordered_message_shows(
+        which in 0..9_usize, at in 1..500_usize, distance in 1..14_usize,
+    ) {
+        let profile = all()[which];
+        let sent = messages(profile, 540);
+        let judge = |received: &[[u8; 8]]| {
+            let mut checker = Checker::new(profile, 1);
+            received.iter().filter(|data| checker.check(&data[..]) != Ok(Verdict::Ok)).count()
+        };
+        prop_assert_eq!(judge(&sent), 1, "only the first, which has no predecessor");
+
+        let mut lost = sent.clone();
+        lost.drain(at..at + distance);
+        prop_assert_eq!(judge(&lost), 2);
+
+        let mut repeated = sent.clone();
+        repeated.insert(at, sent[at]);
+        prop_assert_eq!(judge(&repeated), 2);
+
+        let mut reordered = sent.clone();
+        reordered.swap(at, at + distance);
+        prop_assert!(judge(&reordered) >= 3);
+    }
+
+    #[test]
+    fn any_bytes_are_judged_without_panic(data in proptest::collection::vec(any::<u8>(), 0..70)) {
+        for profile in all() {
+            let _ = profile.check(&data);
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! A bus that is off, full or gone never blocks: the oldest frames are dropped, and counted.
+
+use embedded_can::nb::Can;
+use embedded_can::{ErrorKind, Frame, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::queue::TransmitQueue;
+use proptest::prelude::*;
+use std::collections::VecDeque;
+
+/// What a controller says next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mood {
+    Takes,
+    Busy,
+    Off,
+    /// Takes the frame and gives back the one that it had.
+    Swaps,
+}
+
+struct Controller {
+    moods: VecDeque<Mood>,
+    held: Option<DataFrame>,
+    sent: Vec<DataFrame>,
+    tries: usize,
+}
+
+impl Controller {
+    fn new(moods: impl IntoIterator<Item = Mood>) -> Self {
+        Self { moods: moods.into_iter().collect(), held: None, sent: Vec::new(), tries: 0 }
+    }
+}
+
+impl Can for Controller {
+    type Frame = DataFrame;
+    type Error = ErrorKind;
+
+    fn transmit(&mut self, frame: &DataFrame) -> nb::Result<Option<DataFrame>, ErrorKind> {
+        self.tries += 1;
+        match self.moods.pop_front().unwrap_or(Mood::Busy) {
+            Mood::Takes => {
+                self.sent.push(*frame);
+                Ok(None)
+            }
+            Mood::Busy => Err(nb::Error::WouldBlock),
+            Mood::Off => Err(nb::Error::Other(ErrorKind::Other)),
+            Mood::Swaps => Ok(self.held.replace(*frame)),
+        }
+    }
+
+    fn receive(&mut self) -> nb::Result<DataFrame, ErrorKind> {
+        Err(nb::Error::WouldBlock)
+    }
+}
+
+fn frame(number: usize) -> DataFrame {
+    DataFrame::new(StandardId::new(0x174).expect("11 bits"), &number.to_le_bytes()).expect("eight bytes")
+}
+
+#[test]
+fn a_bus_that_is_gone_costs_the_oldest_frames() {
+    let mut queue = TransmitQueue::<DataFrame, 7>::new();
+    let mut gone = Controller::new([]);
+    // Ten seconds of six frames every ten milliseconds.
+    for number in 0..6_000 {
+        queue.push(frame(number));
+        assert_eq!(queue.service(&mut gone), 0);
+    }
+    assert_eq!(gone.tries, 6_000, "one try a turn");
+    assert_eq!((queue.len(), queue.dropped(), queue.errors()), (7, 5_993, 0));
+    // The bus is back: what comes out is the newest, in order.
+    let mut back = Controller::new([Mood::Takes; 10]);
+    assert_eq!(queue.service(&mut back), 7);
+    assert_eq!(back.sent, (5_993..6_000).map(frame).collect::<Vec<_>>());
+    assert!(queue.is_empty());
+}
+
+#[test]
+fn a_bus_that_is_off_is_counted_and_tried_again() {
+    let mut queue = TransmitQueue::<DataFrame, 2>::new();
+    let mut controller = Controller::new([Mood::Off, Mood::Off, Mood::Takes, Mood::Takes]);
+    for number in 0..3 {
+        queue.push(frame(number));
+    }
+    assert_eq!(queue.service(&mut controller), 0);
+    assert_eq!(queue.service(&mut controller), 0);
+    assert_eq!(queue.service(&mut controller), 2);
+    assert_eq!(controller.sent, [frame(1), frame(2)]);
+    assert_eq!((queue.dropped(), queue.errors()), (1, 2));
+}
+
+#[test]
+fn a_frame_that_is_given_back_is_not_lost() {
+    let mut queue = TransmitQueue::<DataFrame, 3>::new();
+    for number in 0..3 {
+        queue.push(frame(number));
+    }
+    let mut controller = Controller::new([Mood::Swaps, Mood::Swaps, Mood::Takes]);
+    assert_eq!(queue.service(&mut controller), 2);
+    // 0 was held, 1 took its place, 0 came back and was sent.
+    assert_eq!((controller.held, controller.sent), (Some(frame(1)), vec![frame(0)]));
+    assert_eq!(queue.pop(), Some(frame(2)));
+    assert_eq!(queue.pop(), None);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Nothing is lost unseen, nothing twice, and a turn is bounded.
+    #[test]
+    fn every_frame_is_accounted_for(
+        moods in proptest::collection::vec(
+            prop_oneof![Just(Mood::Takes), Just(Mood::Busy), Just(Mood::Off), Just(Mood::Swaps)], 0..200,
+        ),
+        pushes in proptest::collection::vec(0..5_usize, 0..60),
+    ) {
+        let mut queue = TransmitQueue::<DataFrame, 4>::new();
+        let mut controller = Controller::new(moods);
+        let mut number = 0;
+        for count in pushes {
+            for _ in 0..count {
+                queue.push(frame(number));
+                number += 1;
+            }
+            let before = controller.tries;
+            queue.service(&mut controller);
+            prop_assert!(controller.tries - before <= 4);
+        }
+        let held = usize::from(controller.held.is_some());
+        prop_assert_eq!(controller.sent.len() + held + queue.len() + queue.dropped() as usize, number);
+    }
+}

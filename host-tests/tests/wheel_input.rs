@@ -1,0 +1,296 @@
+//! Wheel speeds from a vehicle's frames, and standing still decided from them.
+
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::e2e::{DataIdMode, Fault, P01, Profile};
+use gyronet::can::signal::{BitField, ByteOrder, OutsideFrame};
+use gyronet::can::wheel::{
+    Checksum, WheelConfigError, WheelError, WheelFrame, WheelReceiver, WheelSettings, WheelSignal,
+};
+use gyronet::sample::Standstill;
+use gyronet::units::{Micros, WheelSpeed};
+use proptest::prelude::*;
+
+const MS: u64 = 1000;
+const ID: Id = Id::Standard(StandardId::new(0xAA).unwrap());
+const OTHER: Id = Id::Extended(ExtendedId::new(0x18FE_BF0B).unwrap());
+
+fn intel(start: u8, len: u8) -> BitField {
+    BitField::new(start, len, ByteOrder::Intel, false).expect("inside a frame")
+}
+
+/// The wheel speed frame of a common car: four big-endian values of 0.01 km/h from -67.67.
+fn car() -> WheelFrame {
+    let signal = |wheel, start| {
+        Some(WheelSignal {
+            wheel,
+            field: BitField::new(start, 16, ByteOrder::Motorola, false).expect("inside a frame"),
+            factor_q16: WheelSignal::per_bit_kmh(0.01),
+            offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
+            invalid: Some(0xFFFF),
+        })
+    };
+    WheelFrame {
+        id: ID,
+        signals: [signal(1, 7), signal(0, 23), signal(3, 39), signal(2, 55)],
+        counter: None,
+        checksum: Checksum::None,
+    }
+}
+
+/// Two wheels, little-endian, signed, a counter in byte 6, byte 7 left for a checksum.
+fn two_wheels(checksum: Checksum) -> WheelFrame {
+    let signal = |wheel, start| {
+        Some(WheelSignal {
+            wheel,
+            field: BitField::new(start, 16, ByteOrder::Intel, true).expect("inside a frame"),
+            factor_q16: WheelSignal::per_bit_kmh(0.036),
+            offset: WheelSpeed(0),
+            invalid: None,
+        })
+    };
+    WheelFrame {
+        id: OTHER,
+        signals: [signal(2, 16), signal(3, 32), None, None],
+        counter: Some(intel(48, 4)),
+        checksum,
+    }
+}
+
+fn settings(frame: WheelFrame) -> WheelSettings {
+    WheelSettings {
+        frames: [Some(frame), None, None, None],
+        timeout_us: 50 * MS,
+        still_speed: WheelSpeed(655),
+        still_for_us: 200 * MS,
+    }
+}
+
+fn frame(id: Id, data: &[u8]) -> DataFrame {
+    DataFrame::new(id, data).expect("at most eight bytes")
+}
+
+/// The car's frame at one speed for all wheels.
+fn at_kmh(kmh: f64) -> DataFrame {
+    let [hi, lo] = (((kmh + 67.67) * 100.0).round() as u16).to_be_bytes();
+    frame(ID, &[hi, lo, hi, lo, hi, lo, hi, lo])
+}
+
+#[test]
+fn speeds_in_metres_per_second() {
+    let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
+    // 0.01 km/h: 6767 + 3600 for the front right wheel, standstill for the others.
+    let sample = receiver
+        .process(&frame(ID, &[0x28, 0x7F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]), Micros(0))
+        .expect("a wheel frame")
+        .expect("valid");
+    let [front_left, front_right, ..] = sample.speeds.map(|speed| speed.expect("known").metre_per_sec());
+    assert!((front_right - 10.0).abs() < 1e-3, "{front_right}");
+    assert!(front_left.abs() < 1e-3, "{front_left}");
+    assert_eq!(sample.standstill, Standstill::Moving);
+    assert!(receiver.process(&frame(OTHER, &[0; 8]), Micros(0)).is_none(), "not a wheel frame");
+}
+
+#[test]
+fn standing_still_is_asserted_late_and_dropped_at_once() {
+    let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
+    let mut now = 0;
+    let mut step = |kmh: f64| {
+        now += 20 * MS;
+        receiver.process(&at_kmh(kmh), Micros(now)).expect("a wheel frame").expect("valid").standstill
+    };
+    assert_eq!(step(5.0), Standstill::Moving);
+    for _ in 0..10 {
+        assert_eq!(step(0.0), Standstill::Unknown);
+    }
+    assert_eq!(step(0.0), Standstill::Still);
+    assert_eq!(step(-0.03), Standstill::Still);
+    assert_eq!(step(0.05), Standstill::Moving);
+    assert_eq!(step(0.0), Standstill::Unknown, "it starts anew");
+}
+
+#[test]
+fn silence_is_neither_standing_nor_moving() {
+    let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
+    assert_eq!(receiver.poll(Micros(0)).standstill, Standstill::Unknown);
+    for k in 0..=20 {
+        let _ = receiver.process(&at_kmh(0.0), Micros(k * 20 * MS));
+    }
+    assert_eq!(receiver.poll(Micros(450 * MS)).standstill, Standstill::Still);
+    let silent = receiver.poll(Micros(451 * MS));
+    assert_eq!((silent.standstill, silent.speeds), (Standstill::Unknown, [None; 4]));
+    // After the gap the time of standing starts anew.
+    let sample = receiver.process(&at_kmh(0.0), Micros(800 * MS)).expect("a wheel frame").expect("valid");
+    assert_eq!(sample.standstill, Standstill::Unknown);
+    // The same without anyone having asked in between.
+    let sample = receiver.process(&at_kmh(0.0), Micros(9_000 * MS)).expect("a wheel frame").expect("valid");
+    assert_eq!(sample.standstill, Standstill::Unknown);
+    // A clock that goes backwards does no harm.
+    assert_eq!(receiver.poll(Micros(0)).standstill, Standstill::Unknown);
+}
+
+#[test]
+fn one_wheel_that_is_not_valid_ends_standing() {
+    let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
+    for k in 0..=20 {
+        let _ = receiver.process(&at_kmh(0.0), Micros(k * 20 * MS));
+    }
+    let marked = frame(ID, &[0xFF, 0xFF, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
+    let refused = receiver.process(&marked, Micros(420 * MS)).expect("a wheel frame");
+    assert_eq!(refused, Err(WheelError::Invalid { wheel: 1 }));
+    let sample = receiver.poll(Micros(420 * MS));
+    assert_eq!(sample.standstill, Standstill::Unknown);
+    assert_eq!(sample.speeds.map(|speed| speed.is_some()), [true, false, true, true]);
+}
+
+#[test]
+fn wheels_may_be_spread_over_frames() {
+    let [front_right, front_left, rear_right, rear_left] = car().signals;
+    let id = |raw| Id::Standard(StandardId::new(raw).expect("11 bits"));
+    let front = WheelFrame { id: id(0x100), signals: [front_right, front_left, None, None], ..car() };
+    let rear = WheelFrame { id: id(0x101), signals: [None, None, rear_right, rear_left], ..car() };
+    let spread = WheelSettings { frames: [Some(front), None, Some(rear), None], ..settings(car()) };
+    let mut receiver = WheelReceiver::new(spread).expect("checked");
+    let still = at_kmh(0.0);
+    for k in 0..20 {
+        let _ = receiver.process(&frame(id(0x100), still.data()), Micros(k * 20 * MS));
+    }
+    assert_eq!(receiver.poll(Micros(400 * MS)).standstill, Standstill::Unknown, "the rear is silent");
+    let _ = receiver.process(&frame(id(0x101), still.data()), Micros(400 * MS));
+    assert_eq!(receiver.poll(Micros(401 * MS)).speeds.map(|speed| speed.is_some()), [true; 4]);
+}
+
+#[test]
+fn checksums_and_counters() {
+    let j1850 = |data: &[u8]| gyronet::can::bosch::CRC.checksum(&data[..7]);
+    let xor = |data: &[u8]| data[..7].iter().fold(0, |sum, byte| sum ^ byte);
+    let sum = |data: &[u8]| data[..7].iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+    let kinds = [
+        (Checksum::J1850 { at: 7 }, j1850 as fn(&[u8]) -> u8),
+        (Checksum::Xor { at: 7 }, xor),
+        (Checksum::Sum { at: 7 }, sum),
+    ];
+    for (checksum, compute) in kinds {
+        let mut receiver = WheelReceiver::new(settings(two_wheels(checksum))).expect("checked");
+        let mut send = |counter: u8, damage: u8| {
+            // -100 and 300 bits of 0.01 m/s.
+            let mut data = [0x55, 0xAA, 0x9C, 0xFF, 0x2C, 0x01, counter, 0];
+            data[7] = compute(&data);
+            data[2] ^= damage;
+            receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame")
+        };
+        let [.., left, right] = send(0, 0).expect("valid").speeds;
+        assert!((left.expect("known").metre_per_sec() + 1.0).abs() < 1e-3);
+        assert!((right.expect("known").metre_per_sec() - 3.0).abs() < 1e-3);
+        assert_eq!(send(1, 1), Err(WheelError::Checksum));
+        assert!(send(2, 0).is_ok());
+        assert_eq!(send(2, 0), Err(WheelError::Repeated));
+        assert!(send(15, 0).is_ok());
+        assert!(send(0, 0).is_ok());
+        assert_eq!(receiver.lost(), 1 + 12);
+        let short = receiver.process(&frame(OTHER, &[0; 3]), Micros(0)).expect("a wheel frame");
+        assert_eq!(short, Err(WheelError::Short(3)));
+    }
+}
+
+#[test]
+fn e2e_protected_input() {
+    let profile = Profile::P01(P01 { data_id: 0x321, mode: DataIdMode::Nibble });
+    let layout = WheelFrame { counter: None, ..two_wheels(Checksum::E2e(profile)) };
+    let mut receiver = WheelReceiver::new(settings(layout)).expect("checked");
+    let mut data = [0; 8];
+    profile.protect(&mut data, 3).expect("eight bytes");
+    assert!(receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame").is_ok());
+    let again = receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
+    assert_eq!(again, Err(WheelError::Repeated));
+    data[5] ^= 4;
+    let damaged = receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
+    assert!(matches!(damaged, Err(WheelError::E2e(Fault::Crc { .. }))));
+}
+
+#[test]
+fn settings_that_cannot_be() {
+    let refused = |frame| WheelReceiver::new(settings(frame)).expect_err("refused");
+    let [first, second, third, _] = car().signals;
+    let with = |signals| WheelFrame { signals, ..car() };
+    assert_eq!(refused(with([first, None, None, None])), WheelConfigError::Wheels(1));
+    assert_eq!(refused(with([first, second, third, None])), WheelConfigError::Wheels(3));
+    assert_eq!(refused(with([None; 4])), WheelConfigError::Wheels(0));
+    assert_eq!(refused(with([first, first, None, None])), WheelConfigError::Wheel(1));
+    let fifth = first.map(|signal| WheelSignal { wheel: 4, ..signal });
+    assert_eq!(refused(with([fifth, None, None, None])), WheelConfigError::Wheel(4));
+    let counter = Some(intel(0, 9));
+    assert_eq!(refused(WheelFrame { counter, ..car() }), WheelConfigError::Counter(9));
+    let checksum = Checksum::Sum { at: 8 };
+    assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Checksum(8));
+    let twice = WheelSettings { frames: [Some(car()), Some(car()), None, None], ..settings(car()) };
+    assert_eq!(WheelReceiver::new(twice).err(), Some(WheelConfigError::DuplicateIdentifier(0xAA)));
+    for (start, len) in [(0, 0), (0, 33), (64, 1), (63, 2), (255, 1)] {
+        let field = BitField::new(start, len, ByteOrder::Intel, false);
+        assert_eq!(field, Err(OutsideFrame { start, len }));
+    }
+    assert!(BitField::new(56, 1, ByteOrder::Motorola, false).is_ok());
+    assert!(BitField::new(56, 2, ByteOrder::Motorola, false).is_err(), "the frame ends there");
+}
+
+/// A value by its definition, bit by bit.
+fn by_bits(data: [u8; 8], start: u8, len: u8, order: ByteOrder, signed: bool) -> Option<i64> {
+    let mut at = i32::from(start);
+    let mut bits = Vec::new();
+    for _ in 0..len {
+        bits.push(data.get(at as usize / 8)? >> (at % 8) & 1);
+        at = match order {
+            ByteOrder::Intel => at + 1,
+            // Down to bit 0, then on with bit 7 of the next byte.
+            ByteOrder::Motorola if at % 8 == 0 => at + 15,
+            ByteOrder::Motorola => at - 1,
+        };
+    }
+    if order == ByteOrder::Intel {
+        bits.reverse();
+    }
+    let value = bits.iter().fold(0i64, |value, bit| value << 1 | i64::from(*bit));
+    let negative = signed && bits[0] == 1;
+    Some(if negative { value - (1 << len) } else { value })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4096, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn bit_fields_are_what_a_dbc_file_means(
+        data in any::<[u8; 8]>(), start in 0..64_u8, len in 1..=32_u8, motorola in any::<bool>(),
+        signed in any::<bool>(), cut in 0..=8_usize,
+    ) {
+        let order = if motorola { ByteOrder::Motorola } else { ByteOrder::Intel };
+        match (BitField::new(start, len, order, signed), by_bits(data, start, len, order, signed)) {
+            (Ok(field), Some(value)) => {
+                prop_assert_eq!(field.value(&data), Some(value));
+                // Cut off, it is read only where it is whole.
+                let mut rest = data;
+                rest[cut..].fill(0xFF);
+                prop_assert!(
+                    field.value(&data[..cut]).is_none()
+                        || field.value(&data[..cut]) == by_bits(rest, start, len, order, signed)
+                );
+            }
+            (Err(_), None) => {}
+            (field, value) => prop_assert!(false, "{field:?} {value:?}"),
+        }
+    }
+
+    #[test]
+    fn any_frame_is_taken_without_panic(
+        data in proptest::collection::vec(any::<u8>(), 0..=8), now in any::<u64>(), kind in 0..4,
+    ) {
+        let checksum = match kind {
+            0 => Checksum::None,
+            1 => Checksum::J1850 { at: 7 },
+            2 => Checksum::Xor { at: 0 },
+            _ => Checksum::Sum { at: 3 },
+        };
+        let mut receiver = WheelReceiver::new(settings(two_wheels(checksum))).expect("checked");
+        let _ = receiver.process(&frame(OTHER, &data), Micros(now));
+        let _ = receiver.poll(Micros(now.wrapping_mul(3)));
+    }
+}

@@ -1,0 +1,56 @@
+//! A rate on a coarser scale, without loss: what rounding takes from one message goes into the
+//! next one.
+//!
+//! Rounded one by one, the messages of a parked car with a constant rate are all wrong in the
+//! same direction. With the residual carried, the sum of what was sent is never off by more than
+//! half an LSB from the sum of what should have been sent. The arithmetic is exact: the scale
+//! is a fixed-point constant, and products are kept to their last bit.
+
+use crate::units::AngularRate;
+
+/// How a signal's code follows from a rate code (LSB 2^-27 rad/s).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scale {
+    /// Signal LSBs per rate code, times 2^32. At most 2^31: a signal finer than twice the rate
+    /// code itself has nothing to gain.
+    pub factor_q32: i64,
+    /// Code of rate zero, times 2^32; it need not be a whole number. Below 2^60.
+    pub zero_q32: i64,
+}
+
+impl Scale {
+    /// 1e-6 deg/s, from 180 / pi / 2^27 / 1e-6; 2.3e-10 too small.
+    pub const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944, zero_q32: 0 };
+    /// 2e-4 deg/s.
+    pub const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325, zero_q32: 0 };
+}
+
+/// The residual of one signal.
+#[derive(Debug, Clone, Copy)]
+pub struct RoundingCarry {
+    scale: Scale,
+    /// Owed to the receiver, in LSB x 2^-32.
+    residual: i64,
+}
+
+impl RoundingCarry {
+    /// Nothing owed.
+    #[must_use]
+    pub const fn new(scale: Scale) -> Self {
+        Self { scale, residual: 0 }
+    }
+
+    /// Nearest code to the rate and what is owed from earlier ones.
+    pub fn encode(&mut self, rate: AngularRate) -> i32 {
+        // At most 2^62 + 2^60 + 2^31.
+        let wanted = i64::from(rate.0) * self.scale.factor_q32 + self.scale.zero_q32 + self.residual;
+        let sent = (wanted + (1 << 31)) >> 32;
+        self.residual = wanted - (sent << 32);
+        sent as i32
+    }
+
+    /// Forgets what is owed: after a message that was marked bad, or at a new start.
+    pub fn reset(&mut self) {
+        self.residual = 0;
+    }
+}

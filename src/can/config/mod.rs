@@ -1,0 +1,162 @@
+//! Which messages go out, under which identifiers, how often, and how protected.
+//!
+//! [`Settings`] is what a user writes; [`Config`] is what has been checked, once, at the start.
+
+mod error;
+mod settings;
+
+pub use error::ConfigError;
+pub use settings::{BoschSettings, E2e, Settings, Vdc2Settings, YawSettings};
+
+use super::bosch::LAYOUTS;
+use super::e2e::{DataIdMode, P11Mode};
+use super::j1939::{VDC2_PGN, VDC2_PRIORITY, broadcast_id};
+use super::load::{Periodic, per_mille};
+use crate::sample::PERIOD_US;
+use embedded_can::{Id, StandardId};
+use heapless::Vec;
+
+/// Period of the samples, and of the messages whose layout fixes it.
+const SAMPLE_MS: u16 = (PERIOD_US / 1000) as u16;
+/// Longest period of a message: a receiver's time-out is a few of them.
+const MAX_PERIOD_MS: u16 = 1000;
+/// Identifiers of diagnosis (ISO 15765-4), kept free for it.
+const DIAGNOSIS: core::ops::RangeInclusive<u16> = 0x7DF..=0x7EF;
+/// Highest J1939 source address; 254 and 255 have other meanings.
+const MAX_SOURCE: u8 = 253;
+/// Largest part of the bus at worst, 1/1000; beyond it others would wait too long.
+const MAX_BUS_LOAD: u32 = 800;
+/// Most messages that a configuration can have.
+pub const MAX_MESSAGES: usize = 7;
+
+/// Settings that have been checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Config {
+    settings: Settings,
+}
+
+impl Config {
+    /// Checks settings.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn new(settings: Settings) -> Result<Self, ConfigError> {
+        if !matches!(settings.bits_per_second, 100_000 | 125_000 | 250_000 | 500_000 | 800_000 | 1_000_000) {
+            return Err(ConfigError::BitRate(settings.bits_per_second));
+        }
+        if let Some(yaw) = &settings.yaw {
+            check_yaw(yaw, settings.bosch)?;
+        }
+        if let Some(Vdc2Settings { source }) = settings.vdc2
+            && source > MAX_SOURCE
+        {
+            return Err(ConfigError::SourceAddress(source));
+        }
+        let config = Self { settings };
+        if config.messages().is_empty() {
+            return Err(ConfigError::Empty);
+        }
+        let per_mille = config.bus_load_per_mille();
+        if per_mille > MAX_BUS_LOAD { Err(ConfigError::Overload { per_mille }) } else { Ok(config) }
+    }
+
+    /// What was checked.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Every message that is sent, in the order of sending.
+    #[must_use]
+    pub fn messages(&self) -> Vec<Periodic, MAX_MESSAGES> {
+        let Settings { bosch, yaw, vdc2, .. } = self.settings;
+        let bosch = bosch_ids(bosch).map(|id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS });
+        let yaw = yaw.into_iter().flat_map(|yaw| {
+            let message = move |id| Some(Periodic { id: Id::Standard(id?), period_ms: yaw.period_ms });
+            yaw.ids.into_iter().filter_map(move |id| message(StandardId::new(id)))
+        });
+        let vdc2 = vdc2.and_then(|vdc2| {
+            let id = broadcast_id(VDC2_PGN, VDC2_PRIORITY, vdc2.source)?;
+            Some(Periodic { id: Id::Extended(id), period_ms: SAMPLE_MS })
+        });
+        bosch.chain(yaw).chain(vdc2).collect()
+    }
+
+    /// Whether a message with this identifier is ours: an input must not have it.
+    #[must_use]
+    pub fn sends(&self, id: Id) -> bool {
+        self.messages().iter().any(|message| message.id == id)
+    }
+
+    /// Part of the bus that the messages take with the most stuff bits possible, in 1/1000.
+    #[must_use]
+    pub fn bus_load_per_mille(&self) -> u32 {
+        per_mille(&self.messages(), Periodic::worst_case_bits, self.settings.bits_per_second)
+    }
+
+    /// Part of a serial line that the messages take as SLCAN, in 1/1000; over 1000 they do not
+    /// fit.
+    #[must_use]
+    pub fn line_load_per_mille(&self, line_bits_per_second: u32, stamped: bool) -> u32 {
+        per_mille(&self.messages(), |message| message.slcan_bits(stamped), line_bits_per_second)
+    }
+
+    /// Samples for each set of our own messages.
+    #[must_use]
+    pub fn samples_per_yaw(&self) -> u8 {
+        // At most 1000 / 10.
+        self.settings.yaw.map_or(1, |yaw| (yaw.period_ms / SAMPLE_MS) as u8)
+    }
+}
+
+fn bosch_ids(bosch: Option<BoschSettings>) -> impl Iterator<Item = StandardId> {
+    let count = match bosch {
+        Some(BoschSettings { tx1_only: true }) => 1,
+        Some(BoschSettings { tx1_only: false }) => LAYOUTS.len(),
+        None => 0,
+    };
+    LAYOUTS.into_iter().take(count).map(|layout| layout.id)
+}
+
+fn check_yaw(yaw: &YawSettings, bosch: Option<BoschSettings>) -> Result<(), ConfigError> {
+    for (k, id) in yaw.ids.into_iter().enumerate() {
+        if id > StandardId::MAX.as_raw() || DIAGNOSIS.contains(&id) {
+            return Err(ConfigError::Identifier(id));
+        }
+        let earlier = yaw.ids.get(..k).unwrap_or_default();
+        if earlier.contains(&id) || bosch_ids(bosch).any(|other| other.as_raw() == id) {
+            return Err(ConfigError::DuplicateIdentifier(id));
+        }
+    }
+    if yaw.period_ms == 0 || yaw.period_ms > MAX_PERIOD_MS || !yaw.period_ms.is_multiple_of(SAMPLE_MS) {
+        return Err(ConfigError::Period(yaw.period_ms));
+    }
+    check_e2e(&yaw.e2e)
+}
+
+fn check_e2e(e2e: &E2e) -> Result<(), ConfigError> {
+    let distinct = |seen: [u16; 3]| seen[0] != seen[1] && seen[1] != seen[2] && seen[0] != seen[2];
+    let unique = match e2e {
+        E2e::P01 { mode: DataIdMode::Low, data_ids } => distinct(data_ids.map(|id| id & 0xFF)),
+        E2e::P01 { mode: DataIdMode::Nibble, data_ids } | E2e::P11 { mode: P11Mode::Nibble, data_ids } => {
+            if let Some(id) = data_ids.iter().find(|id| **id > 0xFFF) {
+                return Err(ConfigError::DataId(*id));
+            }
+            distinct(*data_ids)
+        }
+        // Either byte alone must tell the messages apart.
+        E2e::P01 { mode: DataIdMode::Alternating, data_ids } => {
+            distinct(data_ids.map(|id| id & 0xFF)) && distinct(data_ids.map(|id| id >> 8))
+        }
+        E2e::P01 { mode: DataIdMode::Both, data_ids }
+        | E2e::P11 { mode: P11Mode::Both, data_ids }
+        | E2e::P05 { data_ids } => distinct(*data_ids),
+        E2e::P02 { data_ids: [rate, angle, detail] } => {
+            rate.iter().zip(angle).zip(detail).all(|((rate, angle), detail)| {
+                distinct([u16::from(*rate), u16::from(*angle), u16::from(*detail)])
+            })
+        }
+    };
+    if unique { Ok(()) } else { Err(ConfigError::DuplicateDataId) }
+}

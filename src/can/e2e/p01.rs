@@ -1,0 +1,114 @@
+//! Profile 1: byte 0 CRC, low nibble of byte 1 counter, four ways to bring in the identifier.
+//!
+//! AUTOSAR describes the CRC by the interface of its CRC library, whose start and final XOR
+//! values cancel: what is on the bus is polynomial 0x1D with start 0 and no final XOR.
+
+use super::Fault;
+
+/// Start 0, final XOR 0; not the J1850 of other messages, although the polynomial is.
+pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
+    width: 8,
+    poly: 0x1D,
+    init: 0,
+    refin: false,
+    refout: false,
+    xorout: 0,
+    check: 0x37,
+    residue: 0,
+});
+
+/// 15 is the invalid value.
+pub(super) const COUNTERS: u16 = 15;
+/// 240 bits; beyond 255 the CRC would miss two-bit errors.
+pub(super) const MAX_LEN: usize = 30;
+
+/// How the 16-bit identifier enters the CRC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum DataIdMode {
+    /// Low byte, high byte (variant 1A).
+    Both,
+    /// Low byte with an even counter, high byte with an odd one (variant 1B).
+    Alternating,
+    /// Low byte only.
+    Low,
+    /// Low byte, then 0; the low nibble of the high byte is sent in byte 1 (variant 1C).
+    Nibble,
+}
+
+/// Profile 1 of one message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct P01 {
+    /// Identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
+    pub data_id: u16,
+    /// How it enters the CRC.
+    pub mode: DataIdMode,
+}
+
+impl P01 {
+    /// Writes the header; the high nibble of byte 1 is data except in [`DataIdMode::Nibble`].
+    ///
+    /// # Errors
+    /// [`Fault::Length`] and [`Fault::Counter`].
+    pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
+        let len = data.len();
+        if len > MAX_LEN {
+            return Err(Fault::Length(len));
+        }
+        if u16::from(counter) >= COUNTERS {
+            return Err(Fault::Counter(counter));
+        }
+        let [_, header, ..] = data else { return Err(Fault::Length(len)) };
+        *header = match self.mode {
+            DataIdMode::Nibble => self.nibble() << 4 | counter,
+            _ => (*header & 0xF0) | counter,
+        };
+        let computed = self.crc(counter, data.get(1..).unwrap_or_default());
+        if let Some(crc) = data.first_mut() {
+            *crc = computed;
+        }
+        Ok(())
+    }
+
+    /// Checks CRC, identifier and that the counter can occur; gives the counter.
+    ///
+    /// # Errors
+    /// [`Fault`].
+    pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
+        let &[received, header, ..] = data else { return Err(Fault::Length(data.len())) };
+        if data.len() > MAX_LEN {
+            return Err(Fault::Length(data.len()));
+        }
+        let counter = header & 0x0F;
+        let computed = self.crc(counter, data.get(1..).unwrap_or_default());
+        if computed != received {
+            return Err(Fault::Crc { computed: computed.into(), received: received.into() });
+        }
+        if u16::from(counter) >= COUNTERS {
+            return Err(Fault::Counter(counter));
+        }
+        if self.mode == DataIdMode::Nibble && header >> 4 != self.nibble() {
+            return Err(Fault::DataId { received: header >> 4 });
+        }
+        Ok(counter)
+    }
+
+    fn nibble(&self) -> u8 {
+        (self.data_id >> 8) as u8 & 0x0F
+    }
+
+    fn crc(&self, counter: u8, behind: &[u8]) -> u8 {
+        let [low, high] = self.data_id.to_le_bytes();
+        let mut digest = CRC.digest();
+        match self.mode {
+            DataIdMode::Both => digest.update(&[low, high]),
+            DataIdMode::Alternating if counter & 1 == 0 => digest.update(&[low]),
+            DataIdMode::Alternating => digest.update(&[high]),
+            DataIdMode::Low => digest.update(&[low]),
+            DataIdMode::Nibble => digest.update(&[low, 0]),
+        }
+        digest.update(behind);
+        digest.finalize()
+    }
+}

@@ -1,0 +1,50 @@
+//! Profile 11: the same bytes as profile 1 with its modes Both and Nibble.
+
+use super::Fault;
+use super::p01::{DataIdMode, P01};
+
+/// How the identifier enters the CRC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum P11Mode {
+    /// Low byte, high byte (variant 11A).
+    Both,
+    /// Low byte, then 0; the low nibble of the high byte is sent in byte 1 (variant 11C).
+    Nibble,
+}
+
+/// Profile 11 of one message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct P11 {
+    /// Identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.
+    pub data_id: u16,
+    /// How it enters the CRC.
+    pub mode: P11Mode,
+}
+
+impl P11 {
+    const fn as_p01(self) -> P01 {
+        let mode = match self.mode {
+            P11Mode::Both => DataIdMode::Both,
+            P11Mode::Nibble => DataIdMode::Nibble,
+        };
+        P01 { data_id: self.data_id, mode }
+    }
+
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// [`Fault::Length`] and [`Fault::Counter`].
+    pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
+        self.as_p01().protect(data, counter)
+    }
+
+    /// Checks CRC, identifier and that the counter can occur; gives the counter.
+    ///
+    /// # Errors
+    /// [`Fault`].
+    pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
+        self.as_p01().check(data)
+    }
+}

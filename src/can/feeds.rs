@@ -1,0 +1,95 @@
+//! A sample in, every configured frame out.
+
+use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};
+use super::config::{BoschSettings, Config, MAX_MESSAGES};
+use super::j1939::{Validity, Vdc2Encoder};
+use super::yaw::Quality;
+use super::yaw_feed::{YawFeed, YawSample};
+use crate::units::{AngularRate, CentiCelsius, SpecificForce};
+use embedded_can::{Frame, StandardId};
+use heapless::Vec;
+
+/// What goes out for one sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct VehicleSample {
+    /// Yaw and what it is worth.
+    pub yaw: YawSample,
+    /// About x, forward, less its bias.
+    pub roll_rate: AngularRate,
+    /// About y, left, less its bias.
+    pub pitch_rate: AngularRate,
+    /// Along x, y, z.
+    pub specific_force: [SpecificForce; 3],
+    /// Of the part, where known.
+    pub temperature: Option<CentiCelsius>,
+    /// Step of the grid.
+    pub tick: u32,
+}
+
+/// The encoders of all feeds.
+#[derive(Debug, Clone, Copy)]
+pub struct Feeds {
+    config: Config,
+    bosch: SetEncoder,
+    yaw: Option<YawFeed>,
+    vdc2: Vdc2Encoder,
+}
+
+impl Feeds {
+    /// Nothing sent yet.
+    #[must_use]
+    pub fn new(config: Config) -> Self {
+        let yaw = config.settings().yaw;
+        Self {
+            config,
+            bosch: SetEncoder::default(),
+            yaw: yaw.map(|yaw| YawFeed::new(yaw.e2e.profiles(), config.samples_per_yaw())),
+            vdc2: Vdc2Encoder::default(),
+        }
+    }
+
+    /// The frames of one sample, in a driver's own type.
+    pub fn process<F: Frame>(&mut self, sample: &VehicleSample) -> Vec<F, MAX_MESSAGES> {
+        let (status, validity) = match sample.yaw.quality {
+            Quality::Good | Quality::Degraded => (SignalStatus::OK, Validity::Valid),
+            Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
+            Quality::Unusable => (SignalStatus::FAILURE, Validity::Error),
+        };
+        let settings = *self.config.settings();
+        let mut frames = Vec::new();
+        // MAX_MESSAGES is what a configuration can have at most.
+        let mut send = |frame: Option<F>| frame.map(|frame| frames.push(frame).is_ok());
+        if let Some(BoschSettings { tx1_only }) = settings.bosch {
+            let messages = self.bosch.encode(&motion(sample, status));
+            let count = if tx1_only { 1 } else { LAYOUTS.len() };
+            for (message, layout) in messages.iter().zip(&LAYOUTS).take(count) {
+                send(message.frame(layout));
+            }
+        }
+        if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw)
+            && let Some(messages) = feed.process(&sample.yaw)
+        {
+            for (message, id) in messages.iter().zip(yaw.ids) {
+                send(StandardId::new(id).and_then(|id| F::new(id, message)));
+            }
+        }
+        if let Some(vdc2) = settings.vdc2 {
+            let message = self.vdc2.encode(sample.yaw.rate, validity, &sample.specific_force);
+            send(message.frame(vdc2.source));
+        }
+        frames
+    }
+}
+
+/// The grid step is the counter, so that a receiver sees what is missing.
+fn motion(sample: &VehicleSample, rate_status: SignalStatus) -> Motion {
+    Motion {
+        angular_rate: [sample.roll_rate, sample.pitch_rate, sample.yaw.rate],
+        specific_force: sample.specific_force,
+        temperature: sample.temperature,
+        rate_status,
+        force_status: SignalStatus::OK,
+        counter: (sample.tick & 0x0F) as u8,
+    }
+}

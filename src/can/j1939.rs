@@ -1,0 +1,151 @@
+//! SAE J1939: vehicle dynamic stability control 2 (VDC2), the yaw rate on trucks and machines.
+//!
+//! | bytes | SPN | signal | scale |
+//! |---|---|---|---|
+//! | 0-1 | 1807 | steering wheel angle | not sent: FFFF |
+//! | 2 | 1811, 1812 | turn counter, sensor type | not sent: FF |
+//! | 3-4 | 1808 | yaw rate, u16 LE | 1/8192 rad/s, -3.92 |
+//! | 5-6 | 1809 | lateral acceleration, u16 LE | 1/2048 m/s^2, -15.687 |
+//! | 7 | 1810 | longitudinal acceleration | 0.1 m/s^2, -12.5 |
+//!
+//! Up to FAFF (FA) a value, FE00 (FE) an error, FFFF (FF) not available. 1/8192 rad/s is 25
+//! deg/h, and zero lies between two codes (32112.64): plainly rounded, a parked car would turn
+//! by 9 deg/h for ever. The residual is carried.
+
+use super::carry::{RoundingCarry, Scale};
+use crate::units::{AngularRate, SpecificForce};
+use embedded_can::{ExtendedId, Frame};
+
+/// Parameter group number of VDC2.
+pub const VDC2_PGN: u32 = 61_449;
+/// Its default priority.
+pub const VDC2_PRIORITY: u8 = 6;
+/// Largest code that is a value.
+const MAX_CODE: i64 = 0xFAFF;
+const ERROR: u16 = 0xFE00;
+const NOT_AVAILABLE: u16 = 0xFFFF;
+
+/// 1/8192 rad/s is 2^14 rate codes; zero is 3.92 * 8192.
+const YAW_RATE: Scale = Scale { factor_q32: 1 << 18, zero_q32: 137_922_738_588_221 };
+/// 15.687 * 2048, times 2^9; 1/2048 m/s^2 is 2^9 acceleration codes.
+const LATERAL_ZERO_Q9: i64 = 16_449_012;
+
+/// The 29-bit identifier of a broadcast parameter group: priority 0 to 7, sender's address.
+#[must_use]
+pub const fn broadcast_id(pgn: u32, priority: u8, source: u8) -> Option<ExtendedId> {
+    if priority > 7 || pgn > 0x3_FFFF {
+        return None;
+    }
+    ExtendedId::new((priority as u32) << 26 | pgn << 8 | source as u32)
+}
+
+/// VDC2 as codes, without the signals that we have not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Vdc2 {
+    /// Code of the yaw rate, counter-clockwise positive.
+    pub yaw_rate: u16,
+    /// Code of the lateral acceleration, left positive.
+    pub lateral: u16,
+    /// Code of the longitudinal acceleration, forward positive.
+    pub longitudinal: u8,
+}
+
+/// Not eight bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Vdc2Length(pub usize);
+
+impl core::fmt::Display for Vdc2Length {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "VDC2 has {} bytes instead of 8", self.0)
+    }
+}
+
+impl core::error::Error for Vdc2Length {}
+
+impl Vdc2 {
+    /// The eight bytes.
+    #[must_use]
+    pub const fn emit(&self) -> [u8; 8] {
+        let [yaw0, yaw1] = self.yaw_rate.to_le_bytes();
+        let [lateral0, lateral1] = self.lateral.to_le_bytes();
+        [0xFF, 0xFF, 0xFF, yaw0, yaw1, lateral0, lateral1, self.longitudinal]
+    }
+
+    /// Reads eight bytes.
+    ///
+    /// # Errors
+    /// [`Vdc2Length`].
+    pub const fn parse(bytes: &[u8]) -> Result<Self, Vdc2Length> {
+        let &[_, _, _, yaw0, yaw1, lateral0, lateral1, longitudinal] = bytes else {
+            return Err(Vdc2Length(bytes.len()));
+        };
+        let yaw_rate = u16::from_le_bytes([yaw0, yaw1]);
+        Ok(Self { yaw_rate, lateral: u16::from_le_bytes([lateral0, lateral1]), longitudinal })
+    }
+
+    /// The frame, in a driver's own type; `None` only if that type cannot hold it.
+    #[must_use]
+    pub fn frame<F: Frame>(&self, source: u8) -> Option<F> {
+        F::new(broadcast_id(VDC2_PGN, VDC2_PRIORITY, source)?, &self.emit())
+    }
+
+    /// The yaw rate in rad/s, where the code is one.
+    #[must_use]
+    pub fn yaw_rate_rad_per_sec(&self) -> Option<f64> {
+        (i64::from(self.yaw_rate) <= MAX_CODE).then(|| f64::from(self.yaw_rate) / 8192.0 - 3.92)
+    }
+}
+
+/// What may be said of the rate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Validity {
+    /// A value.
+    Valid,
+    /// Not available: before the sensor is ready.
+    NotAvailable,
+    /// In error.
+    Error,
+}
+
+/// The yaw rate's rounding residual.
+#[derive(Debug, Clone, Copy)]
+pub struct Vdc2Encoder {
+    yaw_rate: RoundingCarry,
+}
+
+impl Default for Vdc2Encoder {
+    fn default() -> Self {
+        Self { yaw_rate: RoundingCarry::new(YAW_RATE) }
+    }
+}
+
+impl Vdc2Encoder {
+    /// One sample: specific force forward, left, up. J1939 has no status beside a value, so a
+    /// value that is not valid, or does not fit, is not sent at all.
+    pub fn encode(&mut self, rate: AngularRate, validity: Validity, force: &[SpecificForce; 3]) -> Vdc2 {
+        let [forward, left, _] = force;
+        let yaw_rate = match validity {
+            Validity::Valid => value(self.yaw_rate.encode(rate).into()),
+            Validity::NotAvailable => NOT_AVAILABLE,
+            Validity::Error => ERROR,
+        };
+        if i64::from(yaw_rate) > MAX_CODE {
+            self.yaw_rate.reset();
+        }
+        let lateral = (i64::from(left.0) + LATERAL_ZERO_Q9 + (1 << 8)) >> 9;
+        let longitudinal = (i64::from(forward.0) * 10 + (125 << 20) + (1 << 19)) >> 20;
+        Vdc2 {
+            yaw_rate,
+            lateral: value(lateral),
+            longitudinal: if (0..=250).contains(&longitudinal) { longitudinal as u8 } else { 0xFE },
+        }
+    }
+}
+
+/// A code that is a value, or the error code.
+const fn value(code: i64) -> u16 {
+    if code >= 0 && code <= MAX_CODE { code as u16 } else { ERROR }
+}

@@ -1,0 +1,57 @@
+//! What messages cost: bits on the bus at worst, characters on a serial line.
+
+use embedded_can::Id;
+
+/// A classic data frame of eight bytes that is sent periodically.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Periodic {
+    /// Its identifier.
+    pub id: Id,
+    /// Its period.
+    pub period_ms: u16,
+}
+
+/// Data bits of a frame; all of ours have eight bytes.
+const DATA_BITS: u32 = 64;
+/// Line bits per character: start, eight, stop.
+const BITS_PER_CHARACTER: u32 = 10;
+
+impl Periodic {
+    /// Bits of one frame with as many stuff bits as there can be, interframe space included.
+    ///
+    /// 13 bits are never stuffed (CRC delimiter, acknowledgement, end of frame, space); in the
+    /// others, of which 34 or 54 are no data, there is at most one stuff bit for every four
+    /// after the first (Davis et al., 2007).
+    #[must_use]
+    pub const fn worst_case_bits(&self) -> u32 {
+        let stuffed = DATA_BITS
+            + match self.id {
+                Id::Standard(_) => 34,
+                Id::Extended(_) => 54,
+            };
+        stuffed + 13 + (stuffed - 1) / 4
+    }
+
+    /// Bits of the same frame as an SLCAN line, with a time stamp or without.
+    #[must_use]
+    pub const fn slcan_bits(&self, stamped: bool) -> u32 {
+        let identifier = match self.id {
+            Id::Standard(_) => 3,
+            Id::Extended(_) => 8,
+        };
+        // Letter, identifier, length, data, stamp, CR.
+        let characters = 1 + identifier + 1 + 2 * 8 + (if stamped { 4 } else { 0 }) + 1;
+        characters * BITS_PER_CHARACTER
+    }
+}
+
+/// How much of a bus or line the messages take, in 1/1000, rounded up.
+#[must_use]
+pub fn per_mille(messages: &[Periodic], bits: impl Fn(&Periodic) -> u32, bits_per_second: u32) -> u32 {
+    // Bits in 1000 s, exact for every period that divides 1,000,000 ms, rounded up for others.
+    let bits: u64 = messages
+        .iter()
+        .map(|message| (u64::from(bits(message)) * 1_000_000).div_ceil(message.period_ms.max(1).into()))
+        .sum();
+    u32::try_from(bits.div_ceil(bits_per_second.max(1).into())).unwrap_or(u32::MAX)
+}

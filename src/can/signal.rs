@@ -1,0 +1,100 @@
+//! Where a value lies in a frame, as DBC files say it.
+
+/// Order of a value's bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ByteOrder {
+    /// Little-endian (DBC `@1`): the start bit is the lowest bit.
+    Intel,
+    /// Big-endian (DBC `@0`): the start bit is the highest bit, counted as `8 * byte + bit`.
+    Motorola,
+}
+
+/// The value does not lie inside eight bytes, or has no bits, or over 32.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct OutsideFrame {
+    /// Start bit as given.
+    pub start: u8,
+    /// Length as given.
+    pub len: u8,
+}
+
+impl core::fmt::Display for OutsideFrame {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} bits from bit {} do not lie inside a frame", self.len, self.start)
+    }
+}
+
+impl core::error::Error for OutsideFrame {}
+
+/// Bits of a frame that are one value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BitField {
+    /// Bits to the right of the value, in the order of the bytes.
+    shift: u8,
+    len: u8,
+    order: ByteOrder,
+    signed: bool,
+    /// Bytes that a frame needs.
+    bytes: u8,
+}
+
+impl BitField {
+    /// Start bit and length as in a DBC file.
+    ///
+    /// # Errors
+    /// [`OutsideFrame`].
+    pub const fn new(start: u8, len: u8, order: ByteOrder, signed: bool) -> Result<Self, OutsideFrame> {
+        let outside = Err(OutsideFrame { start, len });
+        if start > 63 || len == 0 || len > 32 {
+            return outside;
+        }
+        // Bits before the value when the frame is read in its order.
+        let before = match order {
+            ByteOrder::Intel => start,
+            ByteOrder::Motorola => start / 8 * 8 + 7 - start % 8,
+        };
+        let end = before + len;
+        if end > 64 {
+            return outside;
+        }
+        let shift = match order {
+            ByteOrder::Intel => before,
+            ByteOrder::Motorola => 64 - end,
+        };
+        Ok(Self { shift, len, order, signed, bytes: end.div_ceil(8) })
+    }
+
+    /// Bits of the value, 1 to 32.
+    #[must_use]
+    pub const fn bits(&self) -> u8 {
+        self.len
+    }
+
+    /// The bits as they are; `None` when the frame is too short.
+    #[must_use]
+    pub fn raw(&self, data: &[u8]) -> Option<u32> {
+        if data.len() < usize::from(self.bytes) {
+            return None;
+        }
+        let mut bytes = [0; 8];
+        for (byte, value) in bytes.iter_mut().zip(data) {
+            *byte = *value;
+        }
+        let word = match self.order {
+            ByteOrder::Intel => u64::from_le_bytes(bytes),
+            ByteOrder::Motorola => u64::from_be_bytes(bytes),
+        };
+        Some((word >> self.shift & ((1 << self.len) - 1)) as u32)
+    }
+
+    /// The value, sign included.
+    #[must_use]
+    pub fn value(&self, data: &[u8]) -> Option<i64> {
+        let raw = i64::from(self.raw(data)?);
+        let negative = self.signed && raw >> (self.len - 1) & 1 == 1;
+        Some(if negative { raw - (1 << self.len) } else { raw })
+    }
+}

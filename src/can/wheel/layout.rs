@@ -1,0 +1,154 @@
+//! Where wheel speeds lie in a frame, and how the frame is protected.
+
+use crate::can::bosch;
+use crate::can::e2e::{Fault, Profile};
+use crate::can::signal::BitField;
+use crate::sample::WHEELS;
+use crate::units::WheelSpeed;
+use embedded_can::Id;
+
+/// One wheel's speed in a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WheelSignal {
+    /// Which wheel: 0 front left, 1 front right, 2 rear left, 3 rear right.
+    pub wheel: usize,
+    /// Where it lies.
+    pub field: BitField,
+    /// Speed codes (2^-16 m/s) for one bit, times 2^16: see [`WheelSignal::per_bit_kmh`].
+    pub factor_q16: i32,
+    /// Speed at raw zero.
+    pub offset: WheelSpeed,
+    /// Raw code that says "not valid".
+    pub invalid: Option<u32>,
+}
+
+impl WheelSignal {
+    /// Factor of a DBC file in km/h, as [`WheelSignal::factor_q16`]; below 1000 km/h per bit.
+    #[must_use]
+    pub const fn per_bit_kmh(factor: f64) -> i32 {
+        (factor / 3.6 * 4_294_967_296.0) as i32
+    }
+
+    pub(super) fn speed(&self, data: &[u8]) -> Result<WheelSpeed, WheelError> {
+        let short = WheelError::Short(data.len());
+        if self.invalid.is_some() && self.field.raw(data) == self.invalid {
+            return Err(WheelError::Invalid { wheel: self.wheel });
+        }
+        let value = self.field.value(data).ok_or(short)?;
+        // 2^32 x 2^31 at most, and the offset.
+        let code = ((value * i64::from(self.factor_q16)) >> 16) + i64::from(self.offset.0);
+        i32::try_from(code).map(WheelSpeed).map_err(|_| WheelError::Invalid { wheel: self.wheel })
+    }
+}
+
+/// How a frame of wheel speeds is protected, if it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Checksum {
+    /// Not at all.
+    None,
+    /// SAE J1850 in one byte, over all the others in their order.
+    J1850 {
+        /// Which byte.
+        at: usize,
+    },
+    /// Exclusive or in one byte, of all the others.
+    Xor {
+        /// Which byte.
+        at: usize,
+    },
+    /// Sum modulo 256 in one byte, of all the others.
+    Sum {
+        /// Which byte.
+        at: usize,
+    },
+    /// AUTOSAR E2E; its counter is used.
+    E2e(Profile),
+}
+
+/// One frame that carries wheel speeds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WheelFrame {
+    /// Its identifier.
+    pub id: Id,
+    /// The wheels in it.
+    pub signals: [Option<WheelSignal>; WHEELS],
+    /// A message counter of up to 8 bits, cycling through all values.
+    pub counter: Option<BitField>,
+    /// Its protection.
+    pub checksum: Checksum,
+}
+
+/// Why a frame gives no wheel speeds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum WheelError {
+    /// It has too few bytes.
+    Short(usize),
+    /// The checksum does not fit.
+    Checksum,
+    /// The E2E check failed.
+    E2e(Fault),
+    /// The same counter again: an old frame.
+    Repeated,
+    /// A wheel's speed is marked, or cannot be.
+    Invalid {
+        /// Which wheel.
+        wheel: usize,
+    },
+}
+
+impl core::fmt::Display for WheelError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Short(len) => write!(f, "wheel frame of {len} bytes is too short"),
+            Self::Checksum => f.write_str("wheel frame's checksum does not fit"),
+            Self::E2e(fault) => write!(f, "wheel frame: {fault}"),
+            Self::Repeated => f.write_str("wheel frame is a repetition"),
+            Self::Invalid { wheel } => write!(f, "wheel {wheel}: speed is not valid"),
+        }
+    }
+}
+
+impl core::error::Error for WheelError {}
+
+impl WheelFrame {
+    /// Values of the frame's counter.
+    pub(super) fn counters(&self) -> u16 {
+        match (self.checksum, self.counter) {
+            (Checksum::E2e(profile), _) => profile.counters(),
+            (_, Some(field)) => 1 << field.bits(),
+            (_, None) => 1,
+        }
+    }
+
+    /// Checks a frame's protection; gives its counter where it has one.
+    pub(super) fn check(&self, data: &[u8]) -> Result<Option<u8>, WheelError> {
+        let short = WheelError::Short(data.len());
+        let others =
+            |at: usize| data.iter().enumerate().filter(move |(k, _)| *k != at).map(|(_, byte)| *byte);
+        let (at, computed) = match self.checksum {
+            Checksum::E2e(profile) => return profile.check(data).map(Some).map_err(WheelError::E2e),
+            Checksum::None => return self.counter(data),
+            Checksum::Xor { at } => (at, others(at).fold(0, |sum, byte| sum ^ byte)),
+            Checksum::Sum { at } => (at, others(at).fold(0u8, u8::wrapping_add)),
+            Checksum::J1850 { at } => {
+                let mut digest = bosch::CRC.digest();
+                others(at).for_each(|byte| digest.update(&[byte]));
+                (at, digest.finalize())
+            }
+        };
+        if *data.get(at).ok_or(short)? != computed {
+            return Err(WheelError::Checksum);
+        }
+        self.counter(data)
+    }
+
+    fn counter(&self, data: &[u8]) -> Result<Option<u8>, WheelError> {
+        let Some(field) = self.counter else { return Ok(None) };
+        // At most 8 bits: checked with the settings.
+        field.raw(data).map(|raw| Some(raw as u8)).ok_or(WheelError::Short(data.len()))
+    }
+}

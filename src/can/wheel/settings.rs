@@ -1,0 +1,93 @@
+//! Which frames the wheel speeds come in.
+
+use super::layout::{Checksum, WheelFrame};
+use crate::sample::WHEELS;
+use crate::units::WheelSpeed;
+use embedded_can::Id;
+
+/// Most frames that wheel speeds may be spread over.
+pub const MAX_FRAMES: usize = WHEELS;
+
+/// Everything that can be set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WheelSettings {
+    /// The frames.
+    pub frames: [Option<WheelFrame>; MAX_FRAMES],
+    /// A speed that is older says nothing.
+    pub timeout_us: u64,
+    /// Up to this speed a wheel may stand still.
+    pub still_speed: WheelSpeed,
+    /// So long all wheels must be that slow.
+    pub still_for_us: u64,
+}
+
+/// Why wheel settings are no configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum WheelConfigError {
+    /// Not two or four wheels.
+    Wheels(usize),
+    /// A wheel that does not exist, or is in two signals.
+    Wheel(usize),
+    /// Two frames under one identifier.
+    DuplicateIdentifier(u32),
+    /// A counter of over 8 bits.
+    Counter(u8),
+    /// A checksum beyond byte 7.
+    Checksum(usize),
+}
+
+impl core::fmt::Display for WheelConfigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Wheels(count) => write!(f, "{count} wheels instead of two or four"),
+            Self::Wheel(wheel) => write!(f, "wheel {wheel} does not exist or is there twice"),
+            Self::DuplicateIdentifier(id) => write!(f, "wheel frame {id:x} is there twice"),
+            Self::Counter(len) => write!(f, "wheel counter of {len} bits, over 8"),
+            Self::Checksum(at) => write!(f, "wheel checksum in byte {at}, beyond 7"),
+        }
+    }
+}
+
+impl core::error::Error for WheelConfigError {}
+
+impl WheelSettings {
+    /// The wheels that there are, each in one signal.
+    pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
+        let mut expected = [false; WHEELS];
+        let frames = || self.frames.iter().flatten();
+        for (k, frame) in frames().enumerate() {
+            if frames().take(k).any(|earlier| earlier.id == frame.id) {
+                return Err(WheelConfigError::DuplicateIdentifier(raw_id(frame.id)));
+            }
+            if let Some(counter) = frame.counter
+                && counter.bits() > 8
+            {
+                return Err(WheelConfigError::Counter(counter.bits()));
+            }
+            if let Checksum::J1850 { at } | Checksum::Xor { at } | Checksum::Sum { at } = frame.checksum
+                && at > 7
+            {
+                return Err(WheelConfigError::Checksum(at));
+            }
+            for signal in frame.signals.iter().flatten() {
+                match expected.get_mut(signal.wheel) {
+                    Some(seen @ false) => *seen = true,
+                    _ => return Err(WheelConfigError::Wheel(signal.wheel)),
+                }
+            }
+        }
+        match expected.iter().filter(|seen| **seen).count() {
+            2 | 4 => Ok(expected),
+            count => Err(WheelConfigError::Wheels(count)),
+        }
+    }
+}
+
+fn raw_id(id: Id) -> u32 {
+    match id {
+        Id::Standard(id) => id.as_raw().into(),
+        Id::Extended(id) => id.as_raw(),
+    }
+}

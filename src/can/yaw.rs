@@ -1,0 +1,277 @@
+//! Our own yaw messages: full resolution, accumulated yaw, and what the numbers are worth.
+//!
+//! Three messages of eight bytes. Bytes 0 to 2 are the header: bytes 0 and 1, with profile 5
+//! also 2, belong to the E2E profile; with the others byte 2 is the sample counter, the same in
+//! the three messages of one sample. Bytes 3 to 7, little-endian:
+//!
+//! | message | bytes | signal | scale |
+//! |---|---|---|---|
+//! | rate | 3-6 | rate, i32 | 1e-6 deg/s; -2^31 not available |
+//! | | 7, bits 0-2 | [`Source`] | |
+//! | | 7, bits 3-4 | [`Quality`] | |
+//! | angle | 3-6 | accumulated yaw, i32 | 360 deg / 2^32, wraps at half a turn |
+//! | | 7 | [`Faults`] | |
+//! | detail | 3-4 | correction that was taken off, i16 | 2e-4 deg/s |
+//! | | 5-6 | expected error (1 sigma), u16, rounded up | 1e-5 deg/s; FFFF unknown |
+//! | | 7 | latency, u8, rounded up | 0.1 ms; FE that or more, FF unknown |
+//!
+//! The accumulated yaw wraps where an angle does, so the difference of two readings, taken in 32
+//! bits, is the angle turned between them, and a receiver that missed messages misses no angle.
+//! The rate carries its rounding residual: summed up, it is the accumulated yaw to half an LSB.
+
+use crate::health::Status;
+use crate::units::{AngularRate, Yaw};
+
+/// Rate code that says "not available".
+pub const RATE_NOT_AVAILABLE: i32 = i32::MIN;
+/// Expected error that says "unknown".
+pub const SIGMA_UNKNOWN: u16 = u16::MAX;
+/// Latency that says "unknown".
+pub const LATENCY_UNKNOWN: u8 = u8::MAX;
+
+/// Codes of 360 deg / 2^32 per code of [`Yaw`] (0.32 / 2 pi), times 2^56.
+const ANGLE_PER_YAW_Q56: i128 = 3_669_863_129_102_502;
+/// Codes of 1e-5 deg/s per rate code, times 2^32.
+const SIGMA_PER_CODE_Q32: u64 = 183_346_494;
+
+/// Where a rate comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Source {
+    /// The gyro as it is.
+    #[default]
+    Raw = 0,
+    /// The gyro less its static bias.
+    Static = 1,
+    /// Corrected by GyroNet.
+    GyroNet = 2,
+    /// The fibre-optic gyro, corrected by FoGNet.
+    FogNet = 3,
+    /// The sensor is silent: the last correction goes on for a bounded time.
+    Held = 4,
+}
+
+/// What a rate is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Quality {
+    /// As good as it gets.
+    Good = 0,
+    /// Usable, but less is behind it than there could be.
+    Degraded = 1,
+    /// Shown, not to be used yet.
+    #[default]
+    Initialising = 2,
+    /// Not to be used; the rate is not available.
+    Unusable = 3,
+}
+
+/// What is wrong at present, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Faults(pub u8);
+
+impl Faults {
+    /// Nothing.
+    pub const NONE: Self = Self(0);
+    /// Samples are missing.
+    pub const GAP: Self = Self(1);
+    /// The part is saturated.
+    pub const CLIPPED: Self = Self(1 << 1);
+    /// The part's readings stand still.
+    pub const STUCK: Self = Self(1 << 2);
+    /// The network's estimate is not believed.
+    pub const IMPLAUSIBLE: Self = Self(1 << 3);
+    /// The network's estimate came too late.
+    pub const LATE: Self = Self(1 << 4);
+    /// The weights are damaged.
+    pub const WEIGHTS: Self = Self(1 << 5);
+    /// The wheels are silent.
+    pub const WHEELS: Self = Self(1 << 6);
+    /// Frames were dropped because the bus did not take them.
+    pub const BUS: Self = Self(1 << 7);
+
+    /// Both together.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+/// Source and quality that a status stands for.
+#[must_use]
+pub const fn judge(status: Status) -> (Source, Quality) {
+    match status {
+        Status::Init => (Source::Raw, Quality::Initialising),
+        Status::Ready => (Source::GyroNet, Quality::Good),
+        Status::Degraded => (Source::Static, Quality::Degraded),
+        Status::Clipped => (Source::Raw, Quality::Unusable),
+    }
+}
+
+/// Why bytes are no yaw message. The E2E check comes before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum YawError {
+    /// Not eight bytes.
+    Length(usize),
+    /// A source that this version does not know.
+    Source(u8),
+}
+
+impl core::fmt::Display for YawError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Length(len) => write!(f, "yaw message has {len} bytes instead of 8"),
+            Self::Source(source) => write!(f, "yaw rate from an unknown source ({source})"),
+        }
+    }
+}
+
+impl core::error::Error for YawError {}
+
+/// The rate message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RateMessage {
+    /// Code of the rate.
+    pub rate: i32,
+    /// Where it comes from.
+    pub source: Source,
+    /// What it is worth.
+    pub quality: Quality,
+}
+
+impl RateMessage {
+    /// Eight bytes, the header still empty.
+    #[must_use]
+    pub const fn emit(&self) -> [u8; 8] {
+        let [a, b, c, d] = self.rate.to_le_bytes();
+        [0, 0, 0, a, b, c, d, self.source as u8 | (self.quality as u8) << 3]
+    }
+
+    /// Reads what is behind the header.
+    ///
+    /// # Errors
+    /// [`YawError`].
+    pub const fn parse(bytes: &[u8]) -> Result<Self, YawError> {
+        let &[_, _, _, a, b, c, d, judgement] = bytes else {
+            return Err(YawError::Length(bytes.len()));
+        };
+        let source = match judgement & 7 {
+            0 => Source::Raw,
+            1 => Source::Static,
+            2 => Source::GyroNet,
+            3 => Source::FogNet,
+            4 => Source::Held,
+            unknown => return Err(YawError::Source(unknown)),
+        };
+        let quality = match judgement >> 3 & 3 {
+            0 => Quality::Good,
+            1 => Quality::Degraded,
+            2 => Quality::Initialising,
+            _ => Quality::Unusable,
+        };
+        Ok(Self { rate: i32::from_le_bytes([a, b, c, d]), source, quality })
+    }
+
+    /// The rate in deg/s; `None` when not available.
+    #[must_use]
+    pub fn deg_per_sec(&self) -> Option<f64> {
+        (self.rate != RATE_NOT_AVAILABLE).then(|| f64::from(self.rate) * 1e-6)
+    }
+}
+
+/// The angle message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AngleMessage {
+    /// Code of the accumulated yaw.
+    pub yaw: i32,
+    /// What is wrong at present.
+    pub faults: Faults,
+}
+
+impl AngleMessage {
+    /// Eight bytes, the header still empty.
+    #[must_use]
+    pub const fn emit(&self) -> [u8; 8] {
+        let [a, b, c, d] = self.yaw.to_le_bytes();
+        [0, 0, 0, a, b, c, d, self.faults.0]
+    }
+
+    /// Reads what is behind the header.
+    ///
+    /// # Errors
+    /// [`YawError::Length`].
+    pub const fn parse(bytes: &[u8]) -> Result<Self, YawError> {
+        let &[_, _, _, a, b, c, d, faults] = bytes else {
+            return Err(YawError::Length(bytes.len()));
+        };
+        Ok(Self { yaw: i32::from_le_bytes([a, b, c, d]), faults: Faults(faults) })
+    }
+
+    /// The angle in deg, -180 to below 180.
+    #[must_use]
+    pub fn deg(&self) -> f64 {
+        f64::from(self.yaw) * (360.0 / 4_294_967_296.0)
+    }
+}
+
+/// The detail message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DetailMessage {
+    /// Code of the correction.
+    pub correction: i16,
+    /// Code of the expected error.
+    pub sigma: u16,
+    /// Code of the latency.
+    pub latency: u8,
+}
+
+impl DetailMessage {
+    /// Eight bytes, the header still empty.
+    #[must_use]
+    pub const fn emit(&self) -> [u8; 8] {
+        let [a, b] = self.correction.to_le_bytes();
+        let [c, d] = self.sigma.to_le_bytes();
+        [0, 0, 0, a, b, c, d, self.latency]
+    }
+
+    /// Reads what is behind the header.
+    ///
+    /// # Errors
+    /// [`YawError::Length`].
+    pub const fn parse(bytes: &[u8]) -> Result<Self, YawError> {
+        let &[_, _, _, a, b, c, d, latency] = bytes else {
+            return Err(YawError::Length(bytes.len()));
+        };
+        Ok(Self { correction: i16::from_le_bytes([a, b]), sigma: u16::from_le_bytes([c, d]), latency })
+    }
+}
+
+/// Code of an accumulated yaw: nearest, turns left out.
+#[must_use]
+pub const fn encode_angle(yaw: Yaw) -> i32 {
+    ((yaw.0 as i128 * ANGLE_PER_YAW_Q56 + (1 << 55)) >> 56) as i32
+}
+
+/// Code of an expected error; rounded up, so that it never claims more than is known.
+#[must_use]
+pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
+    let Some(AngularRate(sigma)) = sigma else { return SIGMA_UNKNOWN };
+    let code = (sigma.unsigned_abs() as u64 * SIGMA_PER_CODE_Q32).div_ceil(1 << 32);
+    if code < SIGMA_UNKNOWN as u64 { code as u16 } else { SIGMA_UNKNOWN - 1 }
+}
+
+/// Code of a latency in microseconds; rounded up.
+#[must_use]
+pub const fn encode_latency(latency_us: Option<u32>) -> u8 {
+    let Some(latency_us) = latency_us else { return LATENCY_UNKNOWN };
+    let code = latency_us.div_ceil(100);
+    if code < LATENCY_UNKNOWN as u32 { code as u8 } else { LATENCY_UNKNOWN - 1 }
+}
