@@ -1,4 +1,6 @@
 //! Sensors on the wire: bytes in, samples out. No input or output of its own.
 
+pub mod crc;
+pub mod dsp1760;
 pub mod framer;
 pub mod xsens;
