@@ -2,5 +2,6 @@
 
 pub mod crc;
 pub mod dsp1760;
+pub mod dsp3000;
 pub mod framer;
 pub mod xsens;
