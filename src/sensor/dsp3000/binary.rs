@@ -84,7 +84,7 @@ impl Word {
     /// [`WordError`].
     pub fn parse(bytes: [u8; 4]) -> Result<Self, WordError> {
         let word = u32::from_be_bytes(bytes);
-        if word.count_ones() % 2 == 0 {
+        if word.count_ones().is_multiple_of(2) {
             return Err(WordError::Parity { word });
         }
         let mode = match word >> 27 & 3 {
@@ -107,7 +107,7 @@ impl Word {
         };
         let valid = if self.valid { VALID } else { 0 };
         let word = valid | (self.sync as u32 & 3) << 29 | mode << 27 | self.value as u32 & VALUE_MASK;
-        let parity = if word.count_ones() % 2 == 0 { PARITY } else { 0 };
+        let parity = if word.count_ones().is_multiple_of(2) { PARITY } else { 0 };
         (word | parity).to_be_bytes()
     }
 

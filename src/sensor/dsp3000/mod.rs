@@ -1,7 +1,7 @@
 //! KVH DSP-3000, a fibre-optic gyro with one axis, in its two variants.
 //!
-//! - [`ascii`]: 100 lines a second at 38400 8N1, `[-]ddd.dddddd y`.
-//! - [`binary`]: 1000 words of four bytes a second at 115200 8N1.
+//! One ([`ascii`]) sends 100 lines a second at 38400 8N1, `[-]ddd.dddddd y`; the other
+//! ([`binary`]) 1000 words of four bytes a second at 115200 8N1.
 //!
 //! Neither carries time or a counter, so a lost reading leaves no trace in the bytes: the
 //! arrival times tell. The part's rate is its own within some 3 %; the readings belong on the

@@ -1,8 +1,7 @@
 //! Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
-//! - [`xbus`]: frames.
-//! - [`mtdata2`]: the measurements in a frame; [`precision`]: the four forms of their numbers.
-//! - [`dialogue`]: how a part is brought to send what the pipeline wants.
+//! Frames are in [`xbus`], the measurements in a frame in [`mtdata2`], the four forms of their
+//! numbers in [`precision`]; [`dialogue`] brings a part to send what the pipeline wants.
 
 pub mod dialogue;
 pub mod mtdata2;
