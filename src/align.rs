@@ -6,6 +6,16 @@
 //! is a duplicate, older than the last one or off the grid is an error and leaves the grid as
 //! it was. A jump of more than a second either way (a part that restarted, a cable that came
 //! back) is an error too, and the grid is laid anew from there: no wait without a bound.
+//!
+//! That is for one stream that comes at 100 Hz by itself, by the part's own clock. Streams of
+//! other rates, and two or more parts with a clock each, go through [`streams`] first: it takes
+//! the parts' clocks to the board's ([`clock`]), interpolates ([`resample`]) and sums
+//! ([`increments`]), and its samples lie on the grid.
+
+pub mod clock;
+pub mod increments;
+pub mod resample;
+pub mod streams;
 
 use crate::sample::{Frame, ImuSample, PERIOD_US};
 use crate::units::Micros;

@@ -1,6 +1,6 @@
 //! What a sensor delivers and what the pipeline works on.
 
-use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce, WheelSpeed};
+use crate::units::{Angle, AngularRate, CentiCelsius, Micros, SpecificForce, WheelSpeed};
 
 /// Rate of the common grid that the networks see, Hz.
 pub const RATE_HZ: u32 = 100;
@@ -21,6 +21,23 @@ pub struct ImuSample {
     pub temperature: Option<CentiCelsius>,
     /// The part says that one of its axes clipped.
     pub clipped: bool,
+}
+
+/// What a fibre-optic gyro has turned since its message before: x forward, y left, z up (FLU).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FogSample {
+    /// When the increment ended, by the part's own clock, unwrapped.
+    pub time: Micros,
+    /// How long it lasted, microseconds.
+    pub span: u32,
+    /// Messages missing between the one before and this one; what was turned meanwhile is lost.
+    pub lost: u32,
+    /// Angle turned about x, y, z; `None` where the part says that it is not good, or has no
+    /// such axis.
+    pub increment: [Option<Angle>; 3],
+    /// Temperature of the part, where it gives one.
+    pub temperature: Option<CentiCelsius>,
 }
 
 /// A sample that has found its place on the 100 Hz grid.

@@ -114,15 +114,7 @@ fn missing_packets() {
 }
 
 #[test]
-fn other_precisions_are_refused() {
-    for kind in [0x0810u16, 0x4020, 0x8020] {
-        for (precision, len) in [(1, 12), (2, 18), (3, 24)] {
-            for system in [0, 4, 8] {
-                let id = kind | precision | system;
-                assert_eq!(feed_new(frame(&[(id, &vec![0; len])])), [Err(XsensError::Format { id })]);
-            }
-        }
-    }
+fn any_coordinate_system() {
     // The coordinate system is not the parser's business.
     let (time, values) = (100u32.to_be_bytes(), vector([1.0, 2.0, 3.0]));
     assert!(feed_new(frame(&[(0x1060, &time), (0x4024, &values), (0x8028, &values)]))[0].is_ok());

@@ -53,9 +53,9 @@ mod board {
             p.GPIOA.afrl().modify(|_, w| w.afrl2().af7());
             p.GPIOA.afrh().modify(|_, w| w.afrh10().af7());
             // SAFETY: any 16-bit value is a valid divider; this one is the stated baud rate.
-            p.USART1.brr().write(|w| unsafe { w.bits(BRR_115200.into()) });
+            p.USART1.brr().write(|w| unsafe { w.bits(BRR_115200) });
             // SAFETY: as above.
-            p.USART2.brr().write(|w| unsafe { w.bits(BRR_115200.into()) });
+            p.USART2.brr().write(|w| unsafe { w.bits(BRR_115200) });
             p.USART1.cr1().write(|w| w.ue().enabled().re().enabled().rxneie().enabled());
             p.USART2.cr1().write(|w| w.ue().enabled().te().enabled());
             free(|cs| USART1.borrow(cs).replace(Some(p.USART1)));

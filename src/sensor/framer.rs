@@ -107,6 +107,10 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
     }
 
     fn drop_front(&mut self, count: usize) {
+        if count == 0 {
+            // At nearly every byte: moving the buffer onto itself would cost its length.
+            return;
+        }
         let left = self.buffer.len() - count.min(self.buffer.len());
         self.buffer.copy_within(count.., 0);
         self.buffer.truncate(left);

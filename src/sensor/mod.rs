@@ -1,4 +1,103 @@
-//! Sensors on the wire: bytes in, samples out. No input or output of its own.
+//! Sensors on the wire: bytes in, samples out.
+//!
+//! What the pipeline sees of a part is its samples alone: [`ImuSample`] or [`FogSample`], in
+//! fixed point, with the part's own time unwrapped. [`Source`] names what every part has in
+//! common; which part is fitted is a type in the firmware's wiring, and nothing else changes.
+//!
+//! | part | line | type | sample |
+//! |---|---|---|---|
+//! | Xsens MTi | UART | [`xsens::Mti`] | [`ImuSample`] |
+//! | KVH DSP-1760, 17xx | RS-422 | [`dsp1760::Dsp1760`] | [`FogSample`] |
+//! | KVH DSP-3000 | RS-232 | [`dsp3000`] | [`FogSample`], timed by arrival |
+//! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
+//! | ADI ADIS16465, 16470 | SPI | [`adis16465::Adis16465`] | [`ImuSample`], timed by data ready |
+//!
+//! # Adding a part, in five steps
+//!
+//! 1. Write down its bytes: a file of its own with `parse` and `emit` over byte slices, and an
+//!    error that says what is wrong and where. No input or output in it.
+//! 2. Say how its frames are found: [`framer::Protocol`] for a stream of bytes (header and
+//!    checksum together are synchronisation, a header alone is none), or a thin driver over
+//!    `embedded_hal::spi::SpiDevice` with bounded waits.
+//! 3. Turn a frame into a sample: units by the types of [`crate::units`], axes x forward, y
+//!    left, z up, time unwrapped, what the part marks as bad left out, never replaced.
+//! 4. Implement [`Source`] (and [`ByteSource`] for a stream) for it. A part without a clock of
+//!    its own takes the arrival time as an argument instead, as [`adis16465`] and [`dsp3000`] do.
+//! 5. Test it with recorded or published frames both ways, every truncation and every flipped
+//!    bit, noise with frames strewn in, a mocked bus; and add a fuzz target.
 
+pub mod adis16465;
+pub mod crc;
+pub mod dsp1760;
+pub mod dsp3000;
 pub mod framer;
+pub mod icm42688;
 pub mod xsens;
+
+use crate::sample::{FogSample, ImuSample};
+
+/// A part that gives samples.
+pub trait Source {
+    /// [`ImuSample`] or [`FogSample`].
+    type Sample;
+    /// Why a frame or a transfer gave none.
+    type Error: core::error::Error;
+
+    /// The next sample, or why there is none where one was due; `None`: nothing waits.
+    fn next_sample(&mut self) -> Option<Result<Self::Sample, Self::Error>>;
+}
+
+/// A part at the end of a line of bytes.
+pub trait ByteSource: Source {
+    /// Takes one byte. Call [`Source::next_sample`] until `None` before the next one.
+    fn push(&mut self, byte: u8);
+    /// Candidates whose checksum did not fit.
+    fn bad_checksums(&self) -> u32;
+}
+
+impl Source for xsens::Mti {
+    type Sample = ImuSample;
+    type Error = xsens::XsensError;
+
+    fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
+        self.next_sample()
+    }
+}
+
+impl ByteSource for xsens::Mti {
+    fn push(&mut self, byte: u8) {
+        self.push(byte);
+    }
+
+    fn bad_checksums(&self) -> u32 {
+        self.bad_checksums()
+    }
+}
+
+impl Source for dsp1760::Dsp1760 {
+    type Sample = FogSample;
+    type Error = dsp1760::Dsp1760Error;
+
+    fn next_sample(&mut self) -> Option<Result<FogSample, Self::Error>> {
+        self.next_sample()
+    }
+}
+
+impl ByteSource for dsp1760::Dsp1760 {
+    fn push(&mut self, byte: u8) {
+        self.push(byte);
+    }
+
+    fn bad_checksums(&self) -> u32 {
+        self.bad_checksums()
+    }
+}
+
+impl<SPI: embedded_hal::spi::SpiDevice> Source for icm42688::Icm42688<SPI> {
+    type Sample = ImuSample;
+    type Error = icm42688::Icm42688Error<SPI::Error>;
+
+    fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
+        self.next_sample().transpose()
+    }
+}

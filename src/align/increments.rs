@@ -1,0 +1,165 @@
+//! Increments of a fibre-optic gyro, summed from one grid step to the next.
+//!
+//! The rules:
+//! - An increment belongs to the time since the one before it. One that straddles a grid step
+//!   is split there in proportion; what the first part rounds away the second one gets, so the
+//!   sum over all steps is the sum of all increments, to the last bit.
+//! - After lost messages an increment belongs to its own span only. What was turned meanwhile
+//!   is not known and not guessed: the step says how much of its time is covered.
+//! - What comes after its step has gone out is not used, and counted.
+//! - An axis that was not good in any part of the step has no sum in it.
+//! - A span longer than a grid step is refused: set the part to 100 Hz or more.
+
+use crate::health::count;
+use crate::sample::{FogSample, PERIOD_US};
+use crate::units::{Angle, Micros};
+use heapless::Deque;
+
+/// Increments kept: what a 1 kHz part sends in the 20 ms that a step can be waited for, and
+/// half as many again.
+pub const KEPT: usize = 32;
+
+/// What was turned between two grid steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Turn {
+    /// About x, y, z; `None` where an axis was not good throughout, or nothing came.
+    pub angle: [Option<Angle>; 3],
+    /// How much of the step the increments cover, microseconds; less than
+    /// [`PERIOD_US`] marks a gap.
+    pub covered: u32,
+}
+
+/// How often each kind of event happened. They saturate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct IncrementCounters {
+    /// Times that messages were missing between two increments.
+    pub gaps: u32,
+    /// Increments that came after their step had gone out.
+    pub late: u32,
+    /// Increments refused because their span is longer than a grid step.
+    pub too_long: u32,
+    /// Increments that had to go before a step asked for them.
+    pub dropped: u32,
+}
+
+/// An increment and the time that it belongs to.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    begin: u64,
+    end: u64,
+    angle: [Option<Angle>; 3],
+}
+
+/// Increments that a grid step may still need, times by the board's clock.
+#[derive(Debug, Clone, Default)]
+pub struct Increments {
+    pieces: Deque<Piece, KEPT>,
+    last_end: Option<u64>,
+    counters: IncrementCounters,
+}
+
+impl Increments {
+    /// Takes a sample that ended at `time` by the board's clock, later than the last one.
+    pub fn push(&mut self, time: Micros, sample: &FogSample) {
+        let (end, span) = (time.0, u64::from(sample.span));
+        let own = end.saturating_sub(span);
+        let begin = match self.last_end {
+            // Jitter moves the ends about by less than the span itself.
+            Some(last) if sample.lost == 0 && end.saturating_sub(last) <= 2 * span => last,
+            Some(last) => {
+                count(&mut self.counters.gaps, 1);
+                own.max(last)
+            }
+            None => own,
+        };
+        self.last_end = Some(end);
+        if span > PERIOD_US {
+            count(&mut self.counters.too_long, 1);
+            return;
+        }
+        if self.pieces.is_full() {
+            self.pieces.pop_front();
+            count(&mut self.counters.dropped, 1);
+        }
+        // There is room now.
+        let _ = self.pieces.push_back(Piece { begin, end, angle: sample.increment });
+    }
+
+    /// Nothing before is connected to what follows.
+    pub fn disconnect(&mut self) {
+        self.last_end = None;
+    }
+
+    /// Forgets what has come.
+    pub fn clear(&mut self) {
+        self.pieces.clear();
+        self.last_end = None;
+    }
+
+    /// Whether the increments reach `time`: then [`Increments::take`] need not wait.
+    #[must_use]
+    pub fn has_reached(&self, time: Micros) -> bool {
+        self.last_end.is_some_and(|end| end >= time.0)
+    }
+
+    /// What was turned in the step that ends at `time`; asked for in ascending order.
+    pub fn take(&mut self, time: Micros) -> Turn {
+        let begin = time.0.saturating_sub(PERIOD_US);
+        let mut angle = [Some(Angle::ZERO); 3];
+        let mut covered = 0;
+        while let Some(mut piece) = self.pieces.pop_front() {
+            if piece.begin >= time.0 {
+                // It is the next step's: there was room for it a moment ago.
+                let _ = self.pieces.push_front(piece);
+                break;
+            }
+            let mut rest = None;
+            if piece.end > time.0 {
+                let (first, second) = piece.split(time.0);
+                (piece, rest) = (first, Some(second));
+            }
+            if piece.begin < begin {
+                // Its step has gone out, and whoever took it may have filled the gap.
+                count(&mut self.counters.late, 1);
+                piece = piece.split(begin.min(piece.end)).1;
+            }
+            covered += piece.end - piece.begin;
+            if piece.end > begin {
+                for (sum, part) in angle.iter_mut().zip(piece.angle) {
+                    *sum = sum.zip(part).and_then(|(sum, part)| sum.0.checked_add(part.0)).map(Angle);
+                }
+            }
+            if let Some(rest) = rest {
+                let _ = self.pieces.push_front(rest);
+                break;
+            }
+        }
+        if covered == 0 {
+            angle = [None; 3];
+        }
+        Turn { angle, covered: covered as u32 }
+    }
+
+    /// Event counters since start.
+    #[must_use]
+    pub fn counters(&self) -> &IncrementCounters {
+        &self.counters
+    }
+}
+
+impl Piece {
+    /// The parts before and after `time`, which lies in the piece.
+    fn split(self, time: u64) -> (Self, Self) {
+        let whole = i128::from(self.end - self.begin).max(1);
+        let part = i128::from(time.saturating_sub(self.begin));
+        let first = self.angle.map(|angle| angle.map(|a| Angle((i128::from(a.0) * part / whole) as i64)));
+        let pairs = self.angle.iter().zip(first);
+        let mut second = [None; 3];
+        for (to, (all, first)) in second.iter_mut().zip(pairs) {
+            *to = all.zip(first).map(|(all, first)| Angle(all.0 - first.0));
+        }
+        (Self { end: time, angle: first, ..self }, Self { begin: time, angle: second, ..self })
+    }
+}

@@ -1,0 +1,156 @@
+//! An inertial sensor and a fibre-optic gyro, each with its own clock and rate, on one grid.
+//!
+//! Grid steps are the multiples of 10 ms of the board's clock. A step comes out as soon as both
+//! streams have passed it, and [`MAX_DELAY_US`] after its time at the latest, with what there
+//! is by then: no stream waits for the other without a bound. What comes later than that is
+//! not used.
+
+use super::clock::{ClockCounters, ClockError, PartClock};
+use super::increments::{IncrementCounters, Increments, Turn};
+use super::resample::{Quality, Resampler};
+use crate::sample::{FogSample, ImuSample, PERIOD_US};
+use crate::units::Micros;
+
+/// How long a step is waited for.
+pub const MAX_DELAY_US: u64 = 10_000;
+/// After a silence of this length the grid starts anew, at the next step: one second.
+pub const MAX_SILENCE_US: u64 = 1_000_000;
+
+/// What is known of one grid step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Step {
+    /// Its time by the board's clock, a multiple of [`PERIOD_US`].
+    pub time: Micros,
+    /// The inertial sensor at that time.
+    pub imu: Option<(ImuSample, Quality)>,
+    /// What the fibre-optic gyro has turned since the step before.
+    pub fog: Turn,
+}
+
+/// Which streams there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Fitted {
+    /// An inertial sensor.
+    pub imu: bool,
+    /// A fibre-optic gyro.
+    pub fog: bool,
+}
+
+/// Both streams, and where the grid stands.
+#[derive(Debug, Clone)]
+pub struct Streams {
+    fitted: Fitted,
+    max_delay: u64,
+    imu_clock: PartClock,
+    fog_clock: PartClock,
+    imu: Resampler,
+    fog: Increments,
+    /// The step that comes next; set by the first sample.
+    next: Option<u64>,
+    restarts: u32,
+}
+
+impl Streams {
+    /// Nothing received yet.
+    #[must_use]
+    pub fn new(fitted: Fitted) -> Self {
+        Self {
+            fitted,
+            max_delay: MAX_DELAY_US,
+            imu_clock: PartClock::default(),
+            fog_clock: PartClock::default(),
+            imu: Resampler::default(),
+            fog: Increments::default(),
+            next: None,
+            restarts: 0,
+        }
+    }
+
+    /// Waits longer (or less long) than [`MAX_DELAY_US`]: for a replay of a slow recording.
+    #[must_use]
+    pub fn with_max_delay(self, max_delay: Micros) -> Self {
+        Self { max_delay: max_delay.0, ..self }
+    }
+
+    /// Takes a sample of the inertial sensor that has arrived at `now`.
+    ///
+    /// # Errors
+    /// [`ClockError`]: it is not used.
+    pub fn push_imu(&mut self, now: Micros, sample: ImuSample) -> Result<(), ClockError> {
+        let board = self.imu_clock.process(sample.time, now)?;
+        if board.jumped {
+            self.imu.clear();
+        }
+        self.begin(board.time);
+        self.imu.push(ImuSample { time: board.time, ..sample });
+        Ok(())
+    }
+
+    /// Takes a sample of the fibre-optic gyro that has arrived at `now`.
+    ///
+    /// # Errors
+    /// [`ClockError`]: it is not used.
+    pub fn push_fog(&mut self, now: Micros, sample: FogSample) -> Result<(), ClockError> {
+        let board = self.fog_clock.process(sample.time, now)?;
+        if board.jumped {
+            self.fog.disconnect();
+        }
+        self.begin(board.time);
+        self.fog.push(board.time, &sample);
+        Ok(())
+    }
+
+    /// The next step, if it is complete or due. Call it until `None` after every sample, and
+    /// at least every few milliseconds.
+    pub fn next_step(&mut self, now: Micros) -> Option<Step> {
+        let next = self.next?;
+        let imu = !self.fitted.imu || self.imu.has_reached(Micros(next));
+        let fog = !self.fitted.fog || self.fog.has_reached(Micros(next));
+        let waited = now.0.saturating_sub(next);
+        if waited > MAX_SILENCE_US.max(self.max_delay) {
+            // Nobody has asked for a second: these steps are of no use to anyone.
+            self.restarts = self.restarts.saturating_add(1);
+            self.next = Some(now.0.next_multiple_of(PERIOD_US));
+            self.imu.clear();
+            self.fog.clear();
+            return None;
+        }
+        if !(imu && fog) && waited < self.max_delay {
+            return None;
+        }
+        self.next = Some(next + PERIOD_US);
+        let time = Micros(next);
+        Some(Step { time, imu: self.imu.at(time), fog: self.fog.take(time) })
+    }
+
+    /// Events of the inertial sensor's clock.
+    #[must_use]
+    pub fn imu_clock(&self) -> &ClockCounters {
+        self.imu_clock.counters()
+    }
+
+    /// Events of the fibre-optic gyro's clock.
+    #[must_use]
+    pub fn fog_clock(&self) -> &ClockCounters {
+        self.fog_clock.counters()
+    }
+
+    /// Events of the increments.
+    #[must_use]
+    pub fn increments(&self) -> &IncrementCounters {
+        self.fog.counters()
+    }
+
+    /// Times that the grid started anew.
+    #[must_use]
+    pub fn restarts(&self) -> u32 {
+        self.restarts
+    }
+
+    /// The first sample sets the grid: the first step is the next one from there.
+    fn begin(&mut self, time: Micros) {
+        self.next.get_or_insert(time.0.next_multiple_of(PERIOD_US));
+    }
+}

@@ -1,0 +1,118 @@
+//! What the DSP-1760 can be told: lines of ASCII, ended by LF.
+//!
+//! Settings are taken in configuration mode only. Whether the part sends radians or degrees is
+//! set at the part and cannot be read from a frame; no command for it is known here.
+
+use super::{Dsp1760Config, OutputRate, Rotation, TemperatureUnit};
+use core::fmt::Write;
+use heapless::String;
+
+/// Bytes of the longest line.
+pub const MAX_LINE: usize = 20;
+
+/// One line to the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Command {
+    /// Enters (true) or leaves configuration mode.
+    Configure(bool),
+    /// Messages per second. Two invalid messages follow: [`super::Dsp1760::set_rate`].
+    Rate(OutputRate),
+    /// Increments or rates.
+    Rotation(Rotation),
+    /// Back to the part's own choice.
+    ResetRotation,
+    /// Unit of the temperature field.
+    Temperature(TemperatureUnit),
+    /// Asks for the rate: [`Reply::Rate`] answers.
+    QueryRate,
+}
+
+impl Command {
+    /// The line, LF included.
+    #[must_use]
+    pub fn emit(&self) -> String<MAX_LINE> {
+        let mut line = String::new();
+        // MAX_LINE bytes hold every line.
+        let _ = match self {
+            Self::Configure(on) => write!(line, "=config,{}", u8::from(*on)),
+            Self::Rate(rate) => write!(line, "=dr,{}", rate.hertz()),
+            Self::Rotation(Rotation::Delta) => line.write_str("=rotfmt,delta"),
+            Self::Rotation(Rotation::Rate) => line.write_str("=rotfmt,rate"),
+            Self::ResetRotation => line.write_str("=rotfmt,reset"),
+            Self::Temperature(TemperatureUnit::Whole) => line.write_str("=tempunits,C"),
+            Self::Temperature(TemperatureUnit::Hundredths) => line.write_str("=tempunits,C_100"),
+            Self::QueryRate => line.write_str("?DR"),
+        };
+        let _ = line.push('\n');
+        line
+    }
+
+    /// Reads a line, as the part does: case and the blanks around it do not matter.
+    #[must_use]
+    pub fn parse(line: &[u8]) -> Option<Self> {
+        let line = core::str::from_utf8(line).ok()?.trim();
+        if line.eq_ignore_ascii_case("?dr") {
+            return Some(Self::QueryRate);
+        }
+        let (name, value) = line.strip_prefix('=')?.split_once(',')?;
+        let is = |word| value.eq_ignore_ascii_case(word);
+        if name.eq_ignore_ascii_case("config") {
+            return if is("1") {
+                Some(Self::Configure(true))
+            } else {
+                is("0").then_some(Self::Configure(false))
+            };
+        }
+        if name.eq_ignore_ascii_case("dr") {
+            return value.parse().ok().and_then(OutputRate::new).map(Self::Rate);
+        }
+        let choices: &[(&str, &str, Self)] = &[
+            ("rotfmt", "delta", Self::Rotation(Rotation::Delta)),
+            ("rotfmt", "rate", Self::Rotation(Rotation::Rate)),
+            ("rotfmt", "reset", Self::ResetRotation),
+            ("tempunits", "c", Self::Temperature(TemperatureUnit::Whole)),
+            ("tempunits", "c_100", Self::Temperature(TemperatureUnit::Hundredths)),
+        ];
+        choices.iter().find(|(n, v, _)| name.eq_ignore_ascii_case(n) && is(v)).map(|(.., command)| *command)
+    }
+}
+
+/// The lines that bring a part to a configuration, in order. Its messages stop meanwhile.
+#[must_use]
+pub const fn setup(config: &Dsp1760Config) -> [Command; 5] {
+    [
+        Command::Configure(true),
+        Command::Rate(config.rate),
+        Command::Rotation(config.rotation),
+        Command::Temperature(config.temperature),
+        Command::Configure(false),
+    ]
+}
+
+/// A line from the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reply {
+    /// Messages per second.
+    Rate(OutputRate),
+}
+
+impl Reply {
+    /// Reads a line such as `DR,1000`; `None` for any other.
+    #[must_use]
+    pub fn parse(line: &[u8]) -> Option<Self> {
+        let (name, value) = core::str::from_utf8(line).ok()?.trim().split_once(',')?;
+        let rate = || value.parse().ok().and_then(OutputRate::new).map(Self::Rate);
+        if name.eq_ignore_ascii_case("dr") { rate() } else { None }
+    }
+
+    /// The line, CR and LF included.
+    #[must_use]
+    pub fn emit(&self) -> String<MAX_LINE> {
+        let mut line = String::new();
+        let Self::Rate(rate) = self;
+        let _ = write!(line, "DR,{}\r\n", rate.hertz());
+        line
+    }
+}

@@ -1,0 +1,260 @@
+//! One data message of the DSP-1760, field by field.
+//!
+//! | offset | format A, 36 bytes | format B, 40 bytes | format C, 38 bytes |
+//! |---|---|---|---|
+//! | 0 | FE 81 FF 55 | FE 81 FF 56 | FE 81 FF 57 |
+//! | 4 | f32 rotation x, y, z | same | same |
+//! | 16 | f32 acceleration x, y, z | same | same |
+//! | 28 | status, sequence | u32 time, microseconds | f32 temperature or field |
+//! | 30 | i16 temperature | (time) | (f32) |
+//! | 32 | CRC | status, sequence, i16 temperature | status, sequence |
+//! | end | | CRC at 36 | CRC at 34 |
+//!
+//! Everything is big-endian. Format C's length is an inference: no recorded frame of it was at
+//! hand, its fields add up to 38 bytes, and a test script for these parts counts as many. If
+//! it is wrong, no frame of that format passes its CRC: nothing wrong comes out.
+
+use crate::sensor::crc::CRC_32_MPEG_2;
+use heapless::Vec;
+
+/// The longest message.
+pub const MAX_MESSAGE: usize = 40;
+/// What every data message begins with; the format byte follows.
+const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
+/// The largest sequence number; 0 follows it.
+pub const MAX_SEQUENCE: u8 = 127;
+
+/// Layout of a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Format {
+    /// Without time stamp.
+    A,
+    /// With a time stamp.
+    B,
+    /// With one slow reading in turn.
+    C,
+}
+
+impl Format {
+    /// The format that the first four bytes announce.
+    #[must_use]
+    pub const fn of(header: [u8; 4]) -> Option<Self> {
+        match header {
+            [0xFE, 0x81, 0xFF, 0x55] => Some(Self::A),
+            [0xFE, 0x81, 0xFF, 0x56] => Some(Self::B),
+            [0xFE, 0x81, 0xFF, 0x57] => Some(Self::C),
+            _ => None,
+        }
+    }
+
+    /// Bytes of a whole message.
+    #[must_use]
+    pub const fn length(self) -> usize {
+        match self {
+            Self::A => 36,
+            Self::B => 40,
+            Self::C => 38,
+        }
+    }
+
+    const fn header_byte(self) -> u8 {
+        match self {
+            Self::A => 0x55,
+            Self::B => 0x56,
+            Self::C => 0x57,
+        }
+    }
+}
+
+/// Which readings are good, one bit each; bits 3 and 7 are 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Validity(pub u8);
+
+impl Validity {
+    /// All three gyro axes.
+    pub const GYRO: Self = Self(0x07);
+    /// All gyro and accelerometer axes.
+    pub const ALL: Self = Self(0x77);
+
+    /// Whether the gyro about `axis` (0 to 2) is good: the part drops the bit in saturation.
+    #[must_use]
+    pub const fn gyro(self, axis: usize) -> bool {
+        axis < 3 && self.0 & 1 << axis != 0
+    }
+
+    /// Whether the accelerometer along `axis` (0 to 2) is good.
+    #[must_use]
+    pub const fn accelerometer(self, axis: usize) -> bool {
+        axis < 3 && self.0 & 0x10 << axis != 0
+    }
+}
+
+/// What only some formats carry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Extra {
+    /// Format A: a temperature in the unit that the part is set to.
+    Temperature(i16),
+    /// Format B.
+    Timed {
+        /// Microseconds, wraps.
+        time: u32,
+        /// As in format A.
+        temperature: i16,
+    },
+    /// Format C: temperature or magnetic field x, y, z by sequence number modulo 4.
+    Slow(f32),
+}
+
+/// Why bytes are no message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum MessageError {
+    /// No header of a data message.
+    Header,
+    /// Not as long as the header announces.
+    Length {
+        /// Bytes given.
+        got: usize,
+        /// Bytes announced.
+        expected: usize,
+    },
+    /// The checksum does not fit.
+    Crc {
+        /// Of the bytes before it.
+        computed: u32,
+        /// The one in the message.
+        stored: u32,
+    },
+    /// A sequence number above [`MAX_SEQUENCE`].
+    Sequence {
+        /// The number.
+        got: u8,
+    },
+}
+
+impl core::fmt::Display for MessageError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Header => write!(f, "DSP-1760: no header of a data message"),
+            Self::Length { got, expected } => {
+                write!(f, "DSP-1760: {got} bytes where the header announces {expected}")
+            }
+            Self::Crc { computed, stored } => {
+                write!(f, "DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")
+            }
+            Self::Sequence { got } => write!(f, "DSP-1760: sequence number {got}, above {MAX_SEQUENCE}"),
+        }
+    }
+}
+
+impl core::error::Error for MessageError {}
+
+/// A data message as it stands on the wire.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Message {
+    /// Increment or rate about x, y, z, in the unit that the part is set to.
+    pub rotation: [f32; 3],
+    /// Specific force x, y, z in g; the DSP-1760 has none, the 17xx units do.
+    pub acceleration: [f32; 3],
+    /// What the format adds.
+    pub extra: Extra,
+    /// Which readings are good.
+    pub validity: Validity,
+    /// 0 to [`MAX_SEQUENCE`].
+    pub sequence: u8,
+}
+
+impl Message {
+    /// The layout that this message is sent in.
+    #[must_use]
+    pub const fn format(&self) -> Format {
+        match self.extra {
+            Extra::Temperature(_) => Format::A,
+            Extra::Timed { .. } => Format::B,
+            Extra::Slow(_) => Format::C,
+        }
+    }
+
+    /// Reads a whole message. A reading that is no number loses its valid bit.
+    ///
+    /// # Errors
+    /// [`MessageError`].
+    pub fn parse(frame: &[u8]) -> Result<Self, MessageError> {
+        let format = frame.first_chunk().copied().and_then(Format::of).ok_or(MessageError::Header)?;
+        let length = MessageError::Length { got: frame.len(), expected: format.length() };
+        if frame.len() != format.length() {
+            return Err(length);
+        }
+        let (content, stored) = frame.split_last_chunk::<4>().ok_or(length)?;
+        let (computed, stored) = (CRC_32_MPEG_2.checksum(content), u32::from_be_bytes(*stored));
+        if computed != stored {
+            return Err(MessageError::Crc { computed, stored });
+        }
+        let (readings, tail) = content.get(4..).and_then(|rest| rest.split_at_checked(24)).ok_or(length)?;
+        let (words, _) = readings.as_chunks::<4>();
+        let reading = |n: usize| words.get(n).map_or(f32::NAN, |word| f32::from_be_bytes(*word));
+        let rotation = core::array::from_fn(reading);
+        let acceleration = core::array::from_fn(|axis| reading(3 + axis));
+        let (extra, status, sequence) = match *tail {
+            [status, sequence, t1, t0] => {
+                (Extra::Temperature(i16::from_be_bytes([t1, t0])), status, sequence)
+            }
+            [u3, u2, u1, u0, status, sequence, t1, t0] => {
+                let time = u32::from_be_bytes([u3, u2, u1, u0]);
+                (Extra::Timed { time, temperature: i16::from_be_bytes([t1, t0]) }, status, sequence)
+            }
+            [f3, f2, f1, f0, status, sequence] => {
+                (Extra::Slow(f32::from_be_bytes([f3, f2, f1, f0])), status, sequence)
+            }
+            _ => return Err(length),
+        };
+        if sequence > MAX_SEQUENCE {
+            return Err(MessageError::Sequence { got: sequence });
+        }
+        let validity = Validity(status & numbers(&rotation, &acceleration));
+        Ok(Self { rotation, acceleration, extra, validity, sequence })
+    }
+
+    /// The message's bytes, CRC included.
+    #[must_use]
+    pub fn emit(&self) -> Vec<u8, MAX_MESSAGE> {
+        let mut frame = Vec::new();
+        // Every format has room in MAX_MESSAGE bytes.
+        let mut put = |bytes: &[u8]| drop(frame.extend_from_slice(bytes));
+        put(&PREFIX);
+        put(&[self.format().header_byte()]);
+        self.rotation.iter().chain(&self.acceleration).for_each(|reading| put(&reading.to_be_bytes()));
+        let counted = [self.validity.0, self.sequence & MAX_SEQUENCE];
+        match self.extra {
+            Extra::Temperature(temperature) => {
+                put(&counted);
+                put(&temperature.to_be_bytes());
+            }
+            Extra::Timed { time, temperature } => {
+                put(&time.to_be_bytes());
+                put(&counted);
+                put(&temperature.to_be_bytes());
+            }
+            Extra::Slow(reading) => {
+                put(&reading.to_be_bytes());
+                put(&counted);
+            }
+        }
+        let crc = CRC_32_MPEG_2.checksum(&frame);
+        let _ = frame.extend_from_slice(&crc.to_be_bytes());
+        frame
+    }
+}
+
+/// Status bits that may stay set: those of finite readings, and the two that mean nothing.
+fn numbers(rotation: &[f32; 3], acceleration: &[f32; 3]) -> u8 {
+    let bits = |readings: &[f32; 3]| {
+        (0u8..).zip(readings).fold(0, |bits, (axis, reading)| bits | u8::from(reading.is_finite()) << axis)
+    };
+    bits(rotation) | bits(acceleration) << 4 | 0x88
+}

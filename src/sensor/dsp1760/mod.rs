@@ -1,0 +1,222 @@
+//! KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which speak the same): RS-422,
+//! 921600 8N1 at 1000 messages a second.
+//!
+//! The bytes do not say whether rotations are increments or rates, radians or degrees: that is
+//! [`Dsp1760Config`]. Format A and C carry no time, only a sequence number; their time is the
+//! number of messages, lost ones included, times the period. A loss of 128 messages or more is
+//! not seen in a number that wraps at 128; format B tells it, or the arrival times do
+//! ([`crate::align`]).
+
+pub mod command;
+mod config;
+mod framing;
+pub mod message;
+
+pub use config::{AngleUnit, Dsp1760Config, OutputRate, Rotation, TemperatureUnit};
+pub use framing::Kvh;
+
+use super::framer::Framer;
+use crate::health::count;
+use crate::sample::FogSample;
+use crate::units::{Angle, CentiCelsius, Micros};
+use framing::BIT_HEADER;
+use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity};
+
+/// Why an intact frame gives no sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Dsp1760Error {
+    /// Its content makes no sense.
+    Message(MessageError),
+    /// The sequence number of the message before: the same message twice.
+    Repeated {
+        /// The number.
+        sequence: u8,
+    },
+}
+
+impl core::fmt::Display for Dsp1760Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Message(error) => error.fmt(f),
+            Self::Repeated { sequence } => write!(f, "DSP-1760: message {sequence} came twice"),
+        }
+    }
+}
+
+impl core::error::Error for Dsp1760Error {}
+
+/// How often each kind of event happened. They saturate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Dsp1760Counters {
+    /// Times that the sequence number went on by more than one.
+    pub gaps: u32,
+    /// Messages missing in these gaps.
+    pub lost: u32,
+    /// Messages that came twice.
+    pub repeated: u32,
+    /// Built-in-test messages passed over.
+    pub self_tests: u32,
+    /// Messages dropped after a change of rate.
+    pub settling: u32,
+    /// Rotations that were marked as good but that no gyro can measure.
+    pub implausible: u32,
+}
+
+/// Messages without meaning after a change of rate.
+const SETTLING: u8 = 2;
+/// The fastest rotation that is believed, rad/s: the part itself ends at 490 deg/s.
+const MAX_RATE: f32 = 16.0;
+
+/// A DSP-1760 at the end of a cable: bytes in, increments with unwrapped time out.
+#[derive(Debug, Clone)]
+pub struct Dsp1760 {
+    config: Dsp1760Config,
+    framer: Framer<Kvh, MAX_MESSAGE>,
+    last_sequence: Option<u8>,
+    /// Messages since the start, lost ones included.
+    messages: u64,
+    /// Last time stamp of format B and the time it stands for.
+    stamp: Option<(u32, u64)>,
+    settling: u8,
+    counters: Dsp1760Counters,
+}
+
+impl Dsp1760 {
+    /// Nothing received yet.
+    #[must_use]
+    pub const fn new(config: Dsp1760Config) -> Self {
+        Self {
+            config,
+            framer: Framer::new(),
+            last_sequence: None,
+            messages: 0,
+            stamp: None,
+            settling: 0,
+            counters: Dsp1760Counters {
+                gaps: 0,
+                lost: 0,
+                repeated: 0,
+                self_tests: 0,
+                settling: 0,
+                implausible: 0,
+            },
+        }
+    }
+
+    /// The part has been told another rate: the next two messages say nothing, and the count
+    /// of messages begins anew.
+    pub fn set_rate(&mut self, rate: OutputRate) {
+        self.config.rate = rate;
+        self.settling = SETTLING;
+        self.last_sequence = None;
+        self.messages = 0;
+        self.stamp = None;
+    }
+
+    /// Takes one byte. Call [`Dsp1760::next_sample`] until `None` before the next one.
+    pub fn push(&mut self, byte: u8) {
+        self.framer.push(byte);
+    }
+
+    /// The next sample, or why an intact frame is none. Built-in-test messages and those that
+    /// settle are passed over.
+    pub fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
+        loop {
+            let frame = self.framer.next_frame()?;
+            if frame.starts_with(&BIT_HEADER) {
+                count(&mut self.counters.self_tests, 1);
+                continue;
+            }
+            let message = match Message::parse(frame) {
+                Ok(message) => message,
+                Err(error) => return Some(Err(Dsp1760Error::Message(error))),
+            };
+            if self.settling > 0 {
+                self.settling -= 1;
+                count(&mut self.counters.settling, 1);
+                continue;
+            }
+            return Some(self.sample(&message));
+        }
+    }
+
+    /// Candidates whose checksum did not fit.
+    #[must_use]
+    pub fn bad_checksums(&self) -> u32 {
+        self.framer.bad_checksums()
+    }
+
+    /// Event counters since start.
+    #[must_use]
+    pub fn counters(&self) -> &Dsp1760Counters {
+        &self.counters
+    }
+
+    fn sample(&mut self, message: &Message) -> Result<FogSample, Dsp1760Error> {
+        let sequence = message.sequence;
+        let steps = self.last_sequence.map_or(1, |last| sequence.wrapping_sub(last) & MAX_SEQUENCE);
+        if steps == 0 {
+            count(&mut self.counters.repeated, 1);
+            return Err(Dsp1760Error::Repeated { sequence });
+        }
+        self.last_sequence = Some(sequence);
+        let lost = u32::from(steps) - 1;
+        count(&mut self.counters.gaps, u32::from(lost > 0));
+        count(&mut self.counters.lost, lost);
+        let begin = self.config.rate.time(self.messages + u64::from(lost));
+        self.messages += u64::from(steps);
+        let end = self.config.rate.time(self.messages);
+        let (time, temperature) = match message.extra {
+            Extra::Temperature(temperature) => (end, Some(temperature)),
+            Extra::Timed { time, temperature } => (self.unwrap_stamp(time), Some(temperature)),
+            Extra::Slow(_) => (end, None),
+        };
+        let span = (end - begin) as u32;
+        let increment = self.increments(&message.rotation, message.validity, span);
+        let temperature = temperature.and_then(|code| self.centi_celsius(code));
+        Ok(FogSample { time: Micros(time), span, lost, increment, temperature })
+    }
+
+    fn increments(&mut self, rotation: &[f32; 3], validity: Validity, span: u32) -> [Option<Angle>; 3] {
+        let seconds = span as f32 * 1e-6;
+        let per_unit = match self.config.angle {
+            AngleUnit::Radians => 1.0,
+            AngleUnit::Degrees => core::f32::consts::PI / 180.0,
+        };
+        let scale = match self.config.rotation {
+            Rotation::Delta => per_unit,
+            Rotation::Rate => per_unit * seconds,
+        };
+        let limit = MAX_RATE * seconds;
+        core::array::from_fn(|axis| {
+            if !validity.gyro(axis) {
+                return None;
+            }
+            let angle = rotation[axis] * scale;
+            let believed = angle >= -limit && angle <= limit;
+            count(&mut self.counters.implausible, u32::from(!believed));
+            if believed { Angle::from_rad(angle).ok() } else { None }
+        })
+    }
+
+    fn centi_celsius(&self, code: i16) -> Option<CentiCelsius> {
+        match self.config.temperature {
+            TemperatureUnit::Hundredths => Some(CentiCelsius(code)),
+            TemperatureUnit::Whole => code.checked_mul(100).map(CentiCelsius),
+        }
+    }
+
+    /// Microseconds of 32 bits (71 minutes) to ones that never wrap. A stamp that goes back by
+    /// less than half the range is a step back, not a wrap.
+    fn unwrap_stamp(&mut self, stamp: u32) -> u64 {
+        let time = match self.stamp {
+            None => u64::from(stamp),
+            Some((last, base)) => base.saturating_add_signed(i64::from(stamp.wrapping_sub(last) as i32)),
+        };
+        self.stamp = Some((stamp, time));
+        time
+    }
+}

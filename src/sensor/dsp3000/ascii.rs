@@ -1,0 +1,142 @@
+//! The DSP-3000's lines of text.
+//!
+//! A line is a decimal number, blanks and `1` (valid) or `0` (fault), ended by CR and LF.
+//! Implementations differ in the width of the line, so blanks are trimmed and the line end is
+//! the only framing. There is no checksum: a damaged digit is a wrong number. What is not
+//! exactly a line is refused, and a reading is good only if the caller finds it plausible too.
+
+use super::Mode;
+use crate::sample::FogSample;
+use crate::units::Micros;
+use core::fmt::Write;
+use heapless::{String, Vec};
+
+/// Longer than any line that the part sends.
+pub const MAX_LINE: usize = 32;
+/// Millionths of a degree in a degree, the unit of the last digit.
+const MILLIONTHS: u32 = 1_000_000;
+
+/// A number as the part sends it: deg/s, deg, or deg modulo 360, by [`super::Mode`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Reading {
+    /// In millionths of the unit, exact.
+    pub millionths: i32,
+    /// The part says that it is good.
+    pub valid: bool,
+}
+
+/// Why a line is no reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum LineError {
+    /// Not of the form `[-]ddd.dddddd y`.
+    Form,
+    /// Longer than [`MAX_LINE`].
+    TooLong,
+}
+
+impl core::fmt::Display for LineError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Form => "DSP-3000: a line that is no number with a validity",
+            Self::TooLong => "DSP-3000: a line without an end",
+        })
+    }
+}
+
+impl core::error::Error for LineError {}
+
+impl Reading {
+    /// Reads a line without its CR and LF.
+    ///
+    /// # Errors
+    /// [`LineError::Form`].
+    pub fn parse(line: &[u8]) -> Result<Self, LineError> {
+        let line = line.trim_ascii();
+        let (number, valid) = match line {
+            [number @ .., b'1'] => (number, true),
+            [number @ .., b'0'] => (number, false),
+            _ => return Err(LineError::Form),
+        };
+        // At least one blank parts number and validity.
+        let trimmed = number.trim_ascii_end();
+        if trimmed.len() == number.len() {
+            return Err(LineError::Form);
+        }
+        let (digits, sign) = trimmed.strip_prefix(b"-").map_or((trimmed, 1), |digits| (digits, -1));
+        let point = digits.iter().position(|byte| *byte == b'.').ok_or(LineError::Form)?;
+        let (whole, fraction) = digits.split_at_checked(point).ok_or(LineError::Form)?;
+        let fraction = fraction.get(1..).filter(|fraction| fraction.len() == 6).ok_or(LineError::Form)?;
+        if whole.is_empty() || whole.len() > 3 {
+            return Err(LineError::Form);
+        }
+        let millionths = decimal(whole)? * MILLIONTHS + decimal(fraction)?;
+        // Three digits before the point: below 10^9.
+        Ok(Self { millionths: sign * millionths as i32, valid })
+    }
+
+    /// The sample of a rate or increment that arrived at `now` and stands for `span`
+    /// microseconds. `None` for an integrated angle: set the part to increments instead.
+    #[must_use]
+    pub fn sample(&self, mode: Mode, now: Micros, span: u32) -> Option<FogSample> {
+        super::sample(mode, self.millionths as f32 * 1e-6, self.valid, now, span)
+    }
+
+    /// The line, CR and LF included; what has more than three digits before the point is cut to
+    /// the largest number that has not.
+    #[must_use]
+    pub fn emit(&self) -> String<MAX_LINE> {
+        let mut line = String::new();
+        let magnitude = self.millionths.unsigned_abs().min(1_000 * MILLIONTHS - 1);
+        let sign = if self.millionths < 0 { "-" } else { "" };
+        let (whole, fraction) = (magnitude / MILLIONTHS, magnitude % MILLIONTHS);
+        let _ = write!(line, "{sign}{whole}.{fraction:06} {}\r\n", u8::from(self.valid));
+        line
+    }
+}
+
+/// At most six digits.
+fn decimal(digits: &[u8]) -> Result<u32, LineError> {
+    digits.iter().try_fold(0, |value, byte| match byte {
+        b'0'..=b'9' => Ok(value * 10 + u32::from(byte - b'0')),
+        _ => Err(LineError::Form),
+    })
+}
+
+/// Lines out of bytes.
+#[derive(Debug, Clone, Default)]
+pub struct Dsp3000Ascii {
+    line: Vec<u8, MAX_LINE>,
+    /// The line has outgrown its place: nothing counts until it ends.
+    too_long: bool,
+}
+
+impl Dsp3000Ascii {
+    /// Nothing received yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { line: Vec::new(), too_long: false }
+    }
+
+    /// Takes one byte; a line that it ends is a reading or an error. Empty lines are nothing.
+    /// The first line may be half a one, and half a number is a number: drop it if the part
+    /// was already sending when the line was opened.
+    pub fn push(&mut self, byte: u8) -> Option<Result<Reading, LineError>> {
+        if byte != b'\r' && byte != b'\n' {
+            self.too_long |= self.line.push(byte).is_err();
+            return None;
+        }
+        let result = if self.too_long {
+            Some(Err(LineError::TooLong))
+        } else if self.line.trim_ascii().is_empty() {
+            None
+        } else {
+            Some(Reading::parse(&self.line))
+        };
+        self.line.clear();
+        self.too_long = false;
+        result
+    }
+}

@@ -1,0 +1,187 @@
+//! The DSP-3000's words of 32 bits, most significant byte first.
+//!
+//! | bit | content |
+//! |---|---|
+//! | 31 | valid |
+//! | 30-29 | sync |
+//! | 28-27 | 0 rate, 1 incremental, 2 integrated |
+//! | 26 | odd parity over all 32 bits |
+//! | 25-0 | two's complement; integrated: 25-23 turns, 22-0 angle within a turn |
+//!
+//! One parity bit is a weak check, so a byte more or less would give wrong numbers half of the
+//! time. Two things hold the stream together. The part is silent for 0.65 of every
+//! millisecond: who calls [`Dsp3000Binary::pause`] then gets no wrong word from a lost byte.
+//! And a part sends one type: [`Dsp3000Binary`] believes a phase of the four bytes only after
+//! [`LOCK`] good words of the expected type and sync in a row, and looks for it anew after one
+//! bad word. Without the pauses a lost byte gives
+//! wrong readings until a word fails, and there is no bound on how many: a test saw four.
+
+use super::Mode;
+use crate::sample::FogSample;
+use crate::units::Micros;
+use heapless::Vec;
+
+/// deg/s of a rate's last bit.
+pub const RATE_LSB: f64 = 60e-6;
+/// deg of an increment's last bit.
+pub const INCREMENT_LSB: f64 = 6e-6;
+/// deg of an integrated angle's last bit: 360 / 2^23.
+pub const ANGLE_LSB: f64 = 360.0 / (1 << 23) as f64;
+/// Good words in a row before the first is believed.
+pub const LOCK: u8 = 4;
+
+const VALID: u32 = 1 << 31;
+const PARITY: u32 = 1 << 26;
+const VALUE_MASK: u32 = PARITY - 1;
+
+/// A word's content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Word {
+    /// The part says that it is good.
+    pub valid: bool,
+    /// 0 to 3.
+    pub sync: u8,
+    /// What the value is.
+    pub mode: Mode,
+    /// 26 bits, two's complement. For [`Mode::Integrated`] turns and angle together: the bits
+    /// above 22 count turns, so the whole is an angle that wraps after eight turns.
+    pub value: i32,
+}
+
+/// Why four bytes are no word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum WordError {
+    /// An even number of ones.
+    Parity {
+        /// The word.
+        word: u32,
+    },
+    /// Type 3, which does not exist.
+    Type {
+        /// The word.
+        word: u32,
+    },
+}
+
+impl core::fmt::Display for WordError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Parity { word } => write!(f, "DSP-3000: word {word:08x} has even parity"),
+            Self::Type { word } => write!(f, "DSP-3000: word {word:08x} is of no known type"),
+        }
+    }
+}
+
+impl core::error::Error for WordError {}
+
+impl Word {
+    /// Reads a word.
+    ///
+    /// # Errors
+    /// [`WordError`].
+    pub fn parse(bytes: [u8; 4]) -> Result<Self, WordError> {
+        let word = u32::from_be_bytes(bytes);
+        if word.count_ones().is_multiple_of(2) {
+            return Err(WordError::Parity { word });
+        }
+        let mode = match word >> 27 & 3 {
+            0 => Mode::Rate,
+            1 => Mode::Incremental,
+            2 => Mode::Integrated,
+            _ => return Err(WordError::Type { word }),
+        };
+        let value = ((word & VALUE_MASK) << 6) as i32 >> 6;
+        Ok(Self { valid: word & VALID != 0, sync: (word >> 29 & 3) as u8, mode, value })
+    }
+
+    /// The word's bytes. Of the value, the low 26 bits are sent.
+    #[must_use]
+    pub const fn emit(&self) -> [u8; 4] {
+        let mode = match self.mode {
+            Mode::Rate => 0,
+            Mode::Incremental => 1,
+            Mode::Integrated => 2,
+        };
+        let valid = if self.valid { VALID } else { 0 };
+        let word = valid | (self.sync as u32 & 3) << 29 | mode << 27 | self.value as u32 & VALUE_MASK;
+        let parity = if word.count_ones().is_multiple_of(2) { PARITY } else { 0 };
+        (word | parity).to_be_bytes()
+    }
+
+    /// The sample of a rate or increment that arrived at `now` and stands for `span`
+    /// microseconds. `None` for an integrated angle: set the part to increments instead.
+    #[must_use]
+    pub fn sample(&self, now: Micros, span: u32) -> Option<FogSample> {
+        super::sample(self.mode, self.degrees() as f32, self.valid, now, span)
+    }
+
+    /// Rate in deg/s, increment or angle in deg; an angle has its turns in it.
+    #[must_use]
+    pub fn degrees(&self) -> f64 {
+        let lsb = match self.mode {
+            Mode::Rate => RATE_LSB,
+            Mode::Incremental => INCREMENT_LSB,
+            Mode::Integrated => ANGLE_LSB,
+        };
+        f64::from(self.value) * lsb
+    }
+}
+
+/// Words out of bytes.
+#[derive(Debug, Clone)]
+pub struct Dsp3000Binary {
+    mode: Mode,
+    sync: u8,
+    bytes: Vec<u8, 4>,
+    /// Good words in a row.
+    good: u8,
+    /// Times that the phase was lost.
+    losses: u32,
+}
+
+impl Dsp3000Binary {
+    /// A part that is set to send this type with these sync bits.
+    #[must_use]
+    pub const fn new(mode: Mode, sync: u8) -> Self {
+        Self { mode, sync: sync & 3, bytes: Vec::new(), good: 0, losses: 0 }
+    }
+
+    /// Takes one byte; the fourth of a word may give a reading.
+    pub fn push(&mut self, byte: u8) -> Option<Word> {
+        // Three at most are kept between calls.
+        let _ = self.bytes.push(byte);
+        let bytes: [u8; 4] = self.bytes.as_slice().try_into().ok()?;
+        match Word::parse(bytes) {
+            Ok(word) if word.mode == self.mode && word.sync == self.sync => {
+                self.bytes.clear();
+                self.good = (self.good + 1).min(LOCK);
+                (self.good == LOCK).then_some(word)
+            }
+            _ => {
+                self.losses = self.losses.saturating_add(u32::from(self.good == LOCK));
+                self.good = 0;
+                self.bytes.remove(0);
+                None
+            }
+        }
+    }
+
+    /// The line has been silent for longer than a few bytes take (more than 0.3 ms): what was
+    /// begun is no word, and the next byte begins one.
+    pub fn pause(&mut self) {
+        if !self.bytes.is_empty() {
+            self.losses = self.losses.saturating_add(u32::from(self.good == LOCK));
+            self.good = 0;
+            self.bytes.clear();
+        }
+    }
+
+    /// Times that a believed phase turned out bad.
+    #[must_use]
+    pub fn losses(&self) -> u32 {
+        self.losses
+    }
+}

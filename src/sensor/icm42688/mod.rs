@@ -1,0 +1,328 @@
+//! TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
+//!
+//! [`packet`] is what its FIFO holds, sans I/O; [`registers`] its registers; this file talks to
+//! it. Every wait is bounded by counts of [`DelayNs`]. At each read one register of the
+//! configuration is read back in turn, so that a part that has reset itself or lost a bit is
+//! noticed within [`SETTINGS`] reads, not never.
+
+pub mod packet;
+pub mod registers;
+
+use crate::sample::ImuSample;
+use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{Operation, SpiDevice};
+use packet::{MAX_PACKET, Packet, PacketError, Resolution};
+use registers::{self as reg, Register, Setting, aaf_258_hz};
+
+/// Samples per second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum OutputRate {
+    /// 100.
+    #[default]
+    Hz100,
+    /// 1000.
+    Hz1000,
+}
+
+impl OutputRate {
+    /// Low nibble of the two configuration registers.
+    const fn code(self) -> u8 {
+        match self {
+            Self::Hz1000 => 6,
+            Self::Hz100 => 8,
+        }
+    }
+}
+
+/// How the part is set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Icm42688Config {
+    /// Samples per second.
+    pub rate: OutputRate,
+    /// Of the FIFO's packets.
+    pub resolution: Resolution,
+}
+
+impl Icm42688Config {
+    /// What the registers must hold, in the order in which they are written: filters and ranges
+    /// before the sensors are switched on.
+    #[must_use]
+    pub const fn settings(&self) -> [Setting; SETTINGS] {
+        const fn set(register: Register, mask: u8, value: u8) -> Setting {
+            Setting { register, mask, value }
+        }
+        let [square_high, square_low] = aaf_258_hz::DELTSQR.to_be_bytes();
+        let shift = aaf_258_hz::BITSHIFT << 4 | square_high;
+        let content = match self.resolution {
+            Resolution::Bits16 => reg::FIFO_16_BIT,
+            Resolution::Bits20 => reg::FIFO_20_BIT,
+        };
+        [
+            set(reg::INTF_CONFIG0, 0x70, reg::BIG_ENDIAN),
+            set(reg::INTF_CONFIG1, 0xC0, reg::AFSR_OFF),
+            set(reg::GYRO_CONFIG0, 0xEF, reg::GYRO_250_DPS | self.rate.code()),
+            set(reg::ACCEL_CONFIG0, 0xEF, reg::ACCEL_16_G | self.rate.code()),
+            set(reg::GYRO_CONFIG_STATIC2, 0x03, 0),
+            set(reg::GYRO_CONFIG_STATIC3, 0x3F, aaf_258_hz::DELT),
+            set(reg::GYRO_CONFIG_STATIC4, 0xFF, square_low),
+            set(reg::GYRO_CONFIG_STATIC5, 0xFF, shift),
+            set(reg::ACCEL_CONFIG_STATIC2, 0x7F, aaf_258_hz::DELT << 1),
+            set(reg::ACCEL_CONFIG_STATIC3, 0xFF, square_low),
+            set(reg::ACCEL_CONFIG_STATIC4, 0xFF, shift),
+            set(reg::FIFO_CONFIG1, 0x17, content),
+            set(reg::FIFO_CONFIG, 0xC0, reg::FIFO_STREAM),
+            set(reg::PWR_MGMT0, 0x2F, reg::LOW_NOISE),
+        ]
+    }
+}
+
+/// Registers that are set, and checked in turn.
+pub const SETTINGS: usize = 14;
+/// Looks at the reset bit, 1 ms apart.
+const RESET_POLLS: u8 = 10;
+/// The gyro needs this long from switched on to good, ms.
+const START_MS: u32 = 45;
+
+/// What can go wrong with the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Icm42688Error<E> {
+    /// The bus failed.
+    Bus(E),
+    /// The part did not come back from its reset.
+    Reset,
+    /// Another part answers, or none.
+    Identity {
+        /// What it says.
+        got: u8,
+    },
+    /// A register does not hold what was written: configure the part anew.
+    Setting {
+        /// Which register.
+        register: Register,
+        /// What it holds in the bits that are set.
+        got: u8,
+        /// What was written.
+        expected: u8,
+    },
+    /// A packet in which an axis has no reading.
+    NoReading,
+    /// What came out of the FIFO is no packet; the FIFO was emptied.
+    Packet(PacketError),
+}
+
+impl<E: core::fmt::Debug> core::fmt::Display for Icm42688Error<E> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Bus(error) => write!(f, "ICM-42688: the bus failed: {error:?}"),
+            Self::Reset => write!(f, "ICM-42688: no answer after the reset"),
+            Self::Identity { got } => write!(f, "ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY),
+            Self::Setting { register: Register { bank, address }, got, expected } => {
+                write!(
+                    f,
+                    "ICM-42688: register {address:02x} of bank {bank} holds {got:02x}, not {expected:02x}"
+                )
+            }
+            Self::NoReading => write!(f, "ICM-42688: a packet in which an axis has no reading"),
+            Self::Packet(error) => error.fmt(f),
+        }
+    }
+}
+
+impl<E: core::fmt::Debug> core::error::Error for Icm42688Error<E> {}
+
+/// The part on its bus, configured.
+#[derive(Debug)]
+pub struct Icm42688<SPI> {
+    spi: SPI,
+    config: Icm42688Config,
+    /// The setting that is checked next.
+    next_check: usize,
+    clock: Clock,
+}
+
+impl<SPI: SpiDevice> Icm42688<SPI> {
+    /// Resets the part, asks who it is, sets it and reads every setting back.
+    ///
+    /// # Errors
+    /// `Bus`, `Reset`, `Identity` or `Setting`.
+    pub fn new(
+        spi: SPI,
+        config: Icm42688Config,
+        delay: &mut impl DelayNs,
+    ) -> Result<Self, Icm42688Error<SPI::Error>> {
+        let mut part = Self { spi, config, next_check: 0, clock: Clock::default() };
+        part.write(reg::BANK_SEL, 0)?;
+        part.write(reg::DEVICE_CONFIG.address, reg::RESET)?;
+        part.wait_for_reset(delay)?;
+        let got = part.read(reg::WHO_AM_I.address)?;
+        if got != reg::IDENTITY {
+            return Err(Icm42688Error::Identity { got });
+        }
+        for Setting { register, mask, value } in config.settings() {
+            part.in_bank(register, |part| {
+                let held = part.read(register.address)?;
+                part.write(register.address, held & !mask | value)
+            })?;
+        }
+        delay.delay_ms(START_MS);
+        for _ in 0..SETTINGS {
+            part.check_next_setting()?;
+        }
+        part.flush()?;
+        Ok(part)
+    }
+
+    /// The bus back.
+    pub fn destroy(self) -> SPI {
+        self.spi
+    }
+
+    /// The oldest sample in the FIFO, if there is one. Checks one setting each time.
+    ///
+    /// # Errors
+    /// `Bus`, `Setting`, `NoReading` or `Packet`; a sample is not made up.
+    pub fn next_sample(&mut self) -> Result<Option<ImuSample>, Icm42688Error<SPI::Error>> {
+        self.check_next_setting()?;
+        let mut waiting = [0; 2];
+        let address = [reg::FIFO_COUNTH.address | reg::READ];
+        self.transaction(&mut [Operation::Write(&address), Operation::Read(&mut waiting)])?;
+        let bytes = self.config.resolution.bytes();
+        if usize::from(u16::from_be_bytes(waiting)) < bytes {
+            return Ok(None);
+        }
+        let mut buffer = [0; MAX_PACKET];
+        let packet = buffer.get_mut(..bytes).unwrap_or_default();
+        let address = [reg::FIFO_DATA.address | reg::READ];
+        self.transaction(&mut [Operation::Write(&address), Operation::Read(packet)])?;
+        match Packet::parse(self.config.resolution, packet) {
+            Ok(packet) => {
+                let time = self.clock.unwrap(packet.time);
+                sample(&packet, time).map(Some).ok_or(Icm42688Error::NoReading)
+            }
+            Err(PacketError::Empty) => Ok(None),
+            Err(error) => {
+                self.flush()?;
+                Err(Icm42688Error::Packet(error))
+            }
+        }
+    }
+
+    /// Reads one register of the configuration, a different one each time.
+    fn check_next_setting(&mut self) -> Result<(), Icm42688Error<SPI::Error>> {
+        let settings = self.config.settings();
+        let Setting { register, mask, value: expected } = settings[self.next_check % SETTINGS];
+        self.next_check = (self.next_check + 1) % SETTINGS;
+        let got = self.in_bank(register, |part| part.read(register.address))? & mask;
+        if got == expected { Ok(()) } else { Err(Icm42688Error::Setting { register, got, expected }) }
+    }
+
+    fn wait_for_reset(&mut self, delay: &mut impl DelayNs) -> Result<(), Icm42688Error<SPI::Error>> {
+        for _ in 0..RESET_POLLS {
+            delay.delay_ms(1);
+            if self.read(reg::DEVICE_CONFIG.address)? & reg::RESET == 0 {
+                return Ok(());
+            }
+        }
+        Err(Icm42688Error::Reset)
+    }
+
+    fn flush(&mut self) -> Result<(), Icm42688Error<SPI::Error>> {
+        self.write(reg::SIGNAL_PATH_RESET.address, reg::FIFO_FLUSH)
+    }
+
+    /// Does something in a register's bank and goes back to bank 0.
+    fn in_bank<T>(
+        &mut self,
+        register: Register,
+        act: impl FnOnce(&mut Self) -> Result<T, Icm42688Error<SPI::Error>>,
+    ) -> Result<T, Icm42688Error<SPI::Error>> {
+        if register.bank == 0 {
+            return act(self);
+        }
+        self.write(reg::BANK_SEL, register.bank)?;
+        let result = act(self);
+        self.write(reg::BANK_SEL, 0)?;
+        result
+    }
+
+    fn write(&mut self, address: u8, value: u8) -> Result<(), Icm42688Error<SPI::Error>> {
+        self.transaction(&mut [Operation::Write(&[address, value])])
+    }
+
+    fn read(&mut self, address: u8) -> Result<u8, Icm42688Error<SPI::Error>> {
+        let mut value = [0];
+        self.transaction(&mut [Operation::Write(&[address | reg::READ]), Operation::Read(&mut value)])?;
+        let [value] = value;
+        Ok(value)
+    }
+
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Icm42688Error<SPI::Error>> {
+        self.spi.transaction(operations).map_err(Icm42688Error::Bus)
+    }
+}
+
+/// The part's 16-bit microseconds, unwrapped: right as long as two samples are less than
+/// 65 ms apart. A longer silence is told by the arrival times ([`crate::align`]).
+#[derive(Debug, Clone, Copy, Default)]
+struct Clock {
+    last: Option<(u16, u64)>,
+}
+
+impl Clock {
+    fn unwrap(&mut self, time: u16) -> Micros {
+        let now = self.last.map_or(u64::from(time), |(last, at)| at + u64::from(time.wrapping_sub(last)));
+        self.last = Some((time, now));
+        Micros(now)
+    }
+}
+
+/// m/s^2 in a g.
+const GRAVITY: f32 = 9.806_65;
+
+/// The packet's readings in the pipeline's units; `None` where an axis has no reading.
+fn sample(packet: &Packet, time: Micros) -> Option<ImuSample> {
+    let (per_dps, per_g) = match packet.resolution {
+        // At 250 deg/s eight times the 16.4 counts per deg/s that there are at 2000; 16 g.
+        Resolution::Bits16 => (131.0, 2048.0),
+        // Halved they are 131 counts per deg/s, quartered 8192 per g.
+        Resolution::Bits20 => (262.0, 32_768.0),
+    };
+    let rate =
+        |reading: Option<i32>| AngularRate::from_rad_per_sec((reading? as f32 / per_dps).to_radians()).ok();
+    let force =
+        |reading: Option<i32>| SpecificForce::from_metre_per_sec2(reading? as f32 / per_g * GRAVITY).ok();
+    let ([ax, ay, az], [gx, gy, gz]) = (packet.acceleration, packet.rate);
+    let (centi, offset) = match packet.resolution {
+        Resolution::Bits16 => (100.0 / 2.07, 2500.0),
+        Resolution::Bits20 => (100.0 / 132.48, 2500.0),
+    };
+    Some(ImuSample {
+        time,
+        specific_force: [force(ax)?, force(ay)?, force(az)?],
+        angular_rate: [rate(gx)?, rate(gy)?, rate(gz)?],
+        temperature: packet.temperature.map(|code| {
+            // At most 27,000.
+            CentiCelsius(libm::roundf(f32::from(code) * centi + offset) as i16)
+        }),
+        clipped: packet
+            .acceleration
+            .iter()
+            .chain(&packet.rate)
+            .flatten()
+            .any(|r| clipped(packet.resolution, *r)),
+    })
+}
+
+/// The ends of the range. The bits below 16 say nothing there.
+const fn clipped(resolution: Resolution, reading: i32) -> bool {
+    let high = match resolution {
+        Resolution::Bits16 => reading,
+        Resolution::Bits20 => reading >> 4,
+    };
+    high >= 32_767 || high <= -32_767
+}

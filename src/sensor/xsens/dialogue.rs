@@ -1,0 +1,282 @@
+//! How an MTi is brought to send what the pipeline wants.
+//!
+//! GoToConfig, SetOutputConfiguration, GoToMeasurement, each answered by its own identifier
+//! plus one. The rules:
+//! - A message without an answer for [`TIMEOUT`] is sent again, [`ATTEMPTS`] times in all.
+//! - An error frame counts as an attempt, and the message is sent again at once.
+//! - The part may set other outputs than asked for, and says so in its acknowledgement: an
+//!   acceleration or rate of turn at another rate ends the dialogue.
+//! - A part that wakes up (MID 3E) is answered within 500 ms if the caller polls that often; it
+//!   is in configuration mode then.
+//! - Measurements that still come in are passed over.
+//!
+//! No port, no clock: bytes and the time come in, frames to send come out.
+
+use super::mtdata2::id;
+use super::xbus::{self, MAX_FRAME, Xbus};
+use crate::sensor::framer::Framer;
+use crate::units::Micros;
+use heapless::Vec;
+
+/// Message identifiers; an acknowledgement is one more.
+pub mod mid {
+    /// Asks for the device identifier.
+    pub const REQ_DID: u8 = 0x00;
+    /// Starts measuring.
+    pub const GO_TO_MEASUREMENT: u8 = 0x10;
+    /// Stops measuring.
+    pub const GO_TO_CONFIG: u8 = 0x30;
+    /// The part has started.
+    pub const WAKE_UP: u8 = 0x3E;
+    /// The answer to it.
+    pub const WAKE_UP_ACK: u8 = 0x3F;
+    /// The part refuses a message; one byte says why.
+    pub const ERROR: u8 = 0x42;
+    /// Which data at which rate.
+    pub const SET_OUTPUT_CONFIGURATION: u8 = 0xC0;
+}
+
+/// How long an answer may take.
+pub const TIMEOUT: Micros = Micros(500_000);
+/// How often a message is sent before the part is given up.
+pub const ATTEMPTS: u8 = 3;
+/// "With every message": the rate of counters and time stamps.
+const EVERY_MESSAGE: u16 = 0xFFFF;
+
+/// One output of the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Output {
+    /// Data identifier.
+    pub id: u16,
+    /// Hz.
+    pub rate: u16,
+}
+
+/// What the pipeline wants, 100 Hz, all in single precision.
+pub const OUTPUTS: [Output; 6] = [
+    Output { id: id::PACKET_COUNTER, rate: EVERY_MESSAGE },
+    Output { id: id::SAMPLE_TIME_FINE, rate: EVERY_MESSAGE },
+    Output { id: id::ACCELERATION, rate: 100 },
+    Output { id: id::RATE_OF_TURN, rate: 100 },
+    Output { id: id::TEMPERATURE, rate: 1 },
+    Output { id: id::STATUS_WORD, rate: EVERY_MESSAGE },
+];
+
+/// Bytes of the longest frame that the dialogue sends.
+pub const MAX_SENT: usize = 32;
+
+/// A message of the dialogue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Step {
+    /// Stop measuring.
+    GoToConfig,
+    /// Send [`OUTPUTS`].
+    SetOutputConfiguration,
+    /// Start measuring.
+    GoToMeasurement,
+}
+
+impl Step {
+    const fn mid(self) -> u8 {
+        match self {
+            Self::GoToConfig => mid::GO_TO_CONFIG,
+            Self::SetOutputConfiguration => mid::SET_OUTPUT_CONFIGURATION,
+            Self::GoToMeasurement => mid::GO_TO_MEASUREMENT,
+        }
+    }
+
+    /// The step's frame.
+    #[must_use]
+    pub fn emit(self) -> Vec<u8, MAX_SENT> {
+        let mut data = Vec::<u8, 24>::new();
+        if self == Self::SetOutputConfiguration {
+            for output in OUTPUTS {
+                let _ = data.extend_from_slice(&output.id.to_be_bytes());
+                let _ = data.extend_from_slice(&output.rate.to_be_bytes());
+            }
+        }
+        xbus::emit(self.mid(), &data).unwrap_or_default()
+    }
+}
+
+/// Why the dialogue has ended without a part that measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum DialogueError {
+    /// No answer to any attempt.
+    Silent {
+        /// What was asked.
+        step: Step,
+    },
+    /// The last attempt was answered by an error frame.
+    Refused {
+        /// What was asked.
+        step: Step,
+        /// The part's error code.
+        code: u8,
+    },
+    /// The part has set another rate than asked for, or left the output out (rate 0).
+    Output {
+        /// Data identifier.
+        id: u16,
+        /// The rate that it has set, Hz.
+        rate: u16,
+    },
+}
+
+impl core::fmt::Display for DialogueError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Silent { step } => write!(f, "MTi: no answer to {step:?} after {ATTEMPTS} attempts"),
+            Self::Refused { step, code } => write!(f, "MTi: {step:?} is refused with error {code}"),
+            Self::Output { id, rate } => write!(f, "MTi: output {id:04x} is set to {rate} Hz"),
+        }
+    }
+}
+
+impl core::error::Error for DialogueError {}
+
+/// What is to be done now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Action {
+    /// Send these bytes.
+    Send(Vec<u8, MAX_SENT>),
+    /// Nothing; poll again when bytes have come or time has passed.
+    Wait,
+    /// The part measures.
+    Done,
+}
+
+/// Where the dialogue stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// This message is to be sent.
+    Due(Step),
+    /// It was sent, and its answer is due by then.
+    Sent(Step, Micros),
+    Done,
+    Failed(DialogueError),
+}
+
+/// The dialogue with one part.
+#[derive(Debug, Clone)]
+pub struct Dialogue {
+    framer: Framer<Xbus, MAX_FRAME>,
+    state: State,
+    /// Attempts at the current step.
+    attempts: u8,
+    last_error: Option<u8>,
+    /// The part has woken up and waits for the answer.
+    woken: bool,
+}
+
+impl Default for Dialogue {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Dialogue {
+    /// Nothing sent yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        let state = State::Due(Step::GoToConfig);
+        Self { framer: Framer::new(), state, attempts: 0, last_error: None, woken: false }
+    }
+
+    /// Takes one byte from the part.
+    pub fn push(&mut self, byte: u8) {
+        self.framer.push(byte);
+        while let Some((mid, reply)) = self.framer.next_frame().and_then(xbus::parse).map(Reply::new) {
+            self.answer(mid, reply);
+        }
+    }
+
+    /// What is to be done at `now`.
+    ///
+    /// # Errors
+    /// [`DialogueError`], again at each call: the dialogue is over.
+    pub fn poll(&mut self, now: Micros) -> Result<Action, DialogueError> {
+        if core::mem::take(&mut self.woken) {
+            return Ok(Action::Send(xbus::emit(mid::WAKE_UP_ACK, &[]).unwrap_or_default()));
+        }
+        if let State::Sent(step, until) = self.state
+            && now >= until
+        {
+            self.state = State::Due(step);
+        }
+        match self.state {
+            State::Due(step) if self.attempts == ATTEMPTS => {
+                let error = match self.last_error {
+                    Some(code) => DialogueError::Refused { step, code },
+                    None => DialogueError::Silent { step },
+                };
+                self.state = State::Failed(error);
+                Err(error)
+            }
+            State::Due(step) => {
+                self.attempts += 1;
+                self.last_error = None;
+                self.state = State::Sent(step, Micros(now.0.saturating_add(TIMEOUT.0)));
+                Ok(Action::Send(step.emit()))
+            }
+            State::Sent(..) => Ok(Action::Wait),
+            State::Done => Ok(Action::Done),
+            State::Failed(error) => Err(error),
+        }
+    }
+
+    fn answer(&mut self, mid: u8, reply: Reply) {
+        if mid == mid::WAKE_UP && !matches!(self.state, State::Done | State::Failed(_)) {
+            self.woken = true;
+            self.proceed(Step::SetOutputConfiguration);
+            return;
+        }
+        let State::Sent(step, _) = self.state else { return };
+        if mid == mid::ERROR {
+            self.last_error = Some(reply.code);
+            self.state = State::Due(step);
+        } else if mid == step.mid() + 1 {
+            match (step, reply.different) {
+                (Step::GoToConfig, _) => self.proceed(Step::SetOutputConfiguration),
+                (Step::SetOutputConfiguration, Some(Output { id, rate })) => {
+                    self.state = State::Failed(DialogueError::Output { id, rate });
+                }
+                (Step::SetOutputConfiguration, None) => self.proceed(Step::GoToMeasurement),
+                (Step::GoToMeasurement, _) => self.state = State::Done,
+            }
+        }
+    }
+
+    fn proceed(&mut self, step: Step) {
+        self.state = State::Due(step);
+        self.attempts = 0;
+    }
+}
+
+/// What matters of a frame's data, whatever its message is.
+struct Reply {
+    /// Of an error frame.
+    code: u8,
+    /// Of an output configuration: the first output of those that count which is not as asked.
+    different: Option<Output>,
+}
+
+impl Reply {
+    fn new((mid, data): (u8, &[u8])) -> (u8, Self) {
+        let code = data.first().copied().unwrap_or_default();
+        let (words, _) = data.as_chunks::<4>();
+        let set = |id: u16| {
+            let word = words.iter().find(|[hi, lo, ..]| u16::from_be_bytes([*hi, *lo]) == id);
+            word.map_or(0, |[.., hi, lo]| u16::from_be_bytes([*hi, *lo]))
+        };
+        let counts =
+            OUTPUTS.iter().filter(|output| [id::ACCELERATION, id::RATE_OF_TURN].contains(&output.id));
+        let mut set = counts.map(|output| (output.rate, Output { id: output.id, rate: set(output.id) }));
+        let different = set.find(|(rate, set)| *rate != set.rate).map(|(_, set)| set);
+        (mid, Self { code, different })
+    }
+}

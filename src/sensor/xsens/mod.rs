@@ -1,0 +1,93 @@
+//! Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
+//!
+//! Frames are in [`xbus`], the measurements in a frame in [`mtdata2`], the four forms of their
+//! numbers in [`precision`]; [`dialogue`] brings a part to send what the pipeline wants.
+
+pub mod dialogue;
+pub mod mtdata2;
+pub mod precision;
+pub mod xbus;
+
+pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
+pub use xbus::{MAX_FRAME, Xbus};
+
+use super::framer::Framer;
+use crate::sample::ImuSample;
+use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
+use mtdata2::id;
+
+/// Clipping of accelerometer x, y, z and gyro x, y, z in the status word.
+const STATUS_CLIPPED: u32 = 0x3F << 8;
+
+/// An MTi at the end of a cable: bytes in, samples with unwrapped time out.
+#[derive(Debug, Clone, Default)]
+pub struct Mti {
+    framer: Framer<Xbus, MAX_FRAME>,
+    /// Last SampleTimeFine and the time it stands for.
+    time: Option<(u32, u64)>,
+}
+
+impl Mti {
+    /// Nothing received yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { framer: Framer::new(), time: None }
+    }
+
+    /// Takes one byte. Call [`Mti::next_sample`] until `None` before the next one.
+    pub fn push(&mut self, byte: u8) {
+        self.framer.push(byte);
+    }
+
+    /// The next sample, or why an intact data message is none. Other messages are passed over.
+    pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
+        loop {
+            let frame = self.framer.next_frame()?;
+            if frame.get(2) == Some(&MID_MT_DATA2) {
+                let message = frame.get(4..frame.len() - 1).map_or(Ok(MtData2::default()), MtData2::parse);
+                return Some(message.and_then(|message| self.sample(&message)));
+            }
+        }
+    }
+
+    /// Candidates whose checksum did not fit.
+    #[must_use]
+    pub fn bad_checksums(&self) -> u32 {
+        self.framer.bad_checksums()
+    }
+
+    fn sample(&mut self, message: &MtData2) -> Result<ImuSample, XsensError> {
+        let missing = |id| XsensError::Missing { id };
+        let ticks = message.sample_time_fine.ok_or(missing(id::SAMPLE_TIME_FINE))?;
+        let force = message.acceleration.ok_or(missing(id::ACCELERATION))?;
+        let rate = message.rate_of_turn.ok_or(missing(id::RATE_OF_TURN))?;
+        let reading = |id| move |error| XsensError::Reading { id, error };
+        let [fx, fy, fz] = force.map(SpecificForce::from_metre_per_sec2);
+        let [wx, wy, wz] = rate.map(AngularRate::from_rad_per_sec);
+        let (a, r) = (reading(id::ACCELERATION), reading(id::RATE_OF_TURN));
+        Ok(ImuSample {
+            specific_force: [fx.map_err(a)?, fy.map_err(a)?, fz.map_err(a)?],
+            angular_rate: [wx.map_err(r)?, wy.map_err(r)?, wz.map_err(r)?],
+            temperature: message.temperature.and_then(centi_celsius),
+            clipped: message.status.is_some_and(|status| status & STATUS_CLIPPED != 0),
+            time: self.unwrap_time(ticks),
+        })
+    }
+
+    /// 10 kHz ticks of 32 bits (119 hours) to microseconds that never wrap. Ticks that go
+    /// back by less than half the range are a step back, not a wrap.
+    fn unwrap_time(&mut self, ticks: u32) -> Micros {
+        let base = match self.time {
+            None => u64::from(ticks),
+            Some((last, base)) => base.saturating_add_signed(i64::from(ticks.wrapping_sub(last) as i32)),
+        };
+        self.time = Some((ticks, base));
+        Micros(base * 100)
+    }
+}
+
+/// Hundredths of a degree, where the reading is one.
+fn centi_celsius(degrees: f32) -> Option<CentiCelsius> {
+    let code = libm::roundf(degrees * 100.0);
+    (code >= f32::from(i16::MIN) && code <= f32::from(i16::MAX)).then_some(CentiCelsius(code as i16))
+}

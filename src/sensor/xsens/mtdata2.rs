@@ -1,0 +1,186 @@
+//! MTData2 (MID 36): packets `ID ID LEN DATA..`, big-endian. The low nibble of an ID is
+//! precision and coordinate system. The coordinate system is that of orientations; what is read
+//! here is in the axes of the part.
+
+use super::precision::Precision;
+use super::xbus;
+use crate::units::RangeError;
+use heapless::Vec;
+
+/// Message identifier of MTData2.
+pub const MID_MT_DATA2: u8 = 0x36;
+/// Bytes of the longest frame that [`MtData2::emit_as`] makes.
+pub const MAX_EMITTED: usize = 96;
+
+/// Data identifiers, precision and coordinate system masked out.
+pub mod id {
+    /// What is left of an identifier without them.
+    pub const MASK: u16 = 0xFFF0;
+    /// u16.
+    pub const PACKET_COUNTER: u16 = 0x1020;
+    /// u32, 10 kHz ticks.
+    pub const SAMPLE_TIME_FINE: u16 = 0x1060;
+    /// deg C.
+    pub const TEMPERATURE: u16 = 0x0810;
+    /// x, y, z, m/s^2.
+    pub const ACCELERATION: u16 = 0x4020;
+    /// x, y, z, rad/s.
+    pub const RATE_OF_TURN: u16 = 0x8020;
+    /// u32.
+    pub const STATUS_WORD: u16 = 0xE020;
+}
+
+/// Why an intact MTData2 frame gives no sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum XsensError {
+    /// A packet is longer than what is left of the message.
+    Truncated {
+        /// Its identifier.
+        id: u16,
+    },
+    /// A packet that is used has not the length that its precision asks for.
+    Format {
+        /// Its identifier.
+        id: u16,
+    },
+    /// The message lacks a packet that is needed.
+    Missing {
+        /// Its identifier.
+        id: u16,
+    },
+    /// A reading that no part of this kind can measure.
+    Reading {
+        /// Identifier of the packet.
+        id: u16,
+        /// What is wrong with it.
+        error: RangeError,
+    },
+}
+
+impl core::fmt::Display for XsensError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Truncated { id } => write!(f, "MTData2: packet {id:04x} is cut off"),
+            Self::Format { id } => {
+                write!(f, "MTData2: packet {id:04x} is not as long as its precision asks for")
+            }
+            Self::Missing { id } => write!(f, "MTData2: packet {id:04x} is missing"),
+            Self::Reading { id, error } => write!(f, "MTData2: packet {id:04x}: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for XsensError {}
+
+/// What an MTData2 message says, as far as it is used here.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MtData2 {
+    /// Message counter, wraps.
+    pub packet_counter: Option<u16>,
+    /// 10 kHz ticks, wraps.
+    pub sample_time_fine: Option<u32>,
+    /// Specific force x, y, z, m/s^2.
+    pub acceleration: Option<[f32; 3]>,
+    /// Angular rate x, y, z, rad/s.
+    pub rate_of_turn: Option<[f32; 3]>,
+    /// deg C.
+    pub temperature: Option<f32>,
+    /// Status word.
+    pub status: Option<u32>,
+}
+
+impl MtData2 {
+    /// Reads the packets of a message; unknown ones are passed over.
+    ///
+    /// # Errors
+    /// [`XsensError::Truncated`] and [`XsensError::Format`].
+    pub fn parse(mut data: &[u8]) -> Result<Self, XsensError> {
+        let mut message = Self::default();
+        while let &[hi, lo, len, ref rest @ ..] = data {
+            let full_id = u16::from_be_bytes([hi, lo]);
+            let (packet, rest) =
+                rest.split_at_checked(usize::from(len)).ok_or(XsensError::Truncated { id: full_id })?;
+            data = rest;
+            let format = XsensError::Format { id: full_id };
+            match full_id & id::MASK {
+                id::PACKET_COUNTER => {
+                    message.packet_counter = Some(u16::from_be_bytes(packet.try_into().map_err(|_| format)?));
+                }
+                id::SAMPLE_TIME_FINE => message.sample_time_fine = Some(word(packet).ok_or(format)?),
+                id::STATUS_WORD => message.status = Some(word(packet).ok_or(format)?),
+                id::TEMPERATURE => {
+                    let value = Precision::of(full_id).parse(packet).ok_or(format)?;
+                    message.temperature = Some(value as f32);
+                }
+                id::ACCELERATION => message.acceleration = Some(vector(full_id, packet).ok_or(format)?),
+                id::RATE_OF_TURN => message.rate_of_turn = Some(vector(full_id, packet).ok_or(format)?),
+                _ => {}
+            }
+        }
+        if data.is_empty() { Ok(message) } else { Err(XsensError::Truncated { id: 0 }) }
+    }
+
+    /// The whole frame of this message in single precision, absent packets left out.
+    #[must_use]
+    pub fn emit(&self) -> Vec<u8, 72> {
+        // 72 bytes hold all six packets.
+        xbus::emit(MID_MT_DATA2, &self.data(Precision::Single)).unwrap_or_default()
+    }
+
+    /// The whole frame with its numbers in another precision.
+    #[must_use]
+    pub fn emit_as(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
+        xbus::emit(MID_MT_DATA2, &self.data(precision)).unwrap_or_default()
+    }
+
+    /// All packets.
+    fn data(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
+        let mut data = Vec::new();
+        // MAX_EMITTED bytes hold all six packets in double precision, the longest.
+        let mut packet = |id: u16, bytes: &[u8]| {
+            let _ = data.extend_from_slice(&id.to_be_bytes());
+            let _ = data.push(bytes.len() as u8);
+            let _ = data.extend_from_slice(bytes);
+        };
+        let numbers = |values: &[f32]| {
+            let mut bytes = Vec::<u8, 24>::new();
+            for value in values {
+                let _ = bytes.extend_from_slice(&precision.emit((*value).into()));
+            }
+            bytes
+        };
+        if let Some(counter) = self.packet_counter {
+            packet(id::PACKET_COUNTER, &counter.to_be_bytes());
+        }
+        if let Some(time) = self.sample_time_fine {
+            packet(id::SAMPLE_TIME_FINE, &time.to_be_bytes());
+        }
+        if let Some(values) = &self.acceleration {
+            packet(precision.mark(id::ACCELERATION), &numbers(values));
+        }
+        if let Some(values) = &self.rate_of_turn {
+            packet(precision.mark(id::RATE_OF_TURN), &numbers(values));
+        }
+        if let Some(temperature) = self.temperature {
+            packet(precision.mark(id::TEMPERATURE), &numbers(&[temperature]));
+        }
+        if let Some(status) = self.status {
+            packet(id::STATUS_WORD, &status.to_be_bytes());
+        }
+        data
+    }
+}
+
+fn word(packet: &[u8]) -> Option<u32> {
+    packet.try_into().ok().map(u32::from_be_bytes)
+}
+
+fn vector(id: u16, packet: &[u8]) -> Option<[f32; 3]> {
+    let precision = Precision::of(id);
+    let mut numbers = packet.chunks_exact(precision.bytes());
+    let mut next = || numbers.next().and_then(|bytes| precision.parse(bytes)).map(|value| value as f32);
+    let values = [next()?, next()?, next()?];
+    (packet.len() == 3 * precision.bytes()).then_some(values)
+}

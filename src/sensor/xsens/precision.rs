@@ -1,0 +1,91 @@
+//! The four forms of a number in MTData2, told apart by bits 0 and 1 of the data identifier.
+
+use heapless::Vec;
+
+/// How a number is written, big-endian.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Precision {
+    /// f32.
+    Single,
+    /// i32, 20 bits of fraction.
+    Fixed1220,
+    /// 48 bits, 32 of them fraction; the fraction comes first, the integer behind it.
+    Fixed1632,
+    /// f64.
+    Double,
+}
+
+impl Precision {
+    /// The precision in a data identifier.
+    #[must_use]
+    pub const fn of(id: u16) -> Self {
+        match id & 3 {
+            0 => Self::Single,
+            1 => Self::Fixed1220,
+            2 => Self::Fixed1632,
+            _ => Self::Double,
+        }
+    }
+
+    /// The identifier with this precision in it.
+    #[must_use]
+    pub const fn mark(self, id: u16) -> u16 {
+        id & !3
+            | match self {
+                Self::Single => 0,
+                Self::Fixed1220 => 1,
+                Self::Fixed1632 => 2,
+                Self::Double => 3,
+            }
+    }
+
+    /// Bytes of a number.
+    #[must_use]
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::Single | Self::Fixed1220 => 4,
+            Self::Fixed1632 => 6,
+            Self::Double => 8,
+        }
+    }
+
+    /// The number in exactly these bytes; f64 holds every one exactly.
+    #[must_use]
+    pub fn parse(self, bytes: &[u8]) -> Option<f64> {
+        match (self, bytes) {
+            (Self::Single, &[a, b, c, d]) => Some(f32::from_be_bytes([a, b, c, d]).into()),
+            (Self::Fixed1220, &[a, b, c, d]) => {
+                Some(f64::from(i32::from_be_bytes([a, b, c, d])) / f64::from(1 << 20))
+            }
+            (Self::Fixed1632, &[f3, f2, f1, f0, i1, i0]) => {
+                let sign = if i1 & 0x80 == 0 { 0 } else { 0xFF };
+                let code = i64::from_be_bytes([sign, sign, i1, i0, f3, f2, f1, f0]);
+                Some(code as f64 / (1u64 << 32) as f64)
+            }
+            (Self::Double, &[a, b, c, d, e, f, g, h]) => Some(f64::from_be_bytes([a, b, c, d, e, f, g, h])),
+            _ => None,
+        }
+    }
+
+    /// The nearest number's bytes; the fixed-point forms clamp to their ends.
+    #[must_use]
+    pub fn emit(self, value: f64) -> Vec<u8, 8> {
+        let mut bytes = Vec::new();
+        // Eight bytes hold each form; a float to integer cast clamps.
+        let _ = match self {
+            Self::Single => bytes.extend_from_slice(&(value as f32).to_be_bytes()),
+            Self::Fixed1220 => {
+                let code = libm::round(value * f64::from(1 << 20)) as i32;
+                bytes.extend_from_slice(&code.to_be_bytes())
+            }
+            Self::Fixed1632 => {
+                let code = libm::round(value * (1u64 << 32) as f64) as i64;
+                let [_, _, i1, i0, f3, f2, f1, f0] = code.clamp(-(1 << 47), (1 << 47) - 1).to_be_bytes();
+                bytes.extend_from_slice(&[f3, f2, f1, f0, i1, i0])
+            }
+            Self::Double => bytes.extend_from_slice(&value.to_be_bytes()),
+        };
+        bytes
+    }
+}

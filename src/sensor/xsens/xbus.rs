@@ -1,0 +1,58 @@
+//! Xbus frames: `FA FF MID LEN DATA.. CS`, all of it after FA adding up to 0 modulo 256.
+
+use crate::sensor::framer::{Candidate, Protocol};
+use heapless::Vec;
+
+const PREAMBLE: u8 = 0xFA;
+const BUS_ID: u8 = 0xFF;
+/// A LEN of this value announces an extended length, which nothing here needs.
+const EXTENDED_LENGTH: u8 = 0xFF;
+/// Bytes of a frame around its data.
+const OVERHEAD: usize = 5;
+/// The longest frame.
+pub const MAX_FRAME: usize = 254 + OVERHEAD;
+
+/// The framing of Xbus.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Xbus;
+
+impl Protocol for Xbus {
+    fn candidate(bytes: &[u8]) -> Candidate {
+        match *bytes {
+            [PREAMBLE] | [PREAMBLE, BUS_ID] | [PREAMBLE, BUS_ID, _] => Candidate::Incomplete,
+            [PREAMBLE, BUS_ID, _, EXTENDED_LENGTH, ..] => Candidate::No,
+            [PREAMBLE, BUS_ID, _, len, ..] => {
+                let len = usize::from(len) + OVERHEAD;
+                if bytes.len() < len { Candidate::Incomplete } else { Candidate::Frame(len) }
+            }
+            _ => Candidate::No,
+        }
+    }
+
+    fn check(frame: &[u8]) -> bool {
+        frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte)) == 0
+    }
+}
+
+/// Message identifier and data of an intact frame.
+#[must_use]
+pub fn parse(frame: &[u8]) -> Option<(u8, &[u8])> {
+    match frame {
+        [PREAMBLE, BUS_ID, mid, len, data @ .., _] if usize::from(*len) == data.len() => {
+            Xbus::check(frame).then_some((*mid, data))
+        }
+        _ => None,
+    }
+}
+
+/// The frame of a message. `None` when it is longer than `N` bytes or than an Xbus frame.
+#[must_use]
+pub fn emit<const N: usize>(mid: u8, data: &[u8]) -> Option<Vec<u8, N>> {
+    let len = u8::try_from(data.len()).ok().filter(|len| *len != EXTENDED_LENGTH)?;
+    let mut frame = Vec::new();
+    frame.extend_from_slice(&[PREAMBLE, BUS_ID, mid, len]).ok()?;
+    frame.extend_from_slice(data).ok()?;
+    let sum = frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+    frame.push(sum.wrapping_neg()).ok()?;
+    Some(frame)
+}
