@@ -126,3 +126,13 @@ fn board_slower_than_its_line() {
     let slow = ["-d", "nochain"];
     compare(NAME, &elf, &slow, &messages(&simulated_drive())[..900].concat());
 }
+
+#[test]
+fn board_with_a_full_queue() {
+    const NAME: &str = "board_with_a_full_queue";
+    let Some(elf) = coprocessor(NAME) else { return };
+    // With a log of every block (thrown away) the main loop is slower than the line from the
+    // first frame on: 5,400 bytes do not fit the board's queue, so it must hold the line.
+    let slower = ["-d", "cpu,nochain", "-D", "/dev/null"];
+    compare(NAME, &elf, &slower, &messages(&simulated_drive())[..100].concat());
+}

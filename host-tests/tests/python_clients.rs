@@ -11,6 +11,7 @@ use gyronet::can::yaw::{Quality, Source};
 use gyronet::can::yaw_feed::YawSample;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::units::{AngularRate, SpecificForce, Yaw};
+use gyronet_host_tests::require::{self, Need};
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -20,14 +21,15 @@ use std::process::Command;
 const MINUTE: u32 = 6_000;
 const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 
-fn python() -> Option<String> {
+fn python(test: &str) -> Option<String> {
     let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let check = Command::new(&python).args(["-c", "import can, serial, cantools"]).output();
-    if check.is_ok_and(|output| output.status.success()) {
-        return Some(python);
-    }
-    println!("SKIPPED: {python} has no python-can, pyserial and cantools");
-    None
+    let found = if check.is_ok_and(|output| output.status.success()) {
+        Ok(python)
+    } else {
+        Err(format!("{python} has no python-can, pyserial and cantools"))
+    };
+    require::wants(test, Need::Python, found)
 }
 
 /// A parked car that seems to turn at 0.001 deg/s.
@@ -89,17 +91,17 @@ fn serve(mut stream: TcpStream, config: Config, samples: u32) -> io::Result<Yaw>
 
 #[test]
 fn the_whole_angle_of_a_minute() {
-    compare(MINUTE);
+    compare("the_whole_angle_of_a_minute", MINUTE);
 }
 
 #[test]
 #[ignore = "python-can takes a minute for it"]
 fn the_whole_angle_of_ten_minutes() {
-    compare(10 * MINUTE);
+    compare("the_whole_angle_of_ten_minutes", 10 * MINUTE);
 }
 
-fn compare(samples: u32) {
-    let Some(python) = python() else { return };
+fn compare(test: &str, samples: u32) {
+    let Some(python) = python(test) else { return };
     // One drop-in message and our own, so that Python keeps up.
     let bosch = Some(BoschSettings { tx1_only: true });
     let config = Config::new(Settings { bosch, ..Settings::DEFAULT }).expect("checked");
