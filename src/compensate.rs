@@ -78,13 +78,16 @@ impl Compensator {
 
     /// Takes in a sample and returns the correction to subtract from its gyro rate, and the best
     /// estimate for the sample [`SETTLED_AFTER`] before it, which no window reaches any more.
-    pub fn correction(&mut self) -> (AngularRate, Option<AngularRate>) {
+    ///
+    /// `good`: whether the rate goes out as good. What is owed is not paid in a frame that a
+    /// receiver drops.
+    pub fn correction(&mut self, good: bool) -> (AngularRate, Option<AngularRate>) {
         let [oldest, ..] = self.best;
         self.best.rotate_left(1);
         let newest = Best { sum: 0, count: 0, value: self.prior };
         self.best[REACH - 1] = newest;
         let settled = (oldest.count > 0).then_some(AngularRate(oldest.value));
-        let bound = i64::from(self.config.max_carry.0);
+        let bound = if good { i64::from(self.config.max_carry.0) } else { 0 };
         let carried = self.carry.clamp(-bound, bound);
         self.carry -= carried;
         (AngularRate(newest.value.saturating_add(carried as i32)), settled)

@@ -245,7 +245,7 @@ impl Pipeline {
 
     fn correct(&mut self, frame: &Frame, bias: &[AngularRate; 3]) -> (YawRate, Option<Settled>) {
         let features = window::features(&frame.sample, bias);
-        let (correction, settled) = self.compensator.correction();
+        let (correction, settled) = self.compensator.correction(!frame.sample.clipped);
         let settled =
             settled.map(|correction| Settled { tick: frame.tick.wrapping_sub(SETTLED_AFTER), correction });
         let [.., yaw_feature] = features;
