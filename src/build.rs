@@ -6,7 +6,10 @@ use std::{env, fs, path::PathBuf};
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rerun-if-changed=src/build.rs");
-    println!("cargo:rustc-check-cfg=cfg(gyronet_dsp)");
+    println!("cargo:rustc-check-cfg=cfg(gyronet_dsp, gyronet_armv8m)");
+    if env::var("TARGET").is_ok_and(|target| target.starts_with("thumbv8m.main")) {
+        println!("cargo:rustc-cfg=gyronet_armv8m");
+    }
     if has_dsp() {
         println!("cargo:rustc-cfg=gyronet_dsp");
     }

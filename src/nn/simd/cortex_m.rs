@@ -46,6 +46,21 @@ use crate::nn::activation::{SIGMOID, SIGMOID_SHIFT, TANH, TANH_FRACTION_SCALE, T
 use crate::nn::lstm::{Accumulators, Direction};
 use core::arch::naked_asm;
 
+/// Names a core that has the extension, where the architecture has it as an option: the code of
+/// a naked function is assembled without the compiler's target features.
+#[cfg(gyronet_armv8m)]
+macro_rules! cpu {
+    () => {
+        ".cpu cortex-m33"
+    };
+}
+#[cfg(not(gyronet_armv8m))]
+macro_rules! cpu {
+    () => {
+        ""
+    };
+}
+
 /// Column pairs in the unrolled loop of the projection.
 const PROJECT_UNROLL: usize = 30;
 /// Bytes of code for one of them: 14 instructions of 4 bytes.
@@ -162,6 +177,7 @@ fn entry(count: usize, unroll: usize) -> usize {
 #[unsafe(naked)]
 unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
     naked_asm!(
+        cpu!(),
         "push {{r4-r11, lr}}",
         "ldm r0, {{r2-r8}}",
         "adr.w r12, 2f",
@@ -226,6 +242,7 @@ unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
 #[unsafe(naked)]
 unsafe extern "C" fn step_kernel(call: &StepCall, weights: *const u32) {
     naked_asm!(
+        cpu!(),
         "push {{r4-r11, lr}}",
         "ldm r0, {{r2-r11}}",
         "mov r0, r1",
