@@ -46,4 +46,10 @@ mod tests {
         assert_eq!(simulated_drive().unwrap().rows.len(), 9_000);
         checkpoint().unwrap();
     }
+
+    #[test]
+    fn weights_are_what_quantize_makes() {
+        let (bytes, _) = crate::quantize::quantize(&checkpoint().unwrap()).unwrap();
+        assert!(bytes == gyronet::model::weights::DEFAULT.0, "run: gyronet quantize");
+    }
 }
