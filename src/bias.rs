@@ -13,8 +13,9 @@ use crate::units::{AngularRate, SpecificForce};
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
-/// Limits of stillness. The defaults are about twice the largest value that 204 still
-/// three-second stretches of real drives with a running engine showed.
+/// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
+/// none of 656 (overlapping) stretches with standing wheels and a running engine is refused, and
+/// 3,177 of 3,247 driven ones are.
 #[derive(Debug, Clone, Copy)]
 pub struct StaticConfig {
     /// Standard deviation of each gyro axis, rad/s.

@@ -14,8 +14,8 @@ use gyronet::units::{AngularRate, SpecificForce};
 use gyronet::window::{FEATURES, WINDOW};
 use serde_json::json;
 
-/// Network inputs are clamped to this many standard deviations. On the training drives none is
-/// beyond 21.
+/// Network inputs are clamped to this many standard deviations; `gyronet quantize --drives` says
+/// how many that hits.
 pub const INPUT_CLAMP_STD: f64 = 24.0;
 
 /// Why a checkpoint cannot be quantised.
