@@ -1,8 +1,11 @@
 //! Samples of a vehicle that stands, turns or shakes, in the codes of the pipeline.
 
 use crate::noise::Noise;
+use gyronet::can::feeds::VehicleSample;
+use gyronet::can::yaw::{Quality, Source};
+use gyronet::can::yaw_feed::YawSample;
 use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
-use gyronet::units::{AngularRate, Micros, SpecificForce};
+use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
 
 /// rad/s to a code.
 ///
@@ -48,4 +51,17 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
         sample.specific_force[axis].0 += force(0.8 * shake(axis)).0;
     }
     sample
+}
+
+/// A vehicle that turns at `rate`, has turned by `yaw`, and is well.
+#[must_use]
+pub fn vehicle(tick: u32, rate: AngularRate, yaw: Yaw) -> VehicleSample {
+    VehicleSample {
+        yaw: YawSample { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawSample::default() },
+        roll_rate: AngularRate::ZERO,
+        pitch_rate: AngularRate::ZERO,
+        specific_force: [SpecificForce(0); 3],
+        temperature: None,
+        tick,
+    }
 }

@@ -5,9 +5,9 @@ use gyronet::can::DataFrame;
 use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, Vdc2Settings, YawSettings};
 use gyronet::can::e2e::{DataIdMode, P11Mode};
 use gyronet::can::feeds::{Feeds, VehicleSample};
-use gyronet::can::yaw::{Quality, Source};
-use gyronet::can::yaw_feed::YawSample;
-use gyronet::units::{AngularRate, SpecificForce};
+use gyronet::can::yaw::Quality;
+use gyronet::units::{AngularRate, Yaw};
+use gyronet_host_tests::synthetic;
 
 const YAW: YawSettings = match Settings::DEFAULT.yaw {
     Some(yaw) => yaw,
@@ -111,19 +111,7 @@ fn e2e_identifiers_tell_the_messages_apart() {
 }
 
 fn sample(tick: u32) -> VehicleSample {
-    VehicleSample {
-        yaw: YawSample {
-            rate: AngularRate(1_000_000),
-            source: Source::GyroNet,
-            quality: Quality::Good,
-            ..YawSample::default()
-        },
-        roll_rate: AngularRate::ZERO,
-        pitch_rate: AngularRate::ZERO,
-        specific_force: [SpecificForce(0); 3],
-        temperature: None,
-        tick,
-    }
+    synthetic::vehicle(tick, AngularRate(1_000_000), Yaw::default())
 }
 
 #[test]

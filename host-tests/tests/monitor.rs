@@ -2,11 +2,10 @@
 
 use embedded_can::{Frame, StandardId};
 use gyronet::can::config::{Config, Settings};
-use gyronet::can::feeds::{Feeds, VehicleSample};
-use gyronet::can::yaw::{Quality, Source};
-use gyronet::can::yaw_feed::YawSample;
+use gyronet::can::feeds::Feeds;
 use gyronet::can::{DataFrame, slcan};
-use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
+use gyronet::units::{AngularRate, Micros, Yaw};
+use gyronet_host_tests::synthetic;
 use gyronet_tools::monitor::{Counts, Monitor, NoFrame, parse_line};
 
 /// Frames of a car that turns at 50 deg/s, and how far it has turned, deg.
@@ -15,20 +14,7 @@ fn drive(config: Config, samples: u32) -> (Vec<DataFrame>, f64) {
     let rate = AngularRate::from_rad_per_sec(50_f32.to_radians()).expect("in range");
     let mut frames = Vec::new();
     for tick in 0..samples {
-        let sample = VehicleSample {
-            yaw: YawSample {
-                rate,
-                yaw: Yaw(i64::from(rate.0) * i64::from(tick)),
-                source: Source::GyroNet,
-                quality: Quality::Good,
-                ..YawSample::default()
-            },
-            roll_rate: AngularRate::ZERO,
-            pitch_rate: AngularRate::ZERO,
-            specific_force: [SpecificForce(0); 3],
-            temperature: None,
-            tick,
-        };
+        let sample = synthetic::vehicle(tick, rate, Yaw(i64::from(rate.0) * i64::from(tick)));
         frames.extend(feeds.process::<DataFrame>(&sample));
     }
     (frames, rate.rad_per_sec().to_degrees() * f64::from(samples - 1) / 100.0)

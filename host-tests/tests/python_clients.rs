@@ -7,11 +7,10 @@ use gyronet::can::config::{BoschSettings, Config, Settings};
 use gyronet::can::feeds::{Feeds, VehicleSample};
 use gyronet::can::slcan::assembler::LineAssembler;
 use gyronet::can::slcan::host::{Session, StatusFlags};
-use gyronet::can::yaw::{Quality, Source};
-use gyronet::can::yaw_feed::YawSample;
 use gyronet::can::{DataFrame, slcan};
-use gyronet::units::{AngularRate, SpecificForce, Yaw};
+use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::require::{self, Need};
+use gyronet_host_tests::synthetic;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -36,20 +35,7 @@ fn python(test: &str) -> Option<String> {
 fn parked(tick: u32, yaw: &mut Yaw) -> VehicleSample {
     let rate = AngularRate::from_rad_per_sec(0.001_f32.to_radians()).expect("in range");
     yaw.0 += i64::from(rate.0);
-    VehicleSample {
-        yaw: YawSample {
-            rate,
-            yaw: *yaw,
-            source: Source::GyroNet,
-            quality: Quality::Good,
-            ..YawSample::default()
-        },
-        roll_rate: AngularRate::ZERO,
-        pitch_rate: AngularRate::ZERO,
-        specific_force: [SpecificForce(0); 3],
-        temperature: None,
-        tick,
-    }
+    synthetic::vehicle(tick, rate, *yaw)
 }
 
 /// The board: answers between frames, sends whatever it is told.

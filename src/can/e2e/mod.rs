@@ -16,6 +16,7 @@
 //!
 //! The header is at the start of the data in all of them.
 
+mod header;
 mod p01;
 mod p02;
 mod p05;

@@ -4,6 +4,7 @@
 //! values cancel: what is on the bus is polynomial 0x1D with start 0 and no final XOR.
 
 use super::Fault;
+use super::header::ShortHeader;
 
 /// Start 0, final XOR 0; not the J1850 of other messages, although the polynomial is.
 pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
@@ -20,7 +21,8 @@ pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
 /// 15 is the invalid value.
 pub(super) const COUNTERS: u16 = 15;
 /// 240 bits; beyond 255 the CRC would miss two-bit errors.
-pub(super) const MAX_LEN: usize = 30;
+const MAX_LEN: usize = 30;
+const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
 /// How the 16-bit identifier enters the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,23 +54,8 @@ impl P01 {
     /// # Errors
     /// [`Fault::Length`] and [`Fault::Counter`].
     pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
-        let len = data.len();
-        if len > MAX_LEN {
-            return Err(Fault::Length(len));
-        }
-        if u16::from(counter) >= COUNTERS {
-            return Err(Fault::Counter(counter));
-        }
-        let [_, header, ..] = data else { return Err(Fault::Length(len)) };
-        *header = match self.mode {
-            DataIdMode::Nibble => self.nibble() << 4 | counter,
-            _ => (*header & 0xF0) | counter,
-        };
-        let computed = self.crc(counter, data.get(1..).unwrap_or_default());
-        if let Some(crc) = data.first_mut() {
-            *crc = computed;
-        }
-        Ok(())
+        let nibble = (self.mode == DataIdMode::Nibble).then(|| self.nibble());
+        HEADER.protect(data, counter, nibble, |behind| self.crc(counter, behind))
     }
 
     /// Checks CRC, identifier and that the counter can occur; gives the counter.
@@ -76,20 +63,9 @@ impl P01 {
     /// # Errors
     /// [`Fault`].
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
-        let &[received, header, ..] = data else { return Err(Fault::Length(data.len())) };
-        if data.len() > MAX_LEN {
-            return Err(Fault::Length(data.len()));
-        }
-        let counter = header & 0x0F;
-        let computed = self.crc(counter, data.get(1..).unwrap_or_default());
-        if computed != received {
-            return Err(Fault::Crc { computed: computed.into(), received: received.into() });
-        }
-        if u16::from(counter) >= COUNTERS {
-            return Err(Fault::Counter(counter));
-        }
-        if self.mode == DataIdMode::Nibble && header >> 4 != self.nibble() {
-            return Err(Fault::DataId { received: header >> 4 });
+        let (counter, nibble) = HEADER.check(data, |counter, behind| self.crc(counter, behind))?;
+        if self.mode == DataIdMode::Nibble && nibble != self.nibble() {
+            return Err(Fault::DataId { received: nibble });
         }
         Ok(counter)
     }

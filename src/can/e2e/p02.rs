@@ -2,6 +2,7 @@
 //! identifiers, which enters the CRC last. Profile 22 puts the same bytes on the bus.
 
 use super::Fault;
+use super::header::ShortHeader;
 
 /// CRC-8-AUTOSAR (8H2F): polynomial 0x2F, start and final XOR FF.
 const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_AUTOSAR);
@@ -9,6 +10,7 @@ const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_AUTOSAR);
 pub(super) const COUNTERS: u16 = 16;
 /// With the identifier this is at most 127 bits, the order of the polynomial.
 const MAX_LEN: usize = 14;
+const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
 /// Profile 2 of one message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,20 +26,7 @@ impl P02 {
     /// # Errors
     /// [`Fault::Length`] and [`Fault::Counter`].
     pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
-        let len = data.len();
-        if len > MAX_LEN {
-            return Err(Fault::Length(len));
-        }
-        if u16::from(counter) >= COUNTERS {
-            return Err(Fault::Counter(counter));
-        }
-        let [_, header, ..] = data else { return Err(Fault::Length(len)) };
-        *header = (*header & 0xF0) | counter;
-        let computed = self.crc(counter, data.get(1..).unwrap_or_default());
-        if let Some(crc) = data.first_mut() {
-            *crc = computed;
-        }
-        Ok(())
+        HEADER.protect(data, counter, None, |behind| self.crc(counter, behind))
     }
 
     /// Checks the CRC; gives the counter.
@@ -45,16 +34,7 @@ impl P02 {
     /// # Errors
     /// [`Fault`].
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
-        let &[received, header, ..] = data else { return Err(Fault::Length(data.len())) };
-        if data.len() > MAX_LEN {
-            return Err(Fault::Length(data.len()));
-        }
-        let counter = header & 0x0F;
-        let computed = self.crc(counter, data.get(1..).unwrap_or_default());
-        if computed != received {
-            return Err(Fault::Crc { computed: computed.into(), received: received.into() });
-        }
-        Ok(counter)
+        HEADER.check(data, |counter, behind| self.crc(counter, behind)).map(|(counter, _)| counter)
     }
 
     fn crc(&self, counter: u8, behind: &[u8]) -> u8 {
