@@ -39,7 +39,7 @@ class Settings:
     """Add turns."""
     units: bool
     """Add other units."""
-    windows: int = 3
+    windows: int = 2
     """Windows of a span."""
     memory: float = 0.999
     """Of the running mean of the weights, a batch."""
