@@ -10,6 +10,7 @@ pub mod image_size;
 pub mod methods;
 pub mod metrics;
 pub mod monitor;
+pub mod parser_load;
 pub mod plot;
 pub mod quantization_error;
 pub mod quantize;
