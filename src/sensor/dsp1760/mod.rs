@@ -10,6 +10,7 @@
 mod clock;
 pub mod command;
 mod config;
+pub mod dialogue;
 mod format;
 mod framing;
 pub mod message;

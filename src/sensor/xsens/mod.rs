@@ -6,6 +6,7 @@
 pub mod dialogue;
 pub mod mtdata2;
 pub mod precision;
+mod setup;
 pub mod xbus;
 
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
