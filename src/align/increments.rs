@@ -11,8 +11,8 @@
 //! - A span longer than a grid step is refused: set the part to 100 Hz or more.
 
 use crate::health::count;
-use crate::sample::{FogSample, PERIOD_US};
-use crate::units::{Angle, Micros};
+use crate::sample::{FogSample, PERIOD_US, RATE_HZ};
+use crate::units::{Angle, AngularRate, Micros};
 use heapless::Deque;
 
 /// Increments kept: what a 1 kHz part sends in the 20 ms that a step can be waited for, and
@@ -30,6 +30,21 @@ pub struct Turn {
     pub covered: u32,
 }
 
+impl Turn {
+    /// The mean rate about an axis over the step, rounded to nearest; `None` where the axis was
+    /// not good throughout, or a part of the step is not covered: nothing is guessed.
+    #[must_use]
+    pub fn rate(&self, axis: usize) -> Option<AngularRate> {
+        let Angle(angle) = self.angle.get(axis).copied().flatten()?;
+        if u64::from(self.covered) != PERIOD_US {
+            return None;
+        }
+        const SHIFT: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
+        let per_second = angle.checked_mul(i64::from(RATE_HZ))?.checked_add(1 << (SHIFT - 1))? >> SHIFT;
+        i32::try_from(per_second).ok().map(AngularRate)
+    }
+}
+
 /// How often each kind of event happened. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -42,6 +57,19 @@ pub struct IncrementCounters {
     pub too_long: u32,
     /// Increments that had to go before a step asked for them.
     pub dropped: u32,
+}
+
+impl IncrementCounters {
+    /// What has happened since `before`.
+    #[must_use]
+    pub const fn since(&self, before: &Self) -> Self {
+        Self {
+            gaps: self.gaps.wrapping_sub(before.gaps),
+            late: self.late.wrapping_sub(before.late),
+            too_long: self.too_long.wrapping_sub(before.too_long),
+            dropped: self.dropped.wrapping_sub(before.dropped),
+        }
+    }
 }
 
 /// An increment and the time that it belongs to.

@@ -17,4 +17,5 @@ pub mod quantize;
 pub mod recording;
 pub mod simulate;
 pub mod target_bench;
+pub mod via;
 pub mod weight_file;
