@@ -4,7 +4,8 @@
 //! - An increment belongs to the time since the one before it. One that straddles a grid step
 //!   is split there in proportion; what the first part rounds away the second one gets, so the
 //!   sum over all steps is the sum of all increments, to the last bit.
-//! - After lost messages an increment belongs to its own span only. What was turned meanwhile
+//! - After lost messages, or where the one before ended more than one and a half spans ago, an
+//!   increment belongs to its own span only. What was turned meanwhile
 //!   is not known and not guessed: the step says how much of its time is covered.
 //! - What comes after its step has gone out is not used, and counted.
 //! - An axis that was not good in any part of the step has no sum in it.
@@ -94,8 +95,9 @@ impl Increments {
         let (end, span) = (time.0, u64::from(sample.span));
         let own = end.saturating_sub(span);
         let begin = match self.last_end {
-            // Jitter moves the ends about by less than the span itself.
-            Some(last) if sample.lost == 0 && end.saturating_sub(last) <= 2 * span => last,
+            // Jitter moves the ends about by less than half the span; a part without a sequence
+            // number tells one lost message by nothing but a distance of two spans.
+            Some(last) if sample.lost == 0 && 2 * end.saturating_sub(last) <= 3 * span => last,
             Some(last) => {
                 count(&mut self.counters.gaps, 1);
                 own.max(last)
