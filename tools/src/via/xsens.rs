@@ -16,9 +16,9 @@ const TICK_US: u64 = 100;
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut mti = Mti::new();
     let (mut samples, mut bytes) = (Vec::with_capacity(recording.rows.len()), 0);
-    // What the first of the part's 32-bit ticks leaves out of the recording's time.
+    // What the first of the part's 32-bit ticks leaves out of the recording's time: whole wraps.
     let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
-    let epoch = (first / TICK_US >> 32 << 32) * TICK_US;
+    let epoch = first - first % (TICK_US << 32);
     for (number, row) in recording.rows.iter().enumerate() {
         let frame = message(number, &row.sample).emit();
         bytes += frame.len() as u64;
