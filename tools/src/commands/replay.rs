@@ -46,18 +46,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let recording = Recording::read(&args.file)?;
     let replays = if args.via.is_some() { 2 + STAND_INS as usize } else { 1 };
     let bar = progress::bar(common, replays * recording.rows.len(), recording.name());
-    let direct = Drive::run(&recording, &mut network, || bar.inc(1))?;
-    let (drive, detour) = match args.via {
-        None => (direct, None),
-        Some(part) => {
-            let via = part.send(&recording)?;
-            let drive = Drive::run(&via.recording, &mut network, || bar.inc(1))?;
-            let bound = Bound::new(via.quantisation, &recording, &direct, &mut network, || bar.inc(1))?;
-            let difference = Difference::of_rates(&direct, &drive);
-            (drive, Some(Detour { part, via, difference, bound }))
-        }
-    };
+    let replayed = replay(&recording, args.via, &mut network, || bar.inc(1));
     bar.finish_and_clear();
+    let (drive, detour) = replayed?;
     let mut feeds = Feeds::new(Config::DEFAULT);
     let frames = match &args.out {
         Some(path) => write_file(&drive, &mut feeds, path)?,
@@ -77,6 +68,22 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
     }
     Ok(())
+}
+
+/// The drive, through a part's bytes where one is named, and what they did to it.
+fn replay(
+    recording: &Recording,
+    part: Option<Part>,
+    network: &mut GyroNet<'_>,
+    mut tick: impl FnMut(),
+) -> Result<(Drive, Option<Detour>), Box<dyn std::error::Error>> {
+    let direct = Drive::run(recording, network, &mut tick)?;
+    let Some(part) = part else { return Ok((direct, None)) };
+    let via = part.send(recording)?;
+    let drive = Drive::run(&via.recording, network, &mut tick)?;
+    let bound = Bound::new(via.quantisation, recording, &direct, network, &mut tick)?;
+    let difference = Difference::of_rates(&direct, &drive);
+    Ok((drive, Some(Detour { part, via, difference, bound })))
 }
 
 /// A recording's way through a part, and what came of it.
