@@ -21,6 +21,8 @@ const PROGRAM: &str = "qemu-system-arm";
 /// How long QEMU may take to connect its lines, and the image to switch a receiver on.
 const START: Duration = Duration::from_secs(20);
 const POLL: Duration = Duration::from_millis(5);
+/// How long a client is given to speak first.
+const HELLO: Duration = Duration::from_secs(2);
 
 /// Control register 1 of USART 1 to 6 (RM0090, table 1 and 30.6.4), and its bits UE and RE.
 const CR1: [u32; 6] = [0x4001_100C, 0x4000_440C, 0x4000_480C, 0x4000_4C0C, 0x4000_500C, 0x4001_140C];
@@ -274,7 +276,8 @@ impl Board {
     }
 
     /// An address at which one TCP client can talk to USART `n`, and reads everything that it
-    /// has sent since the start.
+    /// has sent since the start. It comes once the client has said something, or said nothing for
+    /// a while: pyserial throws away what is there when it opens a line.
     ///
     /// # Panics
     /// When the system gives no port.
@@ -289,6 +292,9 @@ impl Board {
         std::thread::spawn(move || {
             let Ok((client, _)) = listener.accept() else { return };
             let Ok(mut from_client) = client.try_clone() else { return };
+            let _ = client.set_read_timeout(Some(HELLO));
+            let _ = client.peek(&mut [0]);
+            let _ = client.set_read_timeout(None);
             std::thread::spawn(move || std::io::copy(&mut from_client, &mut board));
             received.copy_to(client);
         });
