@@ -1,6 +1,6 @@
 //! What a receiver of our messages sees: rate, yaw, quality, and everything that was lost.
 //!
-//! [`line`] reads text, [`source`] opens what it comes from; [`Monitor`] checks the frames as an
+//! [`mod@line`] reads text, [`source`] opens what it comes from; [`Monitor`] checks the frames as an
 //! ECU would and keeps the accounts.
 
 pub mod line;
