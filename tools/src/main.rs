@@ -23,6 +23,8 @@ enum Command {
     Replay(commands::replay::Args),
     Simulate(commands::simulate::Args),
     Quantize(commands::quantize::Args),
+    Monitor(commands::monitor::Args),
+    Bus(commands::bus::Args),
     BenchTarget(commands::bench_target::Args),
 }
 
@@ -34,6 +36,8 @@ fn main() -> ExitCode {
         Command::Replay(args) => commands::replay::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
+        Command::Bus(args) => commands::bus::run(args, common),
+        Command::Monitor(args) => commands::monitor::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
