@@ -118,8 +118,8 @@ def plot(networks: dict[str, dict], path: Path) -> None:
     for name, result in networks.items():
         error = 1e3 * np.array(result["mean_abs_rad_per_sec"])
         axes.plot(range(1, len(error) + 1), error, marker="o", label=f"{name}, {result['parameters']:,} parameters")
-    axes.set(xlabel="epoch", ylabel="test error by sample, 1e-3 rad/s", yscale="log")
-    axes.grid(which="both", alpha=0.3)
+    axes.set(xlabel="epoch", ylabel="test error by sample, 1e-3 rad/s", ylim=(0, None))
+    axes.grid(alpha=0.3)
     axes.legend()
     figure.savefig(path, dpi=110)
 
@@ -130,7 +130,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="files to write, without .json and .png")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NN")
     parser.add_argument("--test", nargs="+", default=["09", "11"], metavar="NN")
-    parser.add_argument("--epochs", type=int, default=10)
+    parser.add_argument("--epochs", type=int, default=8)
     parser.add_argument("--batch", type=int, default=512)
     parser.add_argument("--lr", type=float, default=0.0015)
     parser.add_argument("--seed", type=int, default=1)
