@@ -22,6 +22,7 @@ enum Command {
     Evaluate(commands::evaluate::Args),
     Replay(commands::replay::Args),
     Simulate(commands::simulate::Args),
+    Import(commands::import::Args),
     Quantize(commands::quantize::Args),
     BenchTarget(commands::bench_target::Args),
 }
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => commands::evaluate::run(args, common),
         Command::Replay(args) => commands::replay::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
+        Command::Import(args) => commands::import::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
     };

@@ -3,6 +3,7 @@
 pub mod bench_target;
 pub mod demo;
 pub mod evaluate;
+pub mod import;
 mod networks;
 mod progress;
 pub mod quantize;
