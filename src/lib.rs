@@ -12,4 +12,5 @@ pub mod pipeline;
 pub mod sample;
 pub mod sensor;
 pub mod units;
+pub mod vehicle;
 pub mod window;
