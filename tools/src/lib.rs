@@ -18,4 +18,5 @@ pub mod recording;
 pub mod sequence;
 pub mod simulate;
 pub mod target_bench;
+pub mod trajectory_error;
 pub mod weight_file;

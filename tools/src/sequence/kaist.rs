@@ -153,8 +153,8 @@ impl Encoder {
         if !reset && seconds > 0.0 {
             self.speed = moved.map(|way| way / seconds);
         }
-        for wheel in 0..2 {
-            self.metres[wheel] += if reset { self.speed[wheel] * seconds } else { moved[wheel] };
+        for (metres, (moved, speed)) in self.metres.iter_mut().zip(moved.into_iter().zip(self.speed)) {
+            *metres += if reset { speed * seconds } else { moved };
         }
         (self.metres, reset)
     }
