@@ -17,6 +17,7 @@ pub mod quantize;
 pub mod recording;
 pub mod sequence;
 pub mod simulate;
+pub mod tables;
 pub mod target_bench;
 pub mod trajectory_error;
 pub mod weight_file;

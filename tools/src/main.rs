@@ -23,6 +23,7 @@ enum Command {
     Replay(commands::replay::Args),
     Simulate(commands::simulate::Args),
     Import(commands::import::Args),
+    Tables(commands::tables::Args),
     Quantize(commands::quantize::Args),
     BenchTarget(commands::bench_target::Args),
 }
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => commands::replay::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
         Command::Import(args) => commands::import::run(args, common),
+        Command::Tables(args) => commands::tables::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
     };

@@ -9,6 +9,7 @@ mod progress;
 pub mod quantize;
 pub mod replay;
 pub mod simulate;
+pub mod tables;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.

@@ -68,7 +68,7 @@ struct Clock {
 }
 
 impl StreamSummary {
-    pub(super) fn new(path: &Path, per_second: f64, nominal_hz: f64) -> Self {
+    pub(crate) fn new(path: &Path, per_second: f64, nominal_hz: f64) -> Self {
         Self {
             file: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
             rows: 0,
