@@ -4,6 +4,9 @@
 //! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
 //! and the scaled reading are different methods.
 
+/// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
+pub const STANDARD_GRAVITY: f32 = 9.806_65;
+
 /// Why a reading cannot be taken over into fixed point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,5 +1,4 @@
 //! gyronet on a host: read recordings, simulate, quantise, replay, evaluate, draw.
-
 pub mod bundled;
 pub mod candump;
 pub mod checkpoint;
@@ -11,6 +10,7 @@ pub mod image_size;
 pub mod methods;
 pub mod metrics;
 pub mod monitor;
+pub mod parser_load;
 pub mod plot;
 pub mod quantization_error;
 pub mod quantize;
@@ -20,4 +20,5 @@ pub mod simulate;
 pub mod tables;
 pub mod target_bench;
 pub mod trajectory_error;
+pub mod via;
 pub mod weight_file;
