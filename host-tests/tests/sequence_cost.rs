@@ -39,7 +39,8 @@ fn import_and_replay_of_twenty_minutes() {
     assert_eq!(sequence.files[1].rows, 1_200_000);
 
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("bundled"));
-    let drive = Drive::run(&sequence.recording(), &mut network, || {}).expect("it stands at first");
+    let drive = Drive::run(&sequence.recording().expect("it has a gyro"), &mut network, || {})
+        .expect("it stands at first");
     let replayed = processor_seconds().expect("it was there") - begin - imported;
     let peak = peak_megabytes().expect("as the other");
     println!(

@@ -114,6 +114,8 @@ fn draw(svg: &mut String, labels: Labels<'_>, curves: &[Curve]) -> Result<(), Fa
         .axis_style(GREY)
         .label_style((FONT, 14))
         .axis_desc_style((FONT, 16))
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
         .draw()?;
     for (curve, (color, width)) in curves.iter().zip(styles) {
         let step = curve.points.len().div_ceil(POINTS).max(1);
@@ -158,13 +160,22 @@ fn panel(
         .axis_style(GREY)
         .label_style((FONT, 13))
         .axis_desc_style((FONT, 14))
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
         .draw()?;
     let bars = spreads.enumerate().map(|(second, (least, most))| {
         let x = second as f64 + 0.5;
-        PathElement::new([(x, least), (x, most)], COLORS[0].stroke_width(1))
+        // A second whose stamps are all the same apart is a dot.
+        PathElement::new([(x, least), (x, most.max(least + 0.01 * top))], COLORS[0].stroke_width(1))
     });
     chart.draw_series(bars)?;
     Ok(())
+}
+
+/// As few decimals as it needs, and at most two.
+fn number(value: &f64) -> String {
+    let text = format!("{:.2}", value + 0.0);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// From the least to the most, with some air.
@@ -204,6 +215,11 @@ mod tests {
             assert!(svg.contains(word), "{word}");
         }
         assert!(svg.len() < 100_000, "thinned: {}", svg.len());
+    }
+
+    #[test]
+    fn numbers_of_an_axis() {
+        assert_eq!([100.0, 0.5, 0.25, -3.0, 0.0].map(|v| number(&v)), ["100", "0.5", "0.25", "-3", "0"]);
     }
 
     #[test]

@@ -1,4 +1,5 @@
 //! gyronet on a host: read recordings, simulate, quantise, replay, evaluate, draw.
+
 pub mod bundled;
 pub mod candump;
 pub mod checkpoint;

@@ -67,6 +67,9 @@ pub struct Sequence {
     pub layout: Layout,
     /// What it was simulated of, if it was.
     pub simulated: Option<Spec>,
+    /// Whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; they are zero
+    /// otherwise.
+    pub has_gyro: bool,
     /// Whether [`Step::vendor_yaw`] is a vendor's.
     pub has_vendor: bool,
     /// Distance of the wheels, m, where the data say it.
@@ -85,6 +88,7 @@ struct Files {
     fog: Box<dyn Stream<1>>,
     wheels: Box<dyn Stream<2>>,
     truth: Box<dyn Stream<3>>,
+    has_gyro: bool,
     has_vendor: bool,
     wheel_base: Option<f64>,
 }
@@ -168,13 +172,13 @@ impl Sequence {
                 step.position = [step.position[0] - x, step.position[1] - y];
             }
         }
-        let wheel_base = files.wheel_base;
+        let (wheel_base, has_gyro) = (files.wheel_base, files.has_gyro);
         let Files { imu, fog, wheels, truth, .. } = files;
         let files = [imu.finish()?, fog.finish()?, wheels.finish()?, truth.finish()?];
         let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
         let name = name.unwrap_or_else(|| folder.display().to_string());
         let path = folder.to_owned();
-        Ok(Self { name, path, layout, simulated, has_vendor, wheel_base, steps, in_gap, files })
+        Ok(Self { name, path, layout, simulated, has_gyro, has_vendor, wheel_base, steps, in_gap, files })
     }
 
     /// Length, s.
@@ -207,8 +211,11 @@ impl Sequence {
 
     /// The drive as the pipeline's other commands have it. Steps in a gap of the inertial sensor
     /// are left out, as a board would not get them. Wheels are rear right and rear left.
-    #[must_use]
-    pub fn recording(&self) -> Recording {
+    ///
+    /// # Errors
+    /// [`SequenceError::NoGyro`].
+    pub fn recording(&self) -> Result<Recording, SequenceError> {
+        self.needs_gyro()?;
         let turns = self.turns();
         let steps = self.steps.iter().zip(&turns).enumerate().filter(|(_, (step, _))| !step.imu_gap);
         let rows = steps.filter_map(|(k, (step, turn))| {
@@ -226,7 +233,16 @@ impl Sequence {
             let wheels = [None, right, None, left];
             Some(RecordingRow { line: k as u64 + 1, sample, reference: Some(turn / DT), wheels })
         });
-        Recording { path: self.path.display().to_string(), rows: rows.collect(), missing: 0 }
+        Ok(Recording { path: self.path.display().to_string(), rows: rows.collect(), missing: 0 })
+    }
+
+    /// Whether there is a gyro.
+    ///
+    /// # Errors
+    /// [`SequenceError::NoGyro`].
+    pub fn needs_gyro(&self) -> Result<(), SequenceError> {
+        let path = || self.path.display().to_string();
+        self.has_gyro.then_some(()).ok_or_else(|| SequenceError::NoGyro { path: path() })
     }
 }
 

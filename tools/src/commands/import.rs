@@ -51,6 +51,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         writeln!(out)?;
     }
     if let Some(path) = &args.out {
+        sequence.needs_gyro()?;
         let error = WriteError::to(path);
         let file = File::create(path).map_err(&error)?;
         let rows = sequence::write_csv(&sequence, BufWriter::new(file)).map_err(&error)?;

@@ -3,7 +3,8 @@
 use super::networks::Weights;
 use super::{Common, WriteError, import, progress};
 use gyronet::model::GyroNet;
-use gyronet_tools::sequence;
+use gyronet_tools::sequence::{self, Sequence};
+use gyronet_tools::simulate::layout::Layout;
 use gyronet_tools::tables::results::{Results, SequenceErrors};
 use gyronet_tools::tables::{html, methods, pictures, table};
 use std::fs;
@@ -32,6 +33,15 @@ pub struct Args {
     weights: Option<PathBuf>,
 }
 
+/// Name of a sequence's pictures: folders of different data sets may have the same name.
+fn title(sequence: &Sequence, number: usize) -> String {
+    let layout = match sequence.layout {
+        Layout::Kaist => "kaist",
+        Layout::Nclt => "nclt",
+    };
+    format!("{:02}-{layout}-{}", number + 1, sequence.name)
+}
+
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = Weights::open(args.weights.as_deref())?;
@@ -48,7 +58,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         bar.finish_and_clear();
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
         if args.out.is_some() {
-            drawn.push((sequence.name.clone(), pictures::draw(&sequence, &errors, &paths)?));
+            drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)?));
         }
         all.push(errors);
     }

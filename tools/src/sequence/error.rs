@@ -33,8 +33,7 @@ pub enum SequenceError {
         path: String,
     },
     /// Another number of columns than the data set has.
-    #[error("{path}: line {line}: {found} columns, expected {expected}{}",
-        if *found == 8 && *expected == 17 { " (8 are the early sequences, which have no gyro)" } else { "" })]
+    #[error("{path}: line {line}: {found} columns, expected {expected}")]
     Columns {
         /// The file.
         path: String,
@@ -89,6 +88,12 @@ pub enum SequenceError {
         /// Least time.
         needed: f64,
     },
+    /// What was asked for needs the inertial sensor's gyro.
+    #[error("{path}: xsens_imu.csv has 8 columns: no gyro and no accelerometer")]
+    NoGyro {
+        /// The folder.
+        path: String,
+    },
     /// The note that a sequence is simulated cannot be understood.
     #[error("{path}: {source}")]
     Marker {
@@ -97,4 +102,15 @@ pub enum SequenceError {
         /// What the parser said.
         source: serde_json::Error,
     },
+}
+
+impl SequenceError {
+    /// Why a file could not be opened.
+    pub(super) fn open(path: &str, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            std::io::ErrorKind::NotFound => Self::Missing { path },
+            _ => Self::Io { path, source },
+        }
+    }
 }

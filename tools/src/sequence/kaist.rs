@@ -1,14 +1,18 @@
 //! KAIST Complex Urban: `sensor_data/{xsens_imu,fog,encoder}.csv`,
 //! `calibration/EncoderParameter.txt`, `global_pose.csv`. No headers, nanoseconds since 1970;
-//! x forward, y left, z up.
+//! x forward, y left, z up. The early sequences (campus00, urban00 to 05) have no gyro: 8 columns
+//! in xsens_imu.csv instead of 17.
 //!
 //! Sources: the readers irapkaist/file_player and tsyxyz/kaist2bag, and the data set's page.
 
 use super::rows::{Format, Progress, Row, Rows};
-use super::track::{Track, Unwrap};
+use super::summary::StreamSummary;
+use super::track::{Stream, Track, Unwrap};
 use super::{Files, SequenceError};
 use gyronet::sample::RATE_HZ;
 use std::f64::consts::PI;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 const NANOS: f64 = 1e9;
@@ -19,6 +23,9 @@ const IMU: Format<10> = Format {
     stamps_per_second: NANOS,
     nominal_hz: RATE_HZ as f64,
 };
+/// The early sequences have the vendor's orientation alone.
+const ORIENTATION: Format<4> =
+    Format { columns: 8, used: [1, 2, 3, 4], stamps_per_second: NANOS, nominal_hz: RATE_HZ as f64 };
 /// The yaw increment.
 const FOG: Format<1> = Format { columns: 4, used: [3], stamps_per_second: NANOS, nominal_hz: 1000.0 };
 const ENCODER: Format<2> = Format { columns: 3, used: [1, 2], stamps_per_second: NANOS, nominal_hz: 100.0 };
@@ -35,17 +42,9 @@ pub(super) const PATHS: [&str; 4] =
 pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, SequenceError> {
     let [imu, fog, encoder, pose] = PATHS.map(|path| folder.join(path));
     let parameters = EncoderParameters::read(&folder.join("calibration/EncoderParameter.txt"))?;
-    let mut vendor = Unwrap::default();
-    let imu = Track::new(
-        Rows::open(&imu, IMU, progress.clone())?,
-        None,
-        Box::new(move |row: &Row<10>, _, _| {
-            let [qx, qy, qz, qw, wx, wy, wz, fx, fy, fz] = row.fields;
-            let yaw = libm::atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz));
-            [fx, fy, fz, wx, wy, wz, vendor.angle(yaw)]
-        }),
-    )?;
-    let epoch = Some(imu.epoch());
+    let has_gyro = columns(&imu)? != ORIENTATION.columns;
+    let (imu, epoch) = if has_gyro { whole(&imu, progress)? } else { orientation(&imu, progress)? };
+    let epoch = Some(epoch);
     let mut turned = 0.0;
     let fog = Track::new(
         Rows::open(&fog, FOG, progress.clone())?,
@@ -79,13 +78,54 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, Sequence
         }),
     )?;
     Ok(Files {
-        imu: Box::new(imu),
+        imu,
         fog: Box::new(fog),
         wheels: Box::new(encoder),
         truth: Box::new(truth),
+        has_gyro,
         has_vendor: true,
         wheel_base: Some(parameters.base),
     })
+}
+
+/// The inertial sensor and its first stamp.
+type Imu = (Box<dyn Stream<7>>, i64);
+
+fn whole(path: &Path, progress: &Progress) -> Result<Imu, SequenceError> {
+    let mut vendor = Unwrap::default();
+    let convert = move |row: &Row<10>, _: f64, _: &mut StreamSummary| {
+        let [qx, qy, qz, qw, wx, wy, wz, fx, fy, fz] = row.fields;
+        [fx, fy, fz, wx, wy, wz, vendor.angle(yaw([qx, qy, qz, qw]))]
+    };
+    let track = Track::new(Rows::open(path, IMU, progress.clone())?, None, Box::new(convert))?;
+    let epoch = track.epoch();
+    Ok((Box::new(track), epoch))
+}
+
+fn orientation(path: &Path, progress: &Progress) -> Result<Imu, SequenceError> {
+    let mut vendor = Unwrap::default();
+    let convert = move |row: &Row<4>, _: f64, _: &mut StreamSummary| {
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vendor.angle(yaw(row.fields))]
+    };
+    let track = Track::new(Rows::open(path, ORIENTATION, progress.clone())?, None, Box::new(convert))?;
+    let epoch = track.epoch();
+    Ok((Box::new(track), epoch))
+}
+
+/// Heading of a quaternion.
+fn yaw([x, y, z, w]: [f64; 4]) -> f64 {
+    libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+}
+
+/// Columns of the first row: which of the two kinds of file it is.
+fn columns(path: &Path) -> Result<usize, SequenceError> {
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(|source| SequenceError::open(&name, source))?;
+    let mut line = String::new();
+    // A row of this file is some 200 bytes long.
+    let mut reader = BufReader::new(file).take(4096);
+    reader.read_line(&mut line).map_err(|source| SequenceError::Io { path: name, source })?;
+    Ok(line.split(',').count())
 }
 
 /// What the calibration file says.
@@ -102,10 +142,7 @@ struct EncoderParameters {
 impl EncoderParameters {
     fn read(path: &Path) -> Result<Self, SequenceError> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
-            std::io::ErrorKind::NotFound => SequenceError::Missing { path: name.clone() },
-            _ => SequenceError::Io { path: name.clone(), source },
-        })?;
+        let text = std::fs::read_to_string(path).map_err(|source| SequenceError::open(&name, source))?;
         // Keyed on the second word of a line, as the data set's own readers do.
         let number = |parameter: &'static str, key: &str| {
             let line = text.lines().find(|line| line.split_whitespace().nth(1) == Some(key));

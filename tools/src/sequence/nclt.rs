@@ -82,6 +82,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, Sequence
         fog: Box::new(fog),
         wheels: Box::new(wheels),
         truth: Box::new(truth),
+        has_gyro: true,
         has_vendor: false,
         wheel_base: None,
     })

@@ -48,10 +48,7 @@ pub(super) struct Rows<const N: usize> {
 impl<const N: usize> Rows<N> {
     pub fn open(path: &Path, format: Format<N>, progress: Progress) -> Result<Self, SequenceError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|source| match source.kind() {
-            std::io::ErrorKind::NotFound => SequenceError::Missing { path: name.clone() },
-            _ => SequenceError::Io { path: name.clone(), source },
-        })?;
+        let file = File::open(path).map_err(|source| SequenceError::open(&name, source))?;
         let csv = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)

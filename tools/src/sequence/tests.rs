@@ -100,7 +100,7 @@ fn nclt_turns_into_the_axes_of_kaist() {
 fn it_runs_as_a_recording() {
     let scratch = Scratch::new("recording", Layout::Kaist, 30);
     let sequence = scratch.read().unwrap();
-    let recording = sequence.recording();
+    let recording = sequence.recording().unwrap();
     assert_eq!(recording.rows.len(), sequence.steps.len());
     let mut csv = Vec::new();
     write_csv(&sequence, &mut csv).unwrap();
@@ -134,16 +134,26 @@ fn columns_are_counted() {
     let scratch = Scratch::new("columns", Layout::Kaist, 10);
     scratch.edit(FOG, |lines| lines[41].push_str(",0.5"));
     assert!(scratch.error().ends_with("fog.csv: line 42: 5 columns, expected 4"), "{}", scratch.error());
+    scratch.edit(FOG, |lines| lines[41] = lines[0].clone());
+    scratch.edit(IMU, |lines| lines[1].push_str(",0.5"));
+    assert!(scratch.error().ends_with("xsens_imu.csv: line 2: 18 columns, expected 17"));
+}
+
+#[test]
+fn the_early_sequences_have_no_gyro() {
     let scratch = Scratch::new("early", Layout::Kaist, 10);
     scratch.edit(IMU, |lines| {
         for line in lines {
             *line = line.split(',').take(8).collect::<Vec<_>>().join(",");
         }
     });
-    let error = scratch.error();
-    assert!(
-        error.ends_with("line 1: 8 columns, expected 17 (8 are the early sequences, which have no gyro)")
-    );
+    fs::remove_file(scratch.0.join(MARKER)).unwrap();
+    let sequence = scratch.read().unwrap();
+    assert!(!sequence.has_gyro && sequence.has_vendor && sequence.simulated.is_none());
+    let error = sequence.recording().unwrap_err().to_string();
+    assert!(error.ends_with("xsens_imu.csv has 8 columns: no gyro and no accelerometer"), "{error}");
+    let [first, last] = [&sequence.steps[0], &sequence.steps[sequence.steps.len() - 1]];
+    assert!((last.vendor_yaw - last.yaw - first.vendor_yaw + first.yaw).abs() < 0.1);
 }
 
 #[test]
@@ -237,7 +247,7 @@ fn a_silent_sensor_is_marked() {
     let marked = sequence.steps.iter().filter(|step| step.imu_gap).count();
     assert!((50..=51).contains(&marked), "{marked}");
     assert_eq!(sequence.in_gap[0], marked as u64);
-    assert_eq!(sequence.recording().rows.len(), sequence.steps.len() - marked);
+    assert_eq!(sequence.recording().unwrap().rows.len(), sequence.steps.len() - marked);
 }
 
 #[test]

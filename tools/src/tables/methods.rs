@@ -7,9 +7,10 @@
 //! Information Fusion 91, 2023), without a magnetometer, once with its published defaults and once
 //! with limits of rest that a vehicle with its engine running keeps.
 
-use crate::drive::{Drive, DriveError};
+use crate::drive::Drive;
 use crate::fir;
 use crate::metrics::DT;
+use crate::recording::Recording;
 use crate::sequence::Sequence;
 use crate::simulate::world::EARTH_RATE;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
@@ -85,50 +86,18 @@ pub struct Estimates {
     pub start: usize,
     /// One for each method that could be run.
     pub methods: Vec<Estimate>,
-    /// Why static initialisation, and what needs it, could not be.
-    pub refused: Option<DriveError>,
+    /// Why some methods could not be run.
+    pub refused: Option<String>,
 }
 
 /// Runs every method; `tick` is called for each sample that the network's pipeline takes.
 pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, tick: impl FnMut()) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
     let mut estimates = Estimates { start, methods: Vec::new(), refused: None };
-    let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
-    let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
-
-    let started = Instant::now();
-    let drive = Drive::run(&sequence.recording(), network, tick);
-    let run_time = started.elapsed().as_secs_f64();
-    estimates.add(RAW, || constant(0.0));
-    match drive {
-        Ok(drive) => {
-            let still = &gyro[..start];
-            estimates.add(STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
-            for (method, rates) in [
-                (GYRONET, corrected(&drive, &gyro, |step| step.yaw_rate.correction.0 - step.settled.0)),
-                (GYRONET_ONLINE, corrected(&drive, &gyro, |_| 0)),
-            ] {
-                estimates.add(method, || rates);
-                if let Some(estimate) = estimates.methods.last_mut() {
-                    estimate.run_time = run_time;
-                }
-            }
-        }
-        Err(error) => estimates.refused = Some(error),
+    match sequence.recording() {
+        Ok(recording) => estimates.inertial(sequence, &recording, network, tick),
+        Err(error) => estimates.refused = Some(error.to_string()),
     }
-    estimates.add(FIR, || fir::filter(&fir::Design::PAPER.taps(), &gyro));
-    let filter = || vqf_rs::VQF::new(DT, None, None, None);
-    estimates.add(VQF, || vqf(sequence, filter()));
-    estimates.add(VQF_VEHICLE, || {
-        let mut filter = filter();
-        // Three times the spread that static initialisation allows: VQF looks at each sample.
-        let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
-        filter.set_rest_detection_thresholds(
-            3.0 * f64::from(gyro_std).to_degrees(),
-            3.0 * f64::from(accel_std),
-        );
-        vqf(sequence, filter)
-    });
     if sequence.has_vendor {
         estimates.add(VENDOR, || rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
     }
@@ -140,6 +109,49 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, tick: impl FnM
 }
 
 impl Estimates {
+    /// The methods that start from the inertial sensor.
+    fn inertial(
+        &mut self,
+        sequence: &Sequence,
+        recording: &Recording,
+        network: &mut impl WindowNetwork,
+        tick: impl FnMut(),
+    ) {
+        let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
+        let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
+        let started = Instant::now();
+        let drive = Drive::run(recording, network, tick);
+        let run_time = started.elapsed().as_secs_f64();
+        self.add(RAW, || constant(0.0));
+        match drive {
+            Ok(drive) => {
+                let still = &gyro[..self.start];
+                self.add(STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
+                for (method, rates) in [
+                    (GYRONET, corrected(&drive, &gyro, |step| step.yaw_rate.correction.0 - step.settled.0)),
+                    (GYRONET_ONLINE, corrected(&drive, &gyro, |_| 0)),
+                ] {
+                    self.add(method, || rates);
+                    if let Some(estimate) = self.methods.last_mut() {
+                        estimate.run_time = run_time;
+                    }
+                }
+            }
+            Err(error) => self.refused = Some(error.to_string()),
+        }
+        self.add(FIR, || fir::filter(&fir::Design::PAPER.taps(), &gyro));
+        let filter = || vqf_rs::VQF::new(DT, None, None, None);
+        self.add(VQF, || vqf(sequence, filter()));
+        self.add(VQF_VEHICLE, || {
+            let mut filter = filter();
+            // Three times the spread that static initialisation allows: VQF looks at each sample.
+            let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
+            let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
+            filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
+            vqf(sequence, filter)
+        });
+    }
+
     /// Rates of all steps, rad/s.
     fn add(&mut self, method: Method, rates: impl FnOnce() -> Vec<f64>) {
         let started = Instant::now();

@@ -1,6 +1,6 @@
 //! The paper's figures 6, 7, 9, 10 and 11 for a sequence.
 
-use super::methods::Gyro;
+use super::methods::{FIR, Gyro, RAW};
 use super::results::{Path, SequenceErrors};
 use crate::figures::{self, Curve, Labels};
 use crate::metrics::DT;
@@ -26,9 +26,11 @@ pub struct Picture {
 pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Result<Vec<Picture>, PlotError> {
     let simulated = if errors.simulated { " (simulated)" } else { "" };
     let name = format!("{}{simulated}", errors.name);
+    // A gyro with its bias runs off any scale that shows the others.
+    let in_scale = |path: &&Path| path.method.is_none_or(|method| method != RAW && method != FIR);
     let of = |gyro: Gyro| {
         let is_wanted = move |path: &&Path| path.method.is_none_or(|method| method.gyro == gyro);
-        paths.iter().filter(is_wanted).collect::<Vec<&Path>>()
+        paths.iter().filter(is_wanted).filter(in_scale).collect::<Vec<&Path>>()
     };
     let start = sequence.seconds() - errors.seconds;
     let time = |k: usize| start + k as f64 * DT;
@@ -47,11 +49,10 @@ pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Res
         .map(|path| curve(path, path.yaw.iter().enumerate().map(|(k, yaw)| (time(k), yaw.to_degrees()))));
     add("yaw", "as the paper's Fig. 6", labels, curves.collect())?;
 
-    // The gyro with its bias runs off any scale that shows the others.
     let title = format!("{name}: yaw error");
     let labels = Labels { title: &title, x: "time, s", y: "yaw error, mrad", same_scale: false };
-    let in_scale = |path: &&Path| path.method.is_some_and(|m| !["raw", "fir"].contains(&m.key));
-    let curves = paths.iter().filter(in_scale).map(|path| {
+    let corrected = paths.iter().filter(|path| path.method.is_some()).filter(in_scale);
+    let curves = corrected.map(|path| {
         let errors = path.yaw.iter().zip(truth).enumerate();
         curve(path, errors.map(|(k, (yaw, truth))| (time(k), (yaw - truth) * 1e3)))
     });

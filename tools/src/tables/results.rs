@@ -107,7 +107,7 @@ impl SequenceErrors {
             other_devices: other_devices(sequence),
             seconds: steps.len() as f64 * crate::metrics::DT,
             metres: steps.iter().map(|step| (step.wheels[0] + step.wheels[1]).abs() / 2.0).sum(),
-            refused: estimates.refused.as_ref().map(ToString::to_string),
+            refused: estimates.refused.clone(),
             methods,
             order,
         };

@@ -96,7 +96,7 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
     let rows = methods_of(set, |_| true)
         .into_iter()
         .map(|method| Row { name: method.label.to_owned(), figures: figures(means.get(method.key), &of) });
-    let mut notes: Vec<String> = Vec::new();
+    let mut notes = vec![String::from("The paper's figures are for KAIST Urban.")];
     if let Some((network, still)) = means.get("gyronet").zip(means.get("static")) {
         notes.push(format!(
             "GyroNet's error in 1 s is {:.3} of that of static initialisation; in the paper {:.3}.",

@@ -53,6 +53,7 @@ fn exact() -> Sequence {
         path: PathBuf::from("urban18"),
         layout: Layout::Kaist,
         simulated: None,
+        has_gyro: true,
         has_vendor: true,
         wheel_base: None,
         steps: (0..6_000).map(step).collect(),
