@@ -25,6 +25,8 @@ enum Command {
     Import(commands::import::Args),
     Tables(commands::tables::Args),
     Quantize(commands::quantize::Args),
+    Monitor(commands::monitor::Args),
+    Bus(commands::bus::Args),
     BenchTarget(commands::bench_target::Args),
 }
 
@@ -38,6 +40,8 @@ fn main() -> ExitCode {
         Command::Import(args) => commands::import::run(args, common),
         Command::Tables(args) => commands::tables::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
+        Command::Bus(args) => commands::bus::run(args, common),
+        Command::Monitor(args) => commands::monitor::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
