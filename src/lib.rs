@@ -8,6 +8,7 @@ pub mod compensate;
 pub mod health;
 pub mod model;
 pub mod nn;
+pub mod odometry;
 pub mod pipeline;
 pub mod sample;
 pub mod sensor;
