@@ -1,5 +1,6 @@
 //! gyronet on a host: read recordings, simulate, quantise, replay, evaluate, draw.
 
+pub mod ablation;
 pub mod bundled;
 pub mod candump;
 pub mod checkpoint;
@@ -19,3 +20,4 @@ pub mod simulate;
 pub mod target_bench;
 pub mod via;
 pub mod weight_file;
+pub mod wheel_rates;

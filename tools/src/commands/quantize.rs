@@ -2,6 +2,7 @@
 
 use super::{Common, WriteError};
 use gyronet::model::GyroNet;
+use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::bundled;
 use gyronet_tools::checkpoint::Checkpoint;
 use gyronet_tools::drive::Drive;
@@ -41,7 +42,7 @@ pub fn run(args: &Args, _common: Common) -> super::Result {
     for drive in &drives {
         let (mut integer, mut reference) = (GyroNet::new(weights.blob()?), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
-        Drive::run(drive, &mut both, || {})?;
+        Drive::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
         let error = both.error();
         println!(
             "{}: quantisation adds {:.2} % RMS ({:.2} % to the scale) over {} windows, {} inputs clamped",
