@@ -9,6 +9,7 @@ pub mod health;
 pub mod model;
 pub mod mounting;
 pub mod nn;
+pub mod odometry;
 pub mod pipeline;
 pub mod sample;
 pub mod sensor;

@@ -4,12 +4,14 @@ pub mod bench_target;
 pub mod bus;
 pub mod demo;
 pub mod evaluate;
+pub mod import;
 pub mod monitor;
 mod networks;
 mod progress;
 pub mod quantize;
 pub mod replay;
 pub mod simulate;
+pub mod tables;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.
