@@ -2,11 +2,14 @@
 
 use super::networks::Weights;
 use super::{Common, WriteError, import, progress};
-use gyronet::model::GyroNet;
+use gyronet::model::fognet::FogNetState;
+use gyronet::model::{FogNet, GyroNet};
+use gyronet_tools::bundled;
 use gyronet_tools::sequence::{self, Sequence};
 use gyronet_tools::simulate::layout::Layout;
 use gyronet_tools::tables::results::{Results, SequenceErrors};
 use gyronet_tools::tables::{html, methods, pictures, table};
+use gyronet_tools::weight_file::WeightFile;
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
@@ -31,6 +34,9 @@ pub struct Args {
     /// Weight file of GyroNet, instead of the one that comes with the library.
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
+    /// Weight file of FoGNet, instead of the one that comes with the library.
+    #[arg(long, value_name = "BLOB")]
+    fog_weights: Option<PathBuf>,
 }
 
 /// Name of a sequence's pictures: folders of different data sets may have the same name.
@@ -46,6 +52,13 @@ fn title(sequence: &Sequence, number: usize) -> String {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = Weights::open(args.weights.as_deref())?;
     let mut network = GyroNet::new(weights.blob()?);
+    let fog_weights = args.fog_weights.as_deref().map(WeightFile::read_fognet).transpose()?;
+    let fog_blob = match &fog_weights {
+        Some(file) => file.fog_blob()?,
+        None => bundled::fog_blob()?,
+    };
+    let mut fog_state = FogNetState::ZERO;
+    let mut fognet = FogNet::new(fog_blob, &mut fog_state);
     let mut folders = Vec::new();
     for folder in &args.folders {
         folders.extend(sequence::find(folder)?);
@@ -53,8 +66,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for folder in &folders {
         let sequence = import::read(folder, common)?;
-        let bar = progress::bar(common, sequence.steps.len(), &sequence.name);
-        let estimates = methods::run(&sequence, &mut network, || bar.inc(1));
+        let bar = progress::bar(common, 3 * sequence.steps.len(), &sequence.name);
+        let mut estimates = methods::run(&sequence, &mut network, || bar.inc(1));
+        estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
         bar.finish_and_clear();
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
         if args.out.is_some() {

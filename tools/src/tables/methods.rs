@@ -9,14 +9,18 @@
 
 use crate::drive::{Drive, Step};
 use crate::fir;
+use crate::fog_drive;
 use crate::metrics::DT;
 use crate::recording::Recording;
 use crate::sequence::Sequence;
 use crate::simulate::world::EARTH_RATE;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
+use gyronet::fog::FogConfig;
 use gyronet::model::WindowNetwork;
+use gyronet::model::fognet::MinuteNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
+use gyronet::seconds::Padding;
 use gyronet::units::AngularRate;
 use std::time::Instant;
 
@@ -68,6 +72,10 @@ pub const GYRONET_ONLINE: Method = mems("gyronet_online", "GyroNet, sent at once
 pub const FOG: Method = fog("fog", "FoG");
 /// Less the Earth's rate at the place's latitude.
 pub const FOG_EARTH: Method = fog("fog_earth", "FoG less Earth rate");
+/// FoGNet, its first minute padded.
+pub const FOGNET: Method = fog("fognet", "FoGNet");
+/// FoGNet, its first minute uncorrected.
+pub const FOGNET_NOPAD: Method = fog("fognet_nopad", "FoGNet, no padding");
 
 /// What a method makes of a sequence.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,6 +118,27 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, tick: impl FnM
 }
 
 impl Estimates {
+    /// Adds FoGNet, padded and not, where there is an inertial sensor; `tick` is called for each
+    /// step of both.
+    pub fn add_fognet(
+        &mut self,
+        sequence: &Sequence,
+        network: &mut impl MinuteNetwork,
+        mut tick: impl FnMut(),
+    ) {
+        if !sequence.has_gyro {
+            return;
+        }
+        for (method, padding) in [(FOGNET, FogConfig::DEFAULT.padding), (FOGNET_NOPAD, Padding::None)] {
+            let started = Instant::now();
+            let config = FogConfig { padding, ..FogConfig::DEFAULT };
+            let drive = fog_drive::run(sequence, network, config, &mut tick);
+            let run_time = started.elapsed().as_secs_f64();
+            let turns = drive.turns[self.start..].to_vec();
+            self.methods.push(Estimate { method, turns, run_time });
+        }
+    }
+
     /// The methods that start from the inertial sensor.
     fn inertial(
         &mut self,
