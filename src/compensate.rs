@@ -13,6 +13,7 @@
 use crate::model::Corrections;
 use crate::units::AngularRate;
 use crate::window::WINDOW;
+use serde::{Deserialize, Serialize};
 
 /// Samples between two windows.
 pub const HOP: u32 = 5;
@@ -21,7 +22,7 @@ pub const HOP: u32 = 5;
 pub const DELAY: u32 = 2;
 
 /// Bounds of the correction.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CompensateConfig {
     /// A window whose mean correction is larger is not believed (rad/s code). Vibration makes
     /// single corrections large; their mean is bias-like and small.

@@ -11,5 +11,6 @@ pub mod nn;
 pub mod pipeline;
 pub mod sample;
 pub mod sensor;
+pub mod store;
 pub mod units;
 pub mod window;

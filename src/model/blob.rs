@@ -23,6 +23,7 @@
 use crate::nn::lstm::{Direction, ROW_LIMIT, row_bound};
 use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
 use crate::window::{FEATURES, WINDOW};
+use serde::{Deserialize, Serialize};
 
 /// First bytes of a weight file.
 pub const MAGIC: [u8; 4] = *b"GYRN";
@@ -41,7 +42,7 @@ pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 compile_error!("weights are read in place as little-endian words");
 
 /// Why a weight file is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BlobError {
