@@ -88,7 +88,8 @@ impl Compensator {
         let newest = Best { sum: 0, count: 0, value: self.prior };
         self.best[REACH - 1] = newest;
         let settled = (oldest.count > 0).then_some(AngularRate(oldest.value));
-        let bound = if good { i64::from(self.config.max_carry.0) } else { 0 };
+        // A negative bound would be none.
+        let bound = if good { i64::from(self.config.max_carry.0).max(0) } else { 0 };
         let carried = self.carry.clamp(-bound, bound);
         self.carry -= carried;
         (AngularRate(newest.value.saturating_add(carried as i32)), settled)
@@ -108,7 +109,7 @@ impl Compensator {
         for (best, correction) in self.best.iter_mut().zip(corrections) {
             best.sum += i64::from(correction.0);
             best.count += 1;
-            let value = (best.sum / i64::from(best.count)) as i32;
+            let value = best.sum.checked_div(i64::from(best.count)).unwrap_or(0) as i32;
             self.carry += i64::from(value) - i64::from(best.value);
             best.value = value;
         }

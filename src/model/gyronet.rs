@@ -68,10 +68,12 @@ impl<'w> GyroNet<'w> {
     pub fn advance(&mut self) -> Option<Estimate> {
         let Self { blob, state } = self;
         let GyroNetState { input, layer1, scratch, sums, clamped_inputs, run } = state;
-        let (forward, backward) = blob.dense.weights.split_at(HIDDEN);
+        let (forward, backward) = blob.dense.weights.split_at_checked(HIDDEN).unwrap_or_default();
         let more = run.as_mut()?.advance(&blob.layers, input, layer1, scratch, |way, step, hidden| {
             let weights = if way == Way::Forward { forward } else { backward };
-            sums[step] = sums[step].wrapping_add(Dense::partial(weights, hidden));
+            if let Some(sum) = sums.get_mut(step) {
+                *sum = sum.wrapping_add(Dense::partial(weights, hidden));
+            }
         });
         if more {
             return None;
@@ -95,7 +97,7 @@ impl<'w> GyroNet<'w> {
                 bilstm::store(layer1, step, offset, 2 * HIDDEN, HIDDEN, hidden);
             });
         }
-        let (forward, backward) = dense.weights.split_at(HIDDEN);
+        let (forward, backward) = dense.weights.split_at_checked(HIDDEN).unwrap_or_default();
         let mut sum = dense.bias;
         let mut add = |weights, step, hidden: &[u32]| {
             if step == WINDOW - 1 {
@@ -117,7 +119,7 @@ impl<'w> GyroNet<'w> {
             let mut values = [0; FEATURES];
             for ((to, code), n) in values.iter_mut().zip(features).zip(&self.blob.normalisation) {
                 let value = normalise(*code, *n);
-                let inside = value.clamp(-clamp, clamp);
+                let inside = value.min(clamp).max(-clamp);
                 clamped += u16::from(inside != value);
                 *to = inside as i16;
             }

@@ -111,7 +111,8 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
             // At nearly every byte: moving the buffer onto itself would cost its length.
             return;
         }
-        let left = self.buffer.len() - count.min(self.buffer.len());
+        let count = count.min(self.buffer.len());
+        let left = self.buffer.len() - count;
         self.buffer.copy_within(count.., 0);
         self.buffer.truncate(left);
     }
