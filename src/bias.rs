@@ -77,6 +77,8 @@ pub enum StaticError {
         /// Its mean.
         mean: f32,
     },
+    /// The wheels turn.
+    Wheels,
 }
 
 impl core::fmt::Display for StaticError {
@@ -97,6 +99,7 @@ impl core::fmt::Display for StaticError {
             Self::GyroBias { axis, mean } => {
                 write!(f, "gyro {} shows a steady {mean:.4} rad/s", name(axis))
             }
+            Self::Wheels => f.write_str("the wheels turn"),
         }
     }
 }
@@ -146,18 +149,27 @@ pub struct StaticInit {
     gyro: [Axis; 3],
     accel: [Axis; 3],
     count: u32,
+    /// Turning wheels have been refused, and no sample has been taken since.
+    wheels_refused: bool,
 }
 
 impl StaticInit {
     /// Starts collecting.
     #[must_use]
     pub fn new(config: StaticConfig) -> Self {
-        Self { config, gyro: [Axis::default(); 3], accel: [Axis::default(); 3], count: 0 }
+        Self {
+            config,
+            gyro: [Axis::default(); 3],
+            accel: [Axis::default(); 3],
+            count: 0,
+            wheels_refused: false,
+        }
     }
 
     /// Takes a sample; after [`STATIC_SAMPLES`] of them returns the gyro's bias, or why there
     /// is none, and starts anew.
     pub fn process(&mut self, sample: &ImuSample) -> Option<Result<[AngularRate; 3], StaticError>> {
+        self.wheels_refused = false;
         for axis in 0..3 {
             let rate = sample.angular_rate[axis].0;
             let force = sample.specific_force[axis].0;
@@ -171,6 +183,14 @@ impl StaticInit {
         let result = self.judge();
         *self = Self::new(self.config);
         Some(result)
+    }
+
+    /// The wheels turn, whatever the sample looks like: forgets what was collected. Says so once,
+    /// not with every sample of a drive.
+    pub fn refuse_wheels(&mut self) -> Option<StaticError> {
+        let refused = self.wheels_refused;
+        *self = Self { wheels_refused: true, ..Self::new(self.config) };
+        (!refused).then_some(StaticError::Wheels)
     }
 
     /// Forgets what was collected.

@@ -13,4 +13,5 @@ pub mod sample;
 pub mod sensor;
 pub mod store;
 pub mod units;
+pub mod vehicle;
 pub mod window;

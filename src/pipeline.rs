@@ -1,4 +1,4 @@
-//! Samples in, corrected yaw rate and CAN frame out. This file owns the order of things and
+//! Samples in, corrected yaw rate and what it is worth out. This file owns the order of things and
 //! nothing else; no module below it knows its neighbours. No clock is read: the samples' own
 //! time stamps drive everything.
 //!
@@ -9,12 +9,12 @@
 
 use crate::align::{AlignError, Aligner};
 use crate::bias::{StaticConfig, StaticError, StaticInit};
-use crate::can::bosch::{self, SignalStatus, Tx1, YawRateSignal};
 use crate::compensate::{CompensateConfig, Compensator, DELAY, HOP, Implausible, SETTLED_AFTER};
-use crate::health::{Counters, Status, count};
+use crate::health::{Counters, Faults, Status, count, judge};
 use crate::model::Estimate;
-use crate::sample::{Frame, ImuSample};
+use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
 use crate::units::{AngularRate, Yaw};
+use crate::vehicle::{VehicleSample, YawSample};
 use crate::window::{self, Features, WINDOW, Window};
 
 /// Everything that can be set.
@@ -73,8 +73,8 @@ pub struct DueWindow {
 pub struct Output {
     /// The corrected yaw rate.
     pub yaw_rate: YawRate,
-    /// The same as the CAN message TX1.
-    pub tx1: Tx1,
+    /// The same with all that is sent beside it, for [`crate::can::feeds::Feeds`].
+    pub vehicle: VehicleSample,
     /// The sample whose estimate is final with this one, if windows have covered it.
     pub settled: Option<Settled>,
     /// Run this through the network and [`Pipeline::deliver`] the estimate before the sample
@@ -99,7 +99,13 @@ pub struct Pipeline {
     compensator: Compensator,
     believed: bool,
     yaw: Yaw,
-    signal: YawRateSignal,
+    /// What was wrong with the newest estimate.
+    estimate_faults: Faults,
+    /// Samples until a gap is a whole window away.
+    gap_within: u32,
+    wheels: Option<WheelSample>,
+    /// Wheels that have had a speed.
+    wheels_seen: [bool; WHEELS],
     counters: Counters,
 }
 
@@ -117,7 +123,10 @@ impl Pipeline {
             compensator: Compensator::new(config.compensate),
             believed: false,
             yaw: Yaw::default(),
-            signal: YawRateSignal::default(),
+            estimate_faults: Faults::NONE,
+            gap_within: 0,
+            wheels: None,
+            wheels_seen: [false; WHEELS],
             counters: Counters::default(),
         }
     }
@@ -131,7 +140,7 @@ impl Pipeline {
         count(&mut self.counters.samples, 1);
         if frame.missing > 0 {
             count(&mut self.counters.missing, frame.missing);
-            self.break_window();
+            self.gap();
         }
         if sample.clipped {
             count(&mut self.counters.clipped, 1);
@@ -148,9 +157,19 @@ impl Pipeline {
                 (yaw_rate, settled, None)
             }
         };
-        let tx1 = self.tx1(&yaw_rate, &sample);
+        let vehicle = self.vehicle(&yaw_rate, &sample);
         let window = self.due_window(frame.tick);
-        Ok(Output { yaw_rate, tx1, settled, window, refused, implausible })
+        self.gap_within = self.gap_within.saturating_sub(1);
+        Ok(Output { yaw_rate, vehicle, settled, window, refused, implausible })
+    }
+
+    /// Takes what is known of the wheels, from [`crate::can::wheel::WheelReceiver`]: to be called
+    /// before each sample where wheel speeds are configured, since silence is told here too.
+    pub fn wheels(&mut self, wheels: WheelSample) {
+        for (seen, speed) in self.wheels_seen.iter_mut().zip(&wheels.speeds) {
+            *seen |= speed.is_some();
+        }
+        self.wheels = Some(wheels);
     }
 
     /// Takes back the estimate of a window that [`Output::window`] handed out.
@@ -185,11 +204,16 @@ impl Pipeline {
     fn refuse(&mut self, error: AlignError) {
         if let AlignError::Jump { .. } = error {
             count(&mut self.counters.clock_jumps, 1);
-            self.break_window();
+            self.gap();
             self.static_init.restart();
         } else {
             count(&mut self.counters.misplaced, 1);
         }
+    }
+
+    fn gap(&mut self) {
+        self.gap_within = WINDOW as u32;
+        self.break_window();
     }
 
     /// A window must not reach across a gap; neither must static initialisation.
@@ -199,6 +223,7 @@ impl Pipeline {
         self.out = None;
         self.compensator.break_window();
         self.believed = false;
+        self.estimate_faults = Faults::NONE;
         if self.gyro_bias.is_none() {
             self.static_init.restart();
         }
@@ -213,6 +238,7 @@ impl Pipeline {
         let Some(estimate) = estimate else {
             count(&mut self.counters.late, 1);
             self.believed = false;
+            self.estimate_faults = Faults::LATE;
             self.compensator.forget();
             return None;
         };
@@ -220,13 +246,20 @@ impl Pipeline {
         count(&mut self.counters.clamped_inputs, u32::from(estimate.clamped_inputs));
         let implausible = self.compensator.revise(&estimate.corrections).err();
         self.believed = implausible.is_none();
+        self.estimate_faults = if self.believed { Faults::NONE } else { Faults::IMPLAUSIBLE };
         count(&mut self.counters.implausible, u32::from(implausible.is_some()));
         implausible
     }
 
     fn initialise(&mut self, frame: &Frame) -> (YawRate, Option<StaticError>) {
-        // A clipped reading says nothing about the bias; the gap it leaves has restarted it.
-        let judged = if frame.sample.clipped { None } else { self.static_init.process(&frame.sample) };
+        let judged = if self.standstill() == Standstill::Moving {
+            self.static_init.refuse_wheels().map(Err)
+        } else if frame.sample.clipped {
+            // A clipped reading says nothing about the bias; the gap it leaves has restarted it.
+            None
+        } else {
+            self.static_init.process(&frame.sample)
+        };
         let refused = match judged {
             Some(Ok(bias)) => {
                 self.gyro_bias = Some(bias);
@@ -273,27 +306,49 @@ impl Pipeline {
         Some(DueWindow { end: tick, features })
     }
 
-    fn tx1(&mut self, yaw_rate: &YawRate, sample: &ImuSample) -> Tx1 {
-        let mut yaw_rate_status = match yaw_rate.status {
-            Status::Init => SignalStatus::INITIALISING,
-            Status::Clipped => SignalStatus::FAILURE,
-            Status::Ready | Status::Degraded => SignalStatus::OK,
-        };
-        let code = self.signal.encode(yaw_rate.rate).unwrap_or_else(|limit| {
-            count(&mut self.counters.out_of_range, 1);
-            yaw_rate_status = SignalStatus::FAILURE;
-            limit.0
-        });
-        let [_, lateral, _] = sample.specific_force;
-        let (lateral_acceleration, lateral_acceleration_status) = bosch::encode_acceleration(lateral);
-        Tx1 {
-            yaw_rate: code,
-            yaw_rate_status,
-            temperature: bosch::encode_temperature(sample.temperature),
-            lateral_acceleration,
-            lateral_acceleration_status,
-            // The grid step, so that a receiver sees what is missing.
-            counter: (yaw_rate.tick & 0x0F) as u8,
+    /// Whether the vehicle stands, by its wheels.
+    fn standstill(&self) -> Standstill {
+        self.wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill)
+    }
+
+    /// What is wrong with this sample.
+    fn faults(&self, sample: &ImuSample) -> Faults {
+        let fault = |present: bool, fault| if present { fault } else { Faults::NONE };
+        self.estimate_faults
+            .with(fault(self.gap_within > 0, Faults::GAP))
+            .with(fault(sample.clipped, Faults::CLIPPED))
+            .with(fault(self.wheels_silent(), Faults::WHEELS))
+    }
+
+    /// A wheel that has had a speed has none, or none has ever had one.
+    fn wheels_silent(&self) -> bool {
+        let Some(WheelSample { speeds, .. }) = self.wheels else { return false };
+        let lost = |(speed, seen): (&Option<_>, bool)| seen && speed.is_none();
+        speeds.iter().all(Option::is_none) || speeds.iter().zip(self.wheels_seen).any(lost)
+    }
+
+    fn vehicle(&self, yaw_rate: &YawRate, sample: &ImuSample) -> VehicleSample {
+        let (source, quality) = judge(yaw_rate.status);
+        let [roll_bias, pitch_bias, _] = self.gyro_bias.unwrap_or_default();
+        let [roll_rate, pitch_rate, _] = sample.angular_rate;
+        let less = |rate: AngularRate, bias: AngularRate| AngularRate(rate.0.saturating_sub(bias.0));
+        VehicleSample {
+            yaw: YawSample {
+                rate: yaw_rate.rate,
+                correction: yaw_rate.correction,
+                yaw: yaw_rate.yaw,
+                sigma: None,
+                source,
+                quality,
+                faults: self.faults(sample),
+                // The pipeline has no clock.
+                latency_us: None,
+            },
+            roll_rate: less(roll_rate, roll_bias),
+            pitch_rate: less(pitch_rate, pitch_bias),
+            specific_force: sample.specific_force,
+            temperature: sample.temperature,
+            tick: yaw_rate.tick,
         }
     }
 }

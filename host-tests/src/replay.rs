@@ -1,10 +1,15 @@
 //! The board's main loop on the host: bytes of an Xsens MTi in, SLCAN lines out.
 
 use crate::recordings::Row;
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sensor::xsens::{MtData2, Mti};
+
+/// What the image sends.
+pub const CONFIG: Config = Config::SLCAN_115200;
 
 /// The message that an MTi would send for a row.
 #[must_use]
@@ -29,6 +34,7 @@ pub fn lines(bytes: &[u8]) -> Vec<Vec<u8>> {
         GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
     let mut mti = Mti::new();
     let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+    let mut feeds = Feeds::new(CONFIG);
     let mut lines = Vec::new();
     for byte in bytes {
         mti.push(*byte);
@@ -37,9 +43,10 @@ pub fn lines(bytes: &[u8]) -> Vec<Vec<u8>> {
             if let Some(due) = output.window {
                 pipeline.deliver(due.end, network.estimate(&due.features));
             }
-            let frame: DataFrame = output.tx1.frame().expect("a classic frame holds eight bytes");
-            let line = slcan::emit(&frame).expect("a data frame");
-            lines.push(line.strip_suffix(b"\r").expect("a CR").to_vec());
+            for frame in feeds.process::<DataFrame>(&output.vehicle) {
+                let line = slcan::emit(&frame).expect("a data frame");
+                lines.push(line.strip_suffix(b"\r").expect("a CR").to_vec());
+            }
         }
     }
     lines

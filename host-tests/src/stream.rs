@@ -1,7 +1,7 @@
 //! A pipeline fed with samples, and a network of the test's own behind it.
 
 use crate::synthetic::{rate, turning};
-use gyronet::health::Status;
+use gyronet::health::{Faults, Status};
 use gyronet::model::Estimate;
 use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
@@ -55,4 +55,11 @@ pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
         .chunk_by(|a, b| a.yaw_rate.status == b.yaw_rate.status)
         .map(|run| (run[0].yaw_rate.status, run.len()))
         .collect()
+}
+
+/// Runs of equal faults: which, and how many samples.
+#[must_use]
+pub fn faults(outputs: &[Output]) -> Vec<(Faults, usize)> {
+    let faults = |output: &Output| output.vehicle.yaw.faults;
+    outputs.chunk_by(|a, b| faults(a) == faults(b)).map(|run| (faults(&run[0]), run.len())).collect()
 }

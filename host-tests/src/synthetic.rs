@@ -1,11 +1,10 @@
 //! Samples of a vehicle that stands, turns or shakes, in the codes of the pipeline.
 
 use crate::noise::Noise;
-use gyronet::can::feeds::VehicleSample;
-use gyronet::can::yaw::{Quality, Source};
-use gyronet::can::yaw_feed::YawSample;
+use gyronet::health::{Quality, Source};
 use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
+use gyronet::vehicle::{VehicleSample, YawSample};
 
 /// rad/s to a code.
 ///

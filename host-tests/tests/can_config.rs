@@ -4,9 +4,10 @@ use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, Vdc2Settings, YawSettings};
 use gyronet::can::e2e::{DataIdMode, P11Mode};
-use gyronet::can::feeds::{Feeds, VehicleSample};
+use gyronet::can::feeds::Feeds;
 use gyronet::can::yaw::Quality;
 use gyronet::units::{AngularRate, Yaw};
+use gyronet::vehicle::VehicleSample;
 use gyronet_host_tests::synthetic;
 
 const YAW: YawSettings = match Settings::DEFAULT.yaw {
@@ -108,6 +109,12 @@ fn e2e_identifiers_tell_the_messages_apart() {
     ] {
         assert!(Config::new(with_e2e(e2e)).is_ok(), "{e2e:?}");
     }
+}
+
+#[test]
+fn what_comes_with_the_library_is_checked() {
+    assert_eq!(Config::new(Settings::DEFAULT), Ok(Config::DEFAULT));
+    assert_eq!(Config::new(Settings::SLCAN_115200), Ok(Config::SLCAN_115200));
 }
 
 fn sample(tick: u32) -> VehicleSample {

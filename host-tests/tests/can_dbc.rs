@@ -5,11 +5,12 @@ use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch;
 use gyronet::can::config::{Config, Settings, Vdc2Settings};
-use gyronet::can::feeds::{Feeds, VehicleSample};
+use gyronet::can::feeds::Feeds;
 use gyronet::can::j1939::Vdc2;
 use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, Quality, RateMessage, Source};
-use gyronet::can::yaw_feed::YawSample;
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
+use gyronet::vehicle::VehicleSample;
+use gyronet::vehicle::YawSample;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 

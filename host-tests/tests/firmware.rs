@@ -1,9 +1,10 @@
 //! The image that is flashed, in QEMU: the same bytes give the same frames as on the host, and
 //! as `gyronet replay` makes of the same recording.
 
-use embedded_can::Frame;
+use embedded_can::{Frame, Id};
 use gyronet::bias::STATIC_SAMPLES;
-use gyronet::can::bosch::{SignalStatus, Tx1};
+use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
+use gyronet::can::feeds::Feeds;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::noise::Noise;
@@ -36,9 +37,8 @@ fn messages(recording: &Path) -> Vec<Vec<u8>> {
 }
 
 /// What one line of SLCAN carries.
-fn payload(line: &[u8]) -> [u8; 8] {
-    let frame: DataFrame = slcan::parse(line).expect("a line");
-    frame.data().try_into().expect("eight bytes")
+fn frame(line: &[u8]) -> DataFrame {
+    slcan::parse(line).expect("a line")
 }
 
 /// Sends bytes to the emulated board and holds its lines against the host's.
@@ -55,23 +55,25 @@ fn compare(test: &str, elf: &Path, arguments: &[&str], bytes: &[u8]) {
         assert_eq!(text(line), text(expected), "{test}: frame {number}");
     }
     // All of them are good that come after static initialisation.
-    let good = lines.iter().filter(|line| {
-        Tx1::parse(&payload(line)).expect("a good checksum").yaw_rate_status == SignalStatus::OK
-    });
-    assert_eq!(good.count(), lines.len().saturating_sub(STATIC_SAMPLES as usize), "{test}");
+    let frames = lines.iter().map(|line| frame(line)).filter(|frame| frame.id() == Id::Standard(TX1_ID));
+    let tx1: Vec<Tx1> = frames.map(|frame| Tx1::parse(frame.data()).expect("a good checksum")).collect();
+    let good = tx1.iter().filter(|tx1| tx1.yaw_rate_status == SignalStatus::OK);
+    assert_eq!(good.count(), tx1.len().saturating_sub(STATIC_SAMPLES as usize), "{test}");
 }
 
-/// The wire and the file give the same payloads on the host.
+/// The wire and the file give the same frames on the host.
 fn wire_against_file(path: &Path) {
     let recording = Recording::read(path).expect("a recording");
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
     let drive = Drive::run(&recording, &mut GyroNet::new(blob), || {}).expect("it stands still first");
-    let file: Vec<[u8; 8]> = drive.steps.iter().map(|step| step.tx1.emit()).collect();
-    let wire: Vec<[u8; 8]> =
-        replay::lines(&messages(path).concat()).iter().map(|line| payload(line)).collect();
+    let mut feeds = Feeds::new(replay::CONFIG);
+    let file: Vec<DataFrame> =
+        drive.steps.iter().flat_map(|step| feeds.process::<DataFrame>(&step.vehicle)).collect();
+    let wire: Vec<DataFrame> =
+        replay::lines(&messages(path).concat()).iter().map(|line| frame(line)).collect();
     assert!(
         file == wire,
-        "{}: {} payloads from the file, {} from bytes",
+        "{}: {} frames from the file, {} from bytes",
         path.display(),
         file.len(),
         wire.len()

@@ -1,14 +1,15 @@
 //! The pipeline on made-up streams: status from initialisation to a corrected rate, and what a
 //! gap, clipping, motion or a jumping clock does to it.
 
-use gyronet::can::bosch::SignalStatus;
 use gyronet::compensate::{DELAY, HOP};
 use gyronet::health::Status::{Clipped, Degraded, Init, Ready};
+use gyronet::health::{Faults, Quality, judge};
 use gyronet::sample::ImuSample;
 use gyronet::units::AngularRate;
+use gyronet::vehicle::VehicleSample;
 use gyronet::window::WINDOW;
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::stream::{KNOWN, constant, drive, new, run, statuses};
+use gyronet_host_tests::stream::{KNOWN, constant, drive, faults, new, run, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
 
 /// First tick that a window covers: ten samples, then the delay.
@@ -29,10 +30,9 @@ fn init_then_degraded_then_ready() {
     assert_eq!(at(COVERED - 1).rate, less_bias);
     assert_eq!(at(399).rate, AngularRate(less_bias.0 - rate(0.002).0));
     for output in &outputs {
-        let status =
-            if output.yaw_rate.status == Init { SignalStatus::INITIALISING } else { SignalStatus::OK };
-        assert_eq!(output.tx1.yaw_rate_status, status);
-        assert_eq!(u32::from(output.tx1.counter), output.yaw_rate.tick % 16);
+        let VehicleSample { yaw, tick, .. } = output.vehicle;
+        assert_eq!((yaw.source, yaw.quality), judge(output.yaw_rate.status));
+        assert_eq!((yaw.rate, yaw.faults, tick), (output.yaw_rate.rate, Faults::NONE, output.yaw_rate.tick));
     }
     // The first window ends with the tenth sample, the others follow every fifth.
     let ends: Vec<u32> = outputs.iter().filter_map(|output| Some(output.window?.end)).collect();
@@ -64,8 +64,9 @@ fn a_gap_degrades_and_heals() {
         statuses(&outputs),
         [(Init, 300), (Degraded, 11), (Ready, 89), (Degraded, broken), (Ready, 97 - broken)]
     );
-    let counters = [&outputs[399], &outputs[400]].map(|output| u32::from(output.tx1.counter));
-    assert_eq!(counters, [399 % 16, 403 % 16], "a receiver sees what is missing");
+    let ticks = [&outputs[399], &outputs[400]].map(|output| output.vehicle.tick);
+    assert_eq!(ticks, [399, 403], "a receiver sees what is missing");
+    assert_eq!(faults(&outputs), [(Faults::NONE, 400), (Faults::GAP, WINDOW), (Faults::NONE, 97 - WINDOW)]);
     assert_eq!((pipeline.counters().missing, pipeline.counters().samples), (3, 497));
 }
 
@@ -90,8 +91,9 @@ fn clipping_is_a_failure_until_it_is_over() {
         [(Init, 300), (Degraded, 11), (Ready, 89), (Clipped, 3), (Degraded, 11), (Ready, 86)]
     );
     for output in &outputs[400..403] {
-        assert_eq!(output.tx1.yaw_rate_status, SignalStatus::FAILURE);
+        assert_eq!(output.vehicle.yaw.quality, Quality::Unusable);
     }
+    assert_eq!(faults(&outputs), [(Faults::NONE, 400), (Faults::CLIPPED, 3), (Faults::NONE, 97)]);
     assert_eq!(pipeline.counters().clipped, 3);
 }
 
@@ -145,5 +147,6 @@ fn a_clock_jump_is_counted_and_survived() {
     let outputs = run(&mut pipeline, drive((1..100).map(later)), constant(0.0));
     assert_eq!(statuses(&outputs), [(Degraded, 11), (Ready, 88)]);
     assert_eq!((pipeline.counters().clock_jumps, pipeline.counters().missing), (1, 0));
+    assert_eq!(faults(&outputs), [(Faults::GAP, WINDOW), (Faults::NONE, 99 - WINDOW)]);
     assert_eq!(outputs[0].yaw_rate.tick, 400);
 }

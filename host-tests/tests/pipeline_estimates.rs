@@ -1,14 +1,19 @@
 //! Estimates that come late, not at all or wrong, and rates that do not fit: the pipeline falls
 //! back to the gyro less its bias, or says that there is no good rate.
 
-use gyronet::can::bosch::SignalStatus;
+use embedded_can::Frame;
+use gyronet::can::DataFrame;
+use gyronet::can::bosch::{SignalStatus, Tx1};
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
 use gyronet::compensate::{CompensateConfig, DELAY, HOP};
+use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init, Ready};
 use gyronet::model::Estimate;
-use gyronet::pipeline::DueWindow;
+use gyronet::pipeline::{DueWindow, Output};
 use gyronet::units::AngularRate;
 use gyronet::window::WINDOW;
-use gyronet_host_tests::stream::{constant, drive, new, run, statuses};
+use gyronet_host_tests::stream::{constant, drive, faults, new, run, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
 
 #[test]
@@ -53,6 +58,7 @@ fn a_network_that_dies_leaves_the_gyro_less_its_bias() {
     assert_eq!(statuses(&outputs)[2].0, Ready);
     let last = outputs[599].yaw_rate;
     assert_eq!((last.status, pipeline.carry()), (Degraded, 0));
+    assert_eq!(faults(&outputs), [(Faults::NONE, 456), (Faults::LATE, 144)]);
     assert_eq!(last.correction, AngularRate(0), "an old estimate must not be applied for ever");
 }
 
@@ -80,6 +86,7 @@ fn an_implausible_estimate_is_not_believed() {
     assert_eq!(statuses(&outputs), [(Init, 300), (Degraded, 11), (Ready, 45), (Degraded, 44)]);
     assert_eq!((pipeline.counters().implausible, pipeline.counters().clamped_inputs), (9, 18));
     assert_eq!(outputs.iter().filter(|output| output.implausible.is_some()).count(), 9);
+    assert_eq!(faults(&outputs), [(Faults::NONE, 356), (Faults::IMPLAUSIBLE, 44)]);
     let last = outputs[399].yaw_rate;
     assert_eq!((last.correction, pipeline.carry()), (AngularRate(0), 0));
 }
@@ -89,13 +96,22 @@ fn a_rate_beyond_the_signal_is_marked() {
     let mut pipeline = new();
     let samples = (0..320).map(|tick| turning(tick, rate(if tick < 310 { 0.0 } else { 3.0 })));
     let outputs = run(&mut pipeline, samples, constant(0.0));
-    for output in &outputs[310..] {
-        assert_eq!((output.tx1.yaw_rate, output.tx1.yaw_rate_status), (0xFFFF, SignalStatus::FAILURE));
+    let mut feeds = Feeds::new(Config::DEFAULT);
+    for (number, tx1) in tx1(&mut feeds, &outputs).iter().enumerate() {
+        let failed = (tx1.yaw_rate, tx1.yaw_rate_status) == (0xFFFF, SignalStatus::FAILURE);
+        assert_eq!(failed, number >= 310, "{number}");
     }
-    assert_eq!(pipeline.counters().out_of_range, 10);
+    assert_eq!(feeds.out_of_range(), 10);
     // Neither do the largest codes wrap.
     let samples = (0..400).map(|tick| turning(tick, AngularRate(if tick < 300 { 1_000 } else { i32::MIN })));
     let outputs = run(&mut new(), samples, constant(0.01));
     assert_eq!(outputs[399].yaw_rate.rate, AngularRate(i32::MIN));
-    assert_eq!((outputs[399].tx1.yaw_rate, outputs[399].tx1.yaw_rate_status), (0, SignalStatus::FAILURE));
+    let last = *tx1(&mut Feeds::new(Config::DEFAULT), &outputs).last().expect("samples");
+    assert_eq!((last.yaw_rate, last.yaw_rate_status), (0, SignalStatus::FAILURE));
+}
+
+/// TX1 of each sample.
+fn tx1(feeds: &mut Feeds, outputs: &[Output]) -> Vec<Tx1> {
+    let mut first = |output: &Output| feeds.process::<DataFrame>(&output.vehicle)[0];
+    outputs.iter().map(|output| Tx1::parse(first(output).data()).expect("a good checksum")).collect()
 }

@@ -4,11 +4,12 @@
 //! has no python-can, pyserial and cantools.
 
 use gyronet::can::config::{BoschSettings, Config, Settings};
-use gyronet::can::feeds::{Feeds, VehicleSample};
+use gyronet::can::feeds::Feeds;
 use gyronet::can::slcan::assembler::LineAssembler;
 use gyronet::can::slcan::host::{Session, StatusFlags};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::units::{AngularRate, Yaw};
+use gyronet::vehicle::VehicleSample;
 use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::synthetic;
 use std::collections::BTreeMap;

@@ -3,11 +3,12 @@
 use gyronet::can::e2e::{Checker, DataIdMode, P01, P05, Profile, Verdict};
 use gyronet::can::yaw::{
     AngleMessage, DetailMessage, Faults, LATENCY_UNKNOWN, Quality, RATE_NOT_AVAILABLE, RateMessage,
-    SIGMA_UNKNOWN, Source, YawError, encode_angle, encode_latency, encode_sigma, judge,
+    SIGMA_UNKNOWN, Source, YawError, encode_angle, encode_latency, encode_sigma,
 };
-use gyronet::can::yaw_feed::{YawFeed, YawSample};
-use gyronet::health::Status;
+use gyronet::can::yaw_feed::YawFeed;
+use gyronet::health::{Status, judge};
 use gyronet::units::{AngularRate, Yaw};
+use gyronet::vehicle::YawSample;
 use proptest::prelude::*;
 
 const PERIOD_S: f64 = 0.01;

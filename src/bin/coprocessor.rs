@@ -115,9 +115,11 @@ mod board {
 #[cfg(target_os = "none")]
 mod firmware {
     use crate::board::Board;
+    use gyronet::can::config::Config;
+    use gyronet::can::feeds::Feeds;
     use gyronet::can::{DataFrame, slcan};
     use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
-    use gyronet::pipeline::{Output, Pipeline, PipelineConfig};
+    use gyronet::pipeline::{Pipeline, PipelineConfig};
     use gyronet::sensor::xsens::Mti;
     use panic_halt as _;
 
@@ -134,6 +136,7 @@ mod firmware {
         let mut network = Blob::new_checked(&weights::DEFAULT.0).ok().map(GyroNet::new);
         let mut mti = Mti::new();
         let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+        let mut feeds = Feeds::new(Config::SLCAN_115200);
         loop {
             let Some(byte) = board.receive() else {
                 cortex_m::asm::nop();
@@ -142,18 +145,16 @@ mod firmware {
             mti.push(byte);
             while let Some(sample) = mti.next_sample() {
                 if let Ok(Ok(output)) = sample.map(|sample| pipeline.process(sample)) {
-                    send(&mut board, &output);
+                    for frame in feeds.process::<DataFrame>(&output.vehicle) {
+                        if let Some(line) = slcan::emit(&frame) {
+                            board.send(&line);
+                        }
+                    }
                     if let (Some(due), Some(network)) = (output.window, network.as_mut()) {
                         pipeline.deliver(due.end, network.estimate(&due.features));
                     }
                 }
             }
-        }
-    }
-
-    fn send(board: &mut Board, output: &Output) {
-        if let Some(line) = output.tx1.frame::<DataFrame>().and_then(|frame| slcan::emit(&frame)) {
-            board.send(&line);
         }
     }
 }

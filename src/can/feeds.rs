@@ -4,28 +4,11 @@ use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};
 use super::config::{BoschSettings, Config, MAX_MESSAGES};
 use super::j1939::{Validity, Vdc2Encoder};
 use super::yaw::Quality;
-use super::yaw_feed::{YawFeed, YawSample};
-use crate::units::{AngularRate, CentiCelsius, SpecificForce};
+use super::yaw_feed::YawFeed;
+use crate::health::count;
+use crate::vehicle::VehicleSample;
 use embedded_can::{Frame, StandardId};
 use heapless::Vec;
-
-/// What goes out for one sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct VehicleSample {
-    /// Yaw and what it is worth.
-    pub yaw: YawSample,
-    /// About x, forward, less its bias.
-    pub roll_rate: AngularRate,
-    /// About y, left, less its bias.
-    pub pitch_rate: AngularRate,
-    /// Along x, y, z.
-    pub specific_force: [SpecificForce; 3],
-    /// Of the part, where known.
-    pub temperature: Option<CentiCelsius>,
-    /// Step of the grid.
-    pub tick: u32,
-}
 
 /// The encoders of all feeds.
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +17,7 @@ pub struct Feeds {
     bosch: SetEncoder,
     yaw: Option<YawFeed>,
     vdc2: Vdc2Encoder,
+    out_of_range: u32,
 }
 
 impl Feeds {
@@ -46,7 +30,14 @@ impl Feeds {
             bosch: SetEncoder::default(),
             yaw: yaw.map(|yaw| YawFeed::new(yaw.e2e.profiles(), config.samples_per_yaw())),
             vdc2: Vdc2Encoder::default(),
+            out_of_range: 0,
         }
+    }
+
+    /// Messages that had to say "failed" because a value does not fit its signal.
+    #[must_use]
+    pub fn out_of_range(&self) -> u32 {
+        self.out_of_range
     }
 
     /// The frames of one sample, in a driver's own type.
@@ -62,8 +53,10 @@ impl Feeds {
         let mut send = |frame: Option<F>| frame.map(|frame| frames.push(frame).is_ok());
         if let Some(BoschSettings { tx1_only }) = settings.bosch {
             let messages = self.bosch.encode(&motion(sample, status));
-            let count = if tx1_only { 1 } else { LAYOUTS.len() };
-            for (message, layout) in messages.iter().zip(&LAYOUTS).take(count) {
+            let sent = if tx1_only { 1 } else { LAYOUTS.len() };
+            for (message, layout) in messages.iter().zip(&LAYOUTS).take(sent) {
+                let fits = message.rate_status == status && message.acceleration_status == SignalStatus::OK;
+                count(&mut self.out_of_range, u32::from(!fits));
                 send(message.frame(layout));
             }
         }
@@ -76,6 +69,7 @@ impl Feeds {
         }
         if let Some(vdc2) = settings.vdc2 {
             let message = self.vdc2.encode(sample.yaw.rate, validity, &sample.specific_force);
+            count(&mut self.out_of_range, u32::from(validity != Validity::Error && message.has_error()));
             send(message.frame(vdc2.source));
         }
         frames

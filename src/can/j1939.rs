@@ -23,6 +23,7 @@ pub const VDC2_PRIORITY: u8 = 6;
 /// Largest code that is a value.
 const MAX_CODE: i64 = 0xFAFF;
 const ERROR: u16 = 0xFE00;
+const LONGITUDINAL_ERROR: u8 = 0xFE;
 const NOT_AVAILABLE: u16 = 0xFFFF;
 
 /// 1/8192 rad/s is 2^14 rate codes; zero is 3.92 * 8192.
@@ -91,6 +92,12 @@ impl Vdc2 {
         F::new(broadcast_id(VDC2_PGN, VDC2_PRIORITY, source)?, &self.emit())
     }
 
+    /// Whether a signal says "error".
+    #[must_use]
+    pub const fn has_error(&self) -> bool {
+        self.yaw_rate == ERROR || self.lateral == ERROR || self.longitudinal == LONGITUDINAL_ERROR
+    }
+
     /// The yaw rate in rad/s, where the code is one.
     #[must_use]
     pub fn yaw_rate_rad_per_sec(&self) -> Option<f64> {
@@ -140,7 +147,11 @@ impl Vdc2Encoder {
         Vdc2 {
             yaw_rate,
             lateral: value(lateral),
-            longitudinal: if (0..=250).contains(&longitudinal) { longitudinal as u8 } else { 0xFE },
+            longitudinal: if (0..=250).contains(&longitudinal) {
+                longitudinal as u8
+            } else {
+                LONGITUDINAL_ERROR
+            },
         }
     }
 }

@@ -19,7 +19,8 @@
 //! bits, is the angle turned between them, and a receiver that missed messages misses no angle.
 //! The rate carries its rounding residual: summed up, it is the accumulated yaw to half an LSB.
 
-use crate::health::Status;
+pub use crate::health::{Faults, Quality, Source};
+
 use crate::units::{AngularRate, Yaw};
 
 /// Rate code that says "not available".
@@ -33,83 +34,6 @@ pub const LATENCY_UNKNOWN: u8 = u8::MAX;
 const ANGLE_PER_YAW_Q56: i128 = 3_669_863_129_102_502;
 /// Codes of 1e-5 deg/s per rate code, times 2^32.
 const SIGMA_PER_CODE_Q32: u64 = 183_346_494;
-
-/// Where a rate comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-pub enum Source {
-    /// The gyro as it is.
-    #[default]
-    Raw = 0,
-    /// The gyro less its static bias.
-    Static = 1,
-    /// Corrected by GyroNet.
-    GyroNet = 2,
-    /// The fibre-optic gyro, corrected by FoGNet.
-    FogNet = 3,
-    /// The sensor is silent: the last correction goes on for a bounded time.
-    Held = 4,
-}
-
-/// What a rate is worth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-pub enum Quality {
-    /// As good as it gets.
-    Good = 0,
-    /// Usable, but less is behind it than there could be.
-    Degraded = 1,
-    /// Shown, not to be used yet.
-    #[default]
-    Initialising = 2,
-    /// Not to be used; the rate is not available.
-    Unusable = 3,
-}
-
-/// What is wrong at present, one bit each.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Faults(pub u8);
-
-impl Faults {
-    /// Nothing.
-    pub const NONE: Self = Self(0);
-    /// Samples are missing.
-    pub const GAP: Self = Self(1);
-    /// The part is saturated.
-    pub const CLIPPED: Self = Self(1 << 1);
-    /// The part's readings stand still.
-    pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate is not believed.
-    pub const IMPLAUSIBLE: Self = Self(1 << 3);
-    /// The network's estimate came too late.
-    pub const LATE: Self = Self(1 << 4);
-    /// The weights are damaged.
-    pub const WEIGHTS: Self = Self(1 << 5);
-    /// The wheels are silent.
-    pub const WHEELS: Self = Self(1 << 6);
-    /// Frames were dropped because the bus did not take them.
-    pub const BUS: Self = Self(1 << 7);
-
-    /// Both together.
-    #[must_use]
-    pub const fn with(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-}
-
-/// Source and quality that a status stands for.
-#[must_use]
-pub const fn judge(status: Status) -> (Source, Quality) {
-    match status {
-        Status::Init => (Source::Raw, Quality::Initialising),
-        Status::Ready => (Source::GyroNet, Quality::Good),
-        Status::Degraded => (Source::Static, Quality::Degraded),
-        Status::Clipped => (Source::Raw, Quality::Unusable),
-    }
-}
 
 /// Why bytes are no yaw message. The E2E check comes before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,32 +3,11 @@
 use super::carry::{RoundingCarry, Scale};
 use super::e2e::{Profile, Protector};
 use super::yaw::{
-    AngleMessage, DetailMessage, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage, Source, encode_angle,
+    AngleMessage, DetailMessage, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle,
     encode_latency, encode_sigma,
 };
-use crate::units::{AngularRate, Yaw};
-
-/// One sample, as the messages take it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct YawSample {
-    /// Corrected rate.
-    pub rate: AngularRate,
-    /// What the correction took off.
-    pub correction: AngularRate,
-    /// Accumulated yaw.
-    pub yaw: Yaw,
-    /// Expected error of the rate, 1 sigma, where known.
-    pub sigma: Option<AngularRate>,
-    /// Where the rate comes from.
-    pub source: Source,
-    /// What it is worth.
-    pub quality: Quality,
-    /// What is wrong at present.
-    pub faults: Faults,
-    /// From the sample to the message, microseconds, where known.
-    pub latency_us: Option<u32>,
-}
+use crate::units::AngularRate;
+use crate::vehicle::YawSample;
 
 /// Turns samples into messages, one set for every `every` samples.
 ///

@@ -1,12 +1,16 @@
 //! A recording through the pipeline, as the board would run it.
 
+use crate::candump::Log;
 use crate::recording::Recording;
 use gyronet::bias::StaticError;
-use gyronet::can::bosch::Tx1;
+use gyronet::can::DataFrame;
+use gyronet::can::feeds::Feeds;
 use gyronet::health::{Counters, Status};
 use gyronet::model::WindowNetwork;
-use gyronet::pipeline::{Pipeline, PipelineConfig, YawRate};
+use gyronet::pipeline::{Output, Pipeline, PipelineConfig, YawRate};
 use gyronet::units::{AngularRate, Micros};
+use gyronet::vehicle::VehicleSample;
+use std::io::{self, Write};
 
 /// Why a recording gives no corrected rate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,8 +46,8 @@ pub struct Step {
     /// The best estimate of the correction, known some samples later; the one that went out
     /// where none came (after the last window, before a gap).
     pub settled: AngularRate,
-    /// The rate as a CAN message.
-    pub tx1: Tx1,
+    /// What the messages are made from.
+    pub vehicle: VehicleSample,
 }
 
 /// A drive with its corrected yaw rate.
@@ -87,8 +91,9 @@ impl Drive {
             if start.is_none() && output.yaw_rate.status != Status::Init {
                 start = Some(steps.len());
             }
-            let (time, yaw_rate, tx1) = (row.sample.time, output.yaw_rate, output.tx1);
-            steps.push(Step { row: index, time, yaw_rate, settled: yaw_rate.correction, tx1 });
+            let Output { yaw_rate, vehicle, .. } = output;
+            let (time, settled) = (row.sample.time, yaw_rate.correction);
+            steps.push(Step { row: index, time, yaw_rate, settled, vehicle });
             if let Some(settled) = output.settled {
                 // It is at most a few steps back.
                 let step = steps.iter_mut().rev().find(|step| step.yaw_rate.tick == settled.tick);
@@ -100,6 +105,20 @@ impl Drive {
             .ok_or_else(|| DriveError::NeverInitialised { path: recording.path.clone() })?;
         let start = start.unwrap_or(steps.len());
         Ok(Self { steps, start, gyro_bias, counters: *pipeline.counters() })
+    }
+
+    /// Writes the messages of the whole drive as a candump log, and says how many they are.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn log(&self, feeds: &mut Feeds, out: impl Write) -> io::Result<u64> {
+        let mut log = Log::new(out);
+        for step in &self.steps {
+            for frame in feeds.process::<DataFrame>(&step.vehicle) {
+                log.frame(step.time, &frame)?;
+            }
+        }
+        log.finish()
     }
 
     /// How many steps had each status.

@@ -3,7 +3,9 @@
 //!
 //! [`route`] says where the driver wants to go, [`car`] moves on a plane with grade, bank and
 //! suspension, [`vibration`] shakes the part, [`mems`] adds the part's own errors, [`csv`]
-//! writes the recording. The truth is what a perfect part at the same place would say were the
+//! writes the recording. [`layout`] writes whole sequences of a drive through a [`town`] as the
+//! data sets KAIST and NCLT have them, with a fibre-optic gyro ([`fog`]) and wheels
+//! ([`odometer`]); [`vehicles`] has every number with its source. The truth is what a perfect part at the same place would say were the
 //! car not shaking: vibration turns the car nowhere and counts as an error.
 //!
 //! What it is not: a model of one make of part or car. It shows that everything works, and
@@ -15,10 +17,16 @@
 
 pub mod car;
 pub mod csv;
+pub mod fog;
+pub mod layout;
 pub mod mems;
+pub mod odometer;
 mod random;
 pub mod route;
+pub mod town;
+pub mod vehicles;
 pub mod vibration;
+pub mod world;
 
 use car::Car;
 use mems::Mems;

@@ -37,6 +37,11 @@ pub struct Config {
 }
 
 impl Config {
+    /// [`Settings::DEFAULT`], which pass the check (as a test shows).
+    pub const DEFAULT: Self = Self { settings: Settings::DEFAULT };
+    /// [`Settings::SLCAN_115200`], likewise.
+    pub const SLCAN_115200: Self = Self { settings: Settings::SLCAN_115200 };
+
     /// Checks settings.
     ///
     /// # Errors

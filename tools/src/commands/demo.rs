@@ -1,6 +1,8 @@
 //! `gyronet demo`: one drive, everything that comes of it.
 
 use super::{Common, WriteError, networks, progress, replay};
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
 use gyronet_tools::evaluate::{DriveErrors, EvaluateError, Report};
 use gyronet_tools::methods::Rates;
@@ -51,7 +53,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let folder = args.out.clone().unwrap_or_else(default_folder);
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let (log, picture) = (folder.join("can.log"), folder.join("yaw.svg"));
-    let frames = replay::write_file(&rates.drive, &log)?;
+    let frames = replay::write_file(&rates.drive, &mut Feeds::new(Config::DEFAULT), &log)?;
     std::fs::write(&picture, plot::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
 
     let mut out = std::io::stdout().lock();

@@ -2,9 +2,9 @@
 
 use super::networks::Weights;
 use super::{Common, WriteError, progress};
-use gyronet::can::DataFrame;
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
-use gyronet_tools::candump::Log;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::recording::Recording;
 use std::fs::File;
@@ -38,37 +38,28 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let drive = Drive::run(&recording, &mut network, || bar.inc(1));
     bar.finish_and_clear();
     let drive = drive?;
+    let mut feeds = Feeds::new(Config::DEFAULT);
     let frames = match &args.out {
-        Some(path) => write_file(&drive, path)?,
-        None => write_log(&drive, io::stdout().lock())?,
+        Some(path) => write_file(&drive, &mut feeds, path)?,
+        None => drive.log(&mut feeds, BufWriter::new(io::stdout().lock()))?,
     };
     let mut err = io::stderr().lock();
     writeln!(err, "{}: {frames} frames in {:.2} s", recording.path, recording.seconds())?;
     let statuses = drive.status_counts().map(|(status, count)| format!("{status:?} {count}").to_lowercase());
     writeln!(err, "status: {}", statuses.join(", "))?;
-    writeln!(err, "events: {}", events(&drive))?;
+    writeln!(err, "events: {}", events(&drive, &feeds))?;
     Ok(())
 }
 
 /// Writes a drive's frames to a file.
-pub(super) fn write_file(drive: &Drive, path: &Path) -> Result<u64, WriteError> {
+pub(super) fn write_file(drive: &Drive, feeds: &mut Feeds, path: &Path) -> Result<u64, WriteError> {
     let error = WriteError::to(path);
     let file = File::create(path).map_err(&error)?;
-    write_log(drive, file).map_err(&error)
-}
-
-fn write_log(drive: &Drive, out: impl Write) -> io::Result<u64> {
-    let mut log = Log::new(BufWriter::new(out));
-    for step in &drive.steps {
-        if let Some(frame) = step.tx1.frame::<DataFrame>() {
-            log.frame(step.time, &frame)?;
-        }
-    }
-    log.finish()
+    drive.log(feeds, BufWriter::new(file)).map_err(&error)
 }
 
 /// All counters that are not zero.
-fn events(drive: &Drive) -> String {
+fn events(drive: &Drive, feeds: &Feeds) -> String {
     let c = &drive.counters;
     let all = [
         ("samples", c.samples),
@@ -81,7 +72,7 @@ fn events(drive: &Drive) -> String {
         ("clamped inputs", c.clamped_inputs),
         ("implausible", c.implausible),
         ("late", c.late),
-        ("out of range", c.out_of_range),
+        ("out of range", feeds.out_of_range()),
     ];
     let seen: Vec<String> =
         all.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}")).collect();

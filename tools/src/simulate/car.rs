@@ -6,11 +6,11 @@
 
 use super::DT;
 use super::random::{Purpose, Random};
-use super::route::{Leg, Route};
+use super::route::{Leg, Route, Way};
 use std::f64::consts::TAU;
 
 /// m/s^2.
-const GRAVITY: f64 = 9.80665;
+pub(super) const GRAVITY: f64 = 9.80665;
 
 /// A car and its driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,8 +35,10 @@ pub struct Config {
     pub suspension_hz: f64,
     /// Its damping ratio.
     pub suspension_damping: f64,
-    /// Amplitude of the road's grade and bank, rad: a town on nearly level ground.
-    pub road_slope: f64,
+    /// Amplitude of the road's grade, rad: a town on nearly level ground.
+    pub road_grade: f64,
+    /// Amplitude of the road's bank, rad: the same.
+    pub road_bank: f64,
 }
 
 impl Config {
@@ -52,7 +54,8 @@ impl Config {
         pitch_gradient: 0.0036,
         suspension_hz: 1.3,
         suspension_damping: 0.35,
-        road_slope: 0.008,
+        road_grade: 0.008,
+        road_bank: 0.008,
     };
 }
 
@@ -67,6 +70,14 @@ pub struct Motion {
     pub speed: f64,
     /// About the vertical, rad/s.
     pub heading_rate: f64,
+    /// Along the road, m/s^2.
+    pub acceleration: f64,
+    /// Slope of the road along the way, downhill positive, rad.
+    pub grade: f64,
+    /// Of the body, nose down positive, rad.
+    pub pitch: f64,
+    /// Of the body, left side up positive, rad.
+    pub roll: f64,
 }
 
 /// An angle on a spring: follows what pulls it, and swings.
@@ -116,7 +127,7 @@ impl Slope {
 #[derive(Debug, Clone)]
 pub struct Car {
     config: Config,
-    route: Route,
+    way: Way,
     leg: Leg,
     next: Leg,
     /// Metres into a road, seconds into a stand.
@@ -132,16 +143,20 @@ pub struct Car {
 }
 
 impl Car {
-    /// At rest at the start of its route.
+    /// At rest at the start of the short course.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut route = Route::new(seed);
+        Self::on(config, Way::Course(Route::new(seed)), seed)
+    }
+
+    /// At rest at the start of a way.
+    #[must_use]
+    pub fn on(config: &Config, mut way: Way, seed: u64) -> Self {
         let mut road = Random::new(seed, Purpose::Road);
-        let mut leg = || route.next().unwrap_or(Leg::Stand { seconds: f64::INFINITY });
-        let (first, second) = (leg(), leg());
+        let (first, second) = (way.next_leg(), way.next_leg());
         Self {
             config: *config,
-            route,
+            way,
             leg: first,
             next: second,
             along: 0.0,
@@ -150,8 +165,8 @@ impl Car {
             acceleration: 0.0,
             roll: Spring::default(),
             pitch: Spring::default(),
-            bank: Slope::new(config.road_slope, &mut road),
-            grade: Slope::new(config.road_slope, &mut road),
+            bank: Slope::new(config.road_bank, &mut road),
+            grade: Slope::new(config.road_grade, &mut road),
             wheel_noise: Random::new(seed, Purpose::Wheels),
         }
     }
@@ -167,12 +182,17 @@ impl Car {
         let (grade, grade_change) = self.grade.at(self.travelled);
         let (roll, roll_rate) = (bank + self.roll.angle, bank_change * self.speed + self.roll.rate);
         let (pitch, pitch_rate) = (grade + self.pitch.angle, grade_change * self.speed + self.pitch.rate);
+        let (speed, acceleration) = (self.speed, self.acceleration);
         let level = [self.acceleration, lateral, GRAVITY];
         Motion {
             specific_force: turned_in(level, pitch, roll),
             angular_rate: body_rates(heading_rate, (pitch, pitch_rate), (roll, roll_rate)),
-            speed: self.speed,
+            speed,
             heading_rate,
+            acceleration,
+            grade,
+            pitch,
+            roll,
         }
     }
 
@@ -221,7 +241,7 @@ impl Car {
 
     fn turn_to_next_leg(&mut self) {
         self.leg = self.next;
-        self.next = self.route.next().unwrap_or(Leg::Stand { seconds: f64::INFINITY });
+        self.next = self.way.next_leg();
         self.along = 0.0;
     }
 }
@@ -261,7 +281,8 @@ mod tests {
 
     #[test]
     fn the_body_leans_out_of_a_turn_and_wheels_turn_unevenly() {
-        let mut car = Car::new(&Config { road_slope: 0.0, wheel_noise: 0.0, ..Config::DEFAULT }, 3);
+        let mut car =
+            Car::new(&Config { road_grade: 0.0, road_bank: 0.0, wheel_noise: 0.0, ..Config::DEFAULT }, 3);
         let steepest = (0..12_000)
             .map(|_| {
                 let motion = car.step();

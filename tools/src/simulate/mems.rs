@@ -1,7 +1,7 @@
 //! The errors of the part: bias that wanders, white noise, scale, misalignment.
 //!
-//! This is the paper's sensor model (equations 1 and 2) with scale and misalignment added. No
-//! error of the gyro depends on acceleration.
+//! This is the paper's sensor model (equations 1 and 2) with scale, misalignment and, where the
+//! configuration has it, what the gyro says of a force.
 
 use super::DT;
 use super::car::turned_in;
@@ -29,6 +29,8 @@ pub struct Config {
     /// Misalignment of each axis, sigma, rad: 0.05 deg, the class of a part calibrated at the
     /// factory.
     pub misalignment: f64,
+    /// What a gyro axis says of a force, sigma for each pair of axes, rad/s per m/s^2.
+    pub gyro_per_force: f64,
     /// How the part is mounted, pitch and roll, rad: the recordings' part leans to one side so
     /// that y sees about -0.8 m/s^2 at rest.
     pub mount: [f64; 2],
@@ -45,6 +47,7 @@ impl Config {
         accel_bias: 0.03,
         scale: 0.001,
         misalignment: 0.000_87,
+        gyro_per_force: 0.0,
         mount: [0.015, -0.085],
     };
 }
@@ -60,14 +63,23 @@ struct Triad {
     walk: f64,
 }
 
+/// Scale and misalignment: what three axes make of a vector.
+pub(super) fn axes(scale: f64, misalignment: f64, random: &mut Random) -> [[f64; 3]; 3] {
+    std::array::from_fn(|row| {
+        std::array::from_fn(|column| {
+            let deviation = random.normal();
+            if row == column { 1.0 + scale * deviation } else { misalignment * deviation }
+        })
+    })
+}
+
+/// A vector as three axes see it.
+pub(super) fn seen(matrix: &[[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
+    matrix.map(|row| row.iter().zip(vector).map(|(m, v)| m * v).sum())
+}
+
 impl Triad {
-    fn new(config: &Config, noise: f64, walk: f64, bias: f64, random: &mut Random) -> Self {
-        let matrix = std::array::from_fn(|row| {
-            std::array::from_fn(|column| {
-                let deviation = random.normal();
-                if row == column { 1.0 + config.scale * deviation } else { config.misalignment * deviation }
-            })
-        });
+    fn new(matrix: [[f64; 3]; 3], noise: f64, walk: f64, bias: f64, random: &mut Random) -> Self {
         let bias = random.normals().map(|n| bias * n);
         // A density over the 50 Hz that 100 samples a second can show.
         Self { matrix, bias, noise: noise / DT.sqrt(), walk: walk * DT.sqrt() }
@@ -75,10 +87,10 @@ impl Triad {
 
     fn measure(&mut self, truth: [f64; 3], random: &mut Random) -> [f64; 3] {
         let (noise, walk) = (random.normals(), random.normals());
+        let seen = seen(&self.matrix, truth);
         std::array::from_fn(|axis| {
             self.bias[axis] += self.walk * walk[axis];
-            let seen: f64 = self.matrix[axis].iter().zip(truth).map(|(m, t)| m * t).sum();
-            seen + self.bias[axis] + self.noise * noise[axis]
+            seen[axis] + self.bias[axis] + self.noise * noise[axis]
         })
     }
 }
@@ -89,6 +101,8 @@ pub struct Mems {
     random: Random,
     gyro: Triad,
     accel: Triad,
+    /// Rad/s per m/s^2.
+    gyro_of_force: [[f64; 3]; 3],
     mount: [f64; 2],
 }
 
@@ -97,9 +111,29 @@ impl Mems {
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Random::new(seed, Purpose::Mems);
-        let gyro = Triad::new(config, config.gyro_noise, config.gyro_walk, config.gyro_bias, &mut random);
-        let accel = Triad::new(config, config.accel_noise, config.accel_walk, config.accel_bias, &mut random);
-        Self { random, gyro, accel, mount: config.mount }
+        let mut triad = |noise, walk, bias| {
+            let matrix = axes(config.scale, config.misalignment, &mut random);
+            Triad::new(matrix, noise, walk, bias, &mut random)
+        };
+        let gyro = triad(config.gyro_noise, config.gyro_walk, config.gyro_bias);
+        let accel = triad(config.accel_noise, config.accel_walk, config.accel_bias);
+        Self { random, gyro, accel, gyro_of_force: [[0.0; 3]; 3], mount: config.mount }
+    }
+
+    /// The part of a device seed in one run: its scale, misalignment and what its gyro says of a
+    /// force are the device's, its bias at power-on and its noise the run's.
+    #[must_use]
+    pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
+        let mut fixed = Random::new(device, Purpose::Device);
+        let mut random = Random::new(run, Purpose::Mems);
+        let mut triad = |noise, walk, bias| {
+            let matrix = axes(config.scale, config.misalignment, &mut fixed);
+            Triad::new(matrix, noise, walk, bias, &mut random)
+        };
+        let gyro = triad(config.gyro_noise, config.gyro_walk, config.gyro_bias);
+        let accel = triad(config.accel_noise, config.accel_walk, config.accel_bias);
+        let gyro_of_force = std::array::from_fn(|_| fixed.normals().map(|n| config.gyro_per_force * n));
+        Self { random, gyro, accel, gyro_of_force, mount: config.mount }
     }
 
     /// A vector of the car, seen from the part's nominal axes.
@@ -111,6 +145,8 @@ impl Mems {
 
     /// Specific force and angular rate as the part says them.
     pub fn measure(&mut self, force: [f64; 3], rate: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+        let of_force = seen(&self.gyro_of_force, force);
+        let rate = std::array::from_fn(|axis| rate[axis] + of_force[axis]);
         (self.accel.measure(force, &mut self.random), self.gyro.measure(rate, &mut self.random))
     }
 }
@@ -146,6 +182,7 @@ mod tests {
             accel_bias: 0.0,
             scale: 0.0,
             misalignment: 0.0,
+            gyro_per_force: 0.0,
             mount: [0.0; 2],
         };
         let mut mems = Mems::new(&nothing, 5);

@@ -12,6 +12,11 @@ pub(super) enum Purpose {
     Wheels,
     Vibration,
     Mems,
+    Device,
+    Fog,
+    Odometer,
+    Stamps,
+    Magnetometer,
 }
 
 /// A stream of random numbers.
@@ -30,7 +35,7 @@ impl Random {
         StandardNormal.sample(&mut self.0)
     }
 
-    /// Three of them.
+    /// Three normal ones.
     pub fn normals(&mut self) -> [f64; 3] {
         [self.normal(), self.normal(), self.normal()]
     }
@@ -39,5 +44,10 @@ impl Random {
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         let unit: f64 = StandardUniform.sample(&mut self.0);
         low + (high - low) * unit
+    }
+
+    /// Exponential: from 0 on, with this mean.
+    pub fn exponential(&mut self, mean: f64) -> f64 {
+        -mean * libm::log(1.0 - self.between(0.0, 1.0))
     }
 }

@@ -3,6 +3,7 @@
 //! The car turns by at most some 0.3 rad/s, as in the recordings; nobody parks.
 
 use super::random::{Purpose, Random};
+use super::town::Town;
 use std::f64::consts::FRAC_PI_2;
 
 /// A piece of the way.
@@ -44,6 +45,26 @@ impl Leg {
                 2.0 * turn / metres * sine * sine
             }
         }
+    }
+}
+
+/// Where the legs come from.
+#[derive(Debug, Clone)]
+pub enum Way {
+    /// The short course of [`Route`].
+    Course(Route),
+    /// A town.
+    Town(Town),
+}
+
+impl Way {
+    /// The leg after the last one; standing for ever where there is none.
+    pub(super) fn next_leg(&mut self) -> Leg {
+        let next = match self {
+            Self::Course(route) => route.next(),
+            Self::Town(town) => town.next(),
+        };
+        next.unwrap_or(Leg::Stand { seconds: f64::INFINITY })
     }
 }
 

@@ -1,0 +1,92 @@
+//! What wheel speeds do in the pipeline: no static initialisation while they turn, and a fault
+//! when they fall silent.
+
+use embedded_can::{Frame, StandardId};
+use gyronet::bias::StaticError;
+use gyronet::can::DataFrame;
+use gyronet::can::signal::{BitField, ByteOrder};
+use gyronet::can::wheel::{Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
+use gyronet::health::Faults;
+use gyronet::health::Status::{Degraded, Init};
+use gyronet::pipeline::Output;
+use gyronet::sample::PERIOD_US;
+use gyronet::units::{Micros, WheelSpeed};
+use gyronet_host_tests::stream::{faults, new, statuses};
+use gyronet_host_tests::synthetic::{rate, turning};
+
+const ID: StandardId = StandardId::new(0x4B0).unwrap();
+const TIMEOUT: u64 = 100_000;
+
+fn receiver() -> WheelReceiver {
+    let signal = |wheel: u8| {
+        let field = BitField::new(16 * wheel, 16, ByteOrder::Intel, false).expect("inside the frame");
+        let factor_q16 = WheelSignal::per_bit_kmh(0.01);
+        Some(WheelSignal { wheel: wheel.into(), field, factor_q16, offset: WheelSpeed(0), invalid: None })
+    };
+    let frame = WheelFrame {
+        id: ID.into(),
+        signals: [signal(0), signal(1), None, None],
+        counter: None,
+        checksum: Checksum::None,
+    };
+    WheelReceiver::new(WheelSettings {
+        frames: [Some(frame), None, None, None],
+        timeout_us: TIMEOUT,
+        still_speed: WheelSpeed(0),
+        still_for_us: 500_000,
+    })
+    .expect("two wheels")
+}
+
+/// A gyro that reads a constant; `wheels` gives the speed of each tick in 0.01 km/h, where a
+/// frame comes with it.
+fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<u16>) -> Vec<Output> {
+    let (mut pipeline, mut receiver) = (new(), receiver());
+    let step = |tick: u64| {
+        let now = Micros(tick * PERIOD_US);
+        if let Some(speed) = wheels(tick) {
+            let [low, high] = speed.to_le_bytes();
+            let frame = DataFrame::new(ID, &[low, high, low, high]).expect("four bytes");
+            receiver.process(&frame, now).expect("a wheel frame").expect("a good one");
+        }
+        pipeline.wheels(receiver.poll(now));
+        pipeline.process(turning(tick, rate(0.001))).expect("a place on the grid")
+    };
+    (0..ticks).map(step).collect()
+}
+
+#[test]
+fn static_initialisation_waits_for_the_wheels() {
+    // A steady straight drive looks like standing to the gyro.
+    let outputs = run(1_000, |tick| Some(if tick < 500 { 5_000 } else { 0 }));
+    assert_eq!(statuses(&outputs), [(Init, 800), (Degraded, 200)]);
+    let refused: Vec<usize> = (0..1_000).filter(|&k| outputs[k].refused.is_some()).collect();
+    assert_eq!(refused, [0], "said once");
+    assert_eq!(outputs[0].refused, Some(StaticError::Wheels));
+    assert_eq!(faults(&outputs), [(Faults::NONE, 800 + 11), (Faults::LATE, 200 - 11)]);
+    // Not known to move: the sensor alone decides, as it does without wheels.
+    assert_eq!(statuses(&run(400, |_| None))[0], (Init, 300));
+}
+
+#[test]
+fn one_turn_of_a_wheel_starts_it_anew() {
+    let outputs = run(1_000, |tick| Some(u16::from(tick == 200)));
+    assert_eq!(outputs[200].refused, Some(StaticError::Wheels));
+    assert_eq!(statuses(&outputs)[0], (Init, 201 + 300));
+}
+
+#[test]
+fn silent_wheels_are_a_fault() {
+    // From the start, then heard, then lost after the time-out, then back.
+    let outputs = run(290, |tick| ((50..100).contains(&tick) || tick >= 200).then_some(0));
+    let lost = (99 * PERIOD_US + TIMEOUT) / PERIOD_US + 1;
+    assert_eq!(
+        faults(&outputs),
+        [
+            (Faults::WHEELS, 50),
+            (Faults::NONE, lost as usize - 50),
+            (Faults::WHEELS, 200 - lost as usize),
+            (Faults::NONE, 90)
+        ]
+    );
+}

@@ -1,0 +1,44 @@
+//! What the pipeline says of the vehicle, once a sample; what is sent is made from it alone.
+
+use crate::health::{Faults, Quality, Source};
+use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
+
+/// The corrected yaw rate and what it is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct YawSample {
+    /// Corrected rate.
+    pub rate: AngularRate,
+    /// What the correction took off.
+    pub correction: AngularRate,
+    /// Accumulated yaw.
+    pub yaw: Yaw,
+    /// Expected error of the rate, 1 sigma, where known.
+    pub sigma: Option<AngularRate>,
+    /// Where the rate comes from.
+    pub source: Source,
+    /// What it is worth.
+    pub quality: Quality,
+    /// What is wrong at present.
+    pub faults: Faults,
+    /// From the sample to the message, microseconds, where known.
+    pub latency_us: Option<u32>,
+}
+
+/// What goes out for one sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct VehicleSample {
+    /// Yaw and what it is worth.
+    pub yaw: YawSample,
+    /// About x, forward, less its bias.
+    pub roll_rate: AngularRate,
+    /// About y, left, less its bias.
+    pub pitch_rate: AngularRate,
+    /// Along x, y, z.
+    pub specific_force: [SpecificForce; 3],
+    /// Of the part, where known.
+    pub temperature: Option<CentiCelsius>,
+    /// Step of the grid.
+    pub tick: u32,
+}

@@ -1,0 +1,150 @@
+//! Whole sequences in the layouts of KAIST Complex Urban and NCLT: the folders that their users
+//! have, with the truth known exactly.
+//!
+//! Everything about a sequence follows from its [`Spec`]: the run's seed makes route, road,
+//! traffic, tyres, noise and the biases at power-on; the device's seed makes scale,
+//! misalignment and the lasting bias of both gyros. Sequences of one data set share a device, as
+//! the paper's do. Beside the data lies [`MARKER`], which says that it is simulated and of what.
+
+mod delay;
+mod kaist;
+mod nclt;
+mod text;
+
+use super::fog::Fog;
+use super::mems::Mems;
+use super::odometer::Odometer;
+use super::random::{Purpose, Random};
+use super::route::Way;
+use super::town::Town;
+use super::vehicles::{self, Vehicle};
+use super::world::{Truth, World};
+use gyronet::sample::RATE_HZ;
+use serde::{Deserialize, Serialize};
+use std::io;
+use std::path::Path;
+
+/// File of a sequence's folder that says that it is simulated.
+pub const MARKER: &str = "simulated.json";
+
+/// Which data set's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// KAIST Complex Urban: a car, Xsens MTi-300, KVH DSP-1760, wheel encoders.
+    Kaist,
+    /// NCLT: a Segway, MicroStrain 3DM-GX3-45, KVH DSP-3000, wheel speeds.
+    Nclt,
+}
+
+impl Layout {
+    /// The vehicle.
+    #[must_use]
+    pub fn vehicle(self) -> Vehicle {
+        match self {
+            Self::Kaist => vehicles::KAIST,
+            Self::Nclt => vehicles::NCLT,
+        }
+    }
+}
+
+/// What to simulate; written into [`MARKER`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Spec {
+    /// Whose layout.
+    pub layout: Layout,
+    /// The sequence's name, and its folder's.
+    pub name: String,
+    /// Length, s.
+    pub seconds: u32,
+    /// Seed of the parts.
+    pub device: u64,
+    /// Seed of everything else.
+    pub run: u64,
+}
+
+/// A named set of sequences.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Set {
+    /// Eight sequences, as the paper's urban06 to 13.
+    Train,
+    /// Four more of the same devices, as the paper's urban14 to 17.
+    Test,
+    /// Four of other devices of the same kind.
+    Transfer,
+}
+
+/// Length of a sequence of a set, s.
+pub const SECONDS: u32 = 20 * 60;
+
+impl Set {
+    /// Its sequences. No run is in two sets.
+    #[must_use]
+    pub fn specs(self, layout: Layout) -> Vec<Spec> {
+        let (word, count, device, first) = match self {
+            Self::Train => ("train", 8u64, 1, 101),
+            Self::Test => ("test", 4, 1, 201),
+            Self::Transfer => ("transfer", 4, 2, 301),
+        };
+        let name = |k| format!("{word}{:02}", k + 1);
+        let spec = |k| Spec { layout, name: name(k), seconds: SECONDS, device, run: first + k };
+        (0..count).map(spec).collect()
+    }
+}
+
+/// All parts of the vehicle on their way.
+struct Drive {
+    world: World,
+    mems: Mems,
+    fog: Fog,
+    odometer: Odometer,
+    magnetometer: Random,
+    ticks: usize,
+}
+
+impl Drive {
+    fn new(spec: &Spec) -> Self {
+        let vehicle = spec.layout.vehicle();
+        let way = Way::Town(Town::new(&vehicle.town, spec.run));
+        let heading = Random::new(spec.run, Purpose::Stamps).between(0.0, std::f64::consts::TAU);
+        Self {
+            world: World::new(&vehicle.world, way, heading, spec.run),
+            mems: Mems::of_device(&vehicle.mems, spec.device, spec.run),
+            fog: Fog::of_device(&vehicle.fog, spec.device, spec.run),
+            odometer: Odometer::new(&vehicle.wheels, spec.run),
+            magnetometer: Random::new(spec.run, Purpose::Magnetometer),
+            ticks: (spec.seconds * RATE_HZ) as usize,
+        }
+    }
+
+    /// Specific force and angular rate as the inertial sensor says them.
+    fn imu(&mut self, truth: &Truth) -> ([f64; 3], [f64; 3]) {
+        let force = super::add(truth.motion.specific_force, truth.shake.specific_force);
+        let rate = super::add(truth.inertial_rate, truth.shake.angular_rate);
+        self.mems.measure(self.mems.tilt(force), self.mems.tilt(rate))
+    }
+
+    /// What a magnetometer says in a field of the world, with noise of that size.
+    fn magnetic(&mut self, truth: &Truth, field: [f64; 3], noise: f64) -> [f64; 3] {
+        let seen = truth.in_vehicle(field);
+        let normals = self.magnetometer.normals();
+        std::array::from_fn(|axis| seen[axis] + noise * normals[axis])
+    }
+}
+
+/// Writes a sequence into a folder, which is made. `tick` is called for each 10 ms.
+///
+/// # Errors
+/// What the file system says.
+pub fn write(spec: &Spec, folder: &Path, tick: impl FnMut()) -> io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    std::fs::write(folder.join(MARKER), serde_json::to_string_pretty(spec)? + "\n")?;
+    let drive = Drive::new(spec);
+    match spec.layout {
+        Layout::Kaist => kaist::write(spec, drive, folder, tick),
+        Layout::Nclt => nclt::write(spec, drive, folder, tick),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,48 @@
+//! When a message arrives: its stamp is the logger's, not the part's.
+
+use crate::simulate::random::{Purpose, Random};
+use crate::simulate::vehicles::Delays;
+
+/// The messages of one part on their way.
+#[derive(Debug, Clone)]
+pub(super) struct Delay {
+    delays: Delays,
+    random: Random,
+    last: f64,
+    /// The blockage that is on or comes next, from and to.
+    blocked: [f64; 2],
+}
+
+/// Two messages of a part are never nearer, s: what reading one takes.
+const APART: f64 = 10e-6;
+
+impl Delay {
+    pub fn new(delays: Delays, run: u64, stream: u64) -> Self {
+        let random = Random::new(run ^ (stream << 48), Purpose::Stamps);
+        let mut delay = Self { delays, random, last: f64::NEG_INFINITY, blocked: [0.0; 2] };
+        delay.block();
+        delay
+    }
+
+    /// When a message of this time arrives, later than the one before, s.
+    pub fn arrival(&mut self, time: f64) -> f64 {
+        while time > self.blocked[1] {
+            self.block();
+        }
+        let [from, to] = self.blocked;
+        let released = if time >= from { to } else { time };
+        let arrival = (released + self.random.exponential(self.delays.mean)).max(self.last + APART);
+        self.last = arrival;
+        arrival
+    }
+
+    fn block(&mut self) {
+        let [between, length] = self.delays.blockage;
+        if !between.is_finite() {
+            self.blocked = [f64::INFINITY; 2];
+            return;
+        }
+        let from = self.blocked[1] + self.random.exponential(between);
+        self.blocked = [from, from + self.random.exponential(length).min(self.delays.longest)];
+    }
+}

@@ -1,0 +1,100 @@
+//! Wheel encoders of a rear axle: wheels are not as large as the calibration says, and slip
+//! when they drive or brake.
+//!
+//! Slip is in proportion to the force: slip = a / (g k), with the normalised stiffness k of the
+//! tyres (Rajamani, Vehicle Dynamics and Control, chapter 4).
+
+use super::car::GRAVITY;
+use super::random::{Purpose, Random};
+use std::f64::consts::PI;
+
+/// What the calibration says, and by how much it is wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    /// Diameters as calibrated, left and right, m.
+    pub diameter: [f64; 2],
+    /// Distance between the wheels as calibrated, m; the true one.
+    pub base: f64,
+    /// Error of both diameters in common, sigma, as a part.
+    pub common_error: f64,
+    /// Error of each diameter beside it, sigma, as a part.
+    pub wheel_error: f64,
+    /// Normalised longitudinal stiffness: longitudinal acceleration over g that gives a slip of 1.
+    pub slip_stiffness: f64,
+}
+
+/// Wheels of one run.
+#[derive(Debug, Clone)]
+pub struct Odometer {
+    config: Config,
+    /// True diameters, m.
+    diameter: [f64; 2],
+    /// Turned since the start, revolutions.
+    turns: [f64; 2],
+}
+
+impl Odometer {
+    /// Tyres of one run: pressure and load change from day to day.
+    #[must_use]
+    pub fn new(config: &Config, run: u64) -> Self {
+        let mut random = Random::new(run, Purpose::Odometer);
+        let common = config.common_error * random.normal();
+        let diameter = config.diameter.map(|d| d * (1.0 + common + config.wheel_error * random.normal()));
+        Self { config: *config, diameter, turns: [0.0; 2] }
+    }
+
+    /// So many seconds at a speed along the road (m/s), an acceleration (m/s^2) and a heading
+    /// rate (rad/s).
+    pub fn step(&mut self, speed: f64, acceleration: f64, heading_rate: f64, seconds: f64) {
+        let slip = acceleration / (GRAVITY * self.config.slip_stiffness);
+        let half = heading_rate * self.config.base / 2.0;
+        for (wheel, ground) in [speed - half, speed + half].into_iter().enumerate() {
+            self.turns[wheel] += ground * (1.0 + slip) * seconds / (PI * self.diameter[wheel]);
+        }
+    }
+
+    /// Revolutions since the start, left and right.
+    #[must_use]
+    pub fn turns(&self) -> [f64; 2] {
+        self.turns
+    }
+
+    /// Way since the start as the calibration makes it of the revolutions, left and right, m.
+    #[must_use]
+    pub fn metres(&self) -> [f64; 2] {
+        std::array::from_fn(|wheel| self.turns[wheel] * PI * self.config.diameter[wheel])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXACT: Config = Config {
+        diameter: [0.62, 0.61],
+        base: 1.5,
+        common_error: 0.0,
+        wheel_error: 0.0,
+        slip_stiffness: 20.0,
+    };
+
+    #[test]
+    fn exact_wheels_measure_the_way_and_the_turn() {
+        let mut odometer = Odometer::new(&EXACT, 1);
+        (0..1_000).for_each(|_| odometer.step(10.0, 0.0, 0.1, 0.01));
+        let [left, right] = odometer.metres();
+        assert!(((left + right) / 2.0 - 100.0).abs() < 1e-9);
+        assert!(((right - left) / 1.5 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn driven_wheels_turn_too_much_and_braked_ones_too_little() {
+        let way = |acceleration| {
+            let mut odometer = Odometer::new(&EXACT, 1);
+            odometer.step(10.0, acceleration, 0.0, 1.0);
+            odometer.metres()[0]
+        };
+        assert!(way(2.0) > 10.0 && way(0.0) == 10.0 && way(-2.0) < 10.0);
+        assert!((way(GRAVITY * 0.2) - 10.1).abs() < 1e-9, "a fifth of g: 1 %");
+    }
+}
