@@ -11,6 +11,7 @@ pub mod nn;
 pub mod pipeline;
 pub mod sample;
 pub mod sensor;
+pub mod service;
 pub mod store;
 pub mod units;
 pub mod vehicle;

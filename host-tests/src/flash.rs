@@ -8,7 +8,8 @@
 
 use crate::noise::Noise;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
-use gyronet::store::layout::{SECTORS, sector_at};
+use gyronet::service::MappedSlots;
+use gyronet::store::layout::{self, SECTORS, SLOT_SIZE, sector_at};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
@@ -232,5 +233,78 @@ impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
             self.flash.borrow_mut().program(word, u32::from_le_bytes(*value))?;
         }
         Ok(())
+    }
+}
+
+/// The weight slots, which can also be read in place.
+///
+/// What [`MappedSlots::slots`] hands out is a copy of the content at the last operation: the
+/// mock's bytes are behind a cell.
+#[derive(Debug)]
+pub struct MappedRegion {
+    region: Region<SLOT_SIZE>,
+    copy: [Vec<u32>; 2],
+}
+
+impl MappedRegion {
+    /// The slots of a flash.
+    #[must_use]
+    pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
+        let mut mapped = Self { region: Region::new(flash, layout::SLOTS), copy: [Vec::new(), Vec::new()] };
+        mapped.refresh();
+        mapped
+    }
+
+    /// Both slots.
+    #[must_use]
+    pub fn current(&self) -> [&[u8]; 2] {
+        self.copy.each_ref().map(|words| bytemuck::cast_slice(words))
+    }
+
+    fn refresh(&mut self) {
+        let flash = self.region.flash.borrow();
+        for (words, start) in self.copy.iter_mut().zip(self.region.range.clone().step_by(SLOT_SIZE)) {
+            words.clear();
+            words.extend(&flash.words[start / WORD..(start + SLOT_SIZE) / WORD]);
+        }
+    }
+}
+
+impl MappedSlots for MappedRegion {
+    fn slots(&self) -> [&[u8]; 2] {
+        self.current()
+    }
+}
+
+impl ErrorType for MappedRegion {
+    type Error = MockError;
+}
+
+impl ReadNorFlash for MappedRegion {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), MockError> {
+        self.region.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.region.capacity()
+    }
+}
+
+impl NorFlash for MappedRegion {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = SLOT_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), MockError> {
+        let result = self.region.erase(from, to);
+        self.refresh();
+        result
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), MockError> {
+        let result = self.region.write(offset, bytes);
+        self.refresh();
+        result
     }
 }

@@ -44,6 +44,21 @@ pub struct Mounting {
     pub yaw_deg: f32,
 }
 
+impl Mounting {
+    /// A vector of the sensor in the vehicle's axes.
+    #[must_use]
+    pub fn rotate(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let turn = |degrees: f32, [a, b]: [f32; 2]| {
+            let (sin, cos) = libm::sincosf(degrees.to_radians());
+            [cos * a - sin * b, sin * a + cos * b]
+        };
+        let [y, z] = turn(self.roll_deg, [y, z]);
+        let [z, x] = turn(self.pitch_deg, [z, x]);
+        let [x, y] = turn(self.yaw_deg, [x, y]);
+        [x, y, z]
+    }
+}
+
 /// Everything that a user can set. It holds from the next start on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
@@ -64,11 +79,11 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// An Xsens MTi, level, on a car, with the Bosch set and our own messages.
+    /// An Xsens MTi, level, on a car, with what its SLCAN line can take.
     pub const DEFAULT: Self = Self {
         imu: ImuPart::XsensMti,
         fog: None,
-        can: Settings::DEFAULT,
+        can: Settings::SLCAN_115200,
         latitude_deg: None,
         mounting: Mounting { roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 0.0 },
         static_init: StaticConfig::DEFAULT,
