@@ -48,6 +48,7 @@ pub trait Record: Serialize + DeserializeOwned {
 }
 
 /// A record as it lies in flash.
+#[derive(Clone, Copy)]
 struct Raw {
     words: [u8; BUFFER],
     len: usize,
@@ -103,7 +104,7 @@ impl Raw {
 /// What stands at a place in a sector.
 enum Place {
     /// A record; it may be torn.
-    Record(Raw),
+    Record,
     /// Nothing yet.
     Blank,
     /// No record can begin so, or none fits any more.
@@ -198,7 +199,8 @@ impl<F: NorFlash> Store<F> {
         Ok((crc == header_crc(generation)).then_some(generation))
     }
 
-    fn place(&mut self, sector: u32, at: u32) -> Result<Place, StoreError> {
+    /// Reads a record, where there is one.
+    fn place(&mut self, sector: u32, at: u32, raw: &mut Raw) -> Result<Place, StoreError> {
         let end = self.range(sector).end;
         if at + WORD_U32 > end {
             return Ok(Place::End);
@@ -210,24 +212,25 @@ impl<F: NorFlash> Store<F> {
         let [_, _, low, high] = first;
         let len = usize::from(u16::from_le_bytes([low, high]));
         let fits = len <= MAX_LEN && at + Raw::size(len) as u32 <= end;
-        let mut raw = Raw { words: [0; BUFFER], len };
+        raw.len = len;
         match raw.words.get_mut(..Raw::size(len)) {
             Some(words) if fits => self.flash.read(at, words).map_err(fault)?,
             _ => return Ok(Place::End),
         }
-        Ok(Place::Record(raw))
+        Ok(Place::Record)
     }
 
     /// The newest whole record of a key; learns where the next one goes.
     fn find(&mut self, key: u8) -> Result<Option<Raw>, StoreError> {
         let Some((sector, _)) = self.current else { return Ok(None) };
         let mut at = self.range(sector).start + HEADER;
+        let mut raw = Raw { words: [0; BUFFER], len: 0 };
         let mut found = None;
         self.damaged = false;
         loop {
             // Each turn goes on by a record's length, of two words at least.
-            match self.place(sector, at)? {
-                Place::Record(raw) => {
+            match self.place(sector, at, &mut raw)? {
+                Place::Record => {
                     at += Raw::size(raw.len) as u32;
                     if !raw.is_whole() {
                         self.damaged = true;

@@ -3,10 +3,12 @@
 pub mod bundled;
 pub mod candump;
 pub mod checkpoint;
+pub mod device;
 pub mod drive;
 pub mod evaluate;
 pub mod fir;
 pub mod image_size;
+pub mod image_stack;
 pub mod methods;
 pub mod metrics;
 pub mod monitor;

@@ -24,6 +24,8 @@ enum Command {
     Simulate(commands::simulate::Args),
     Quantize(commands::quantize::Args),
     BenchTarget(commands::bench_target::Args),
+    Device(commands::device::Args),
+    Size(commands::size::Args),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +37,8 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
+        Command::Device(args) => commands::device::run(args, common),
+        Command::Size(args) => commands::size::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
     // Who reads our output has seen enough: `gyronet replay FILE | head`.

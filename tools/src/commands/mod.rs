@@ -2,12 +2,14 @@
 
 pub mod bench_target;
 pub mod demo;
+pub mod device;
 pub mod evaluate;
 mod networks;
 mod progress;
 pub mod quantize;
 pub mod replay;
 pub mod simulate;
+pub mod size;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.
