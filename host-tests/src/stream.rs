@@ -2,7 +2,7 @@
 
 use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};
-use gyronet::model::Estimate;
+use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
 use gyronet::window::WINDOW;
@@ -23,7 +23,7 @@ pub fn drive(ticks: impl IntoIterator<Item = u64>) -> impl Iterator<Item = ImuSa
 
 /// A network that always says the same, rad/s.
 pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
-    move |_| Some(Estimate { corrections: [rate(correction); WINDOW], clamped_inputs: 0 })
+    move |_| Some(Estimate { corrections: [rate(correction); WINDOW], scale: SCALE_MIN, clamped_inputs: 0 })
 }
 
 /// Runs samples through a pipeline; estimates are delivered at once, `None` never.

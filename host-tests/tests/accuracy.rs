@@ -14,14 +14,17 @@ const TRIALS: [u32; 2] = [9, 11];
 const YAW_ERROR: f64 = 0.03;
 /// Largest RMS of the difference of outputs, over the f32 output's own RMS.
 const OUTPUT: f64 = 0.02;
+/// The same of the scale of the expected error.
+const SCALE: f64 = 0.02;
 
 #[test]
 fn integer_network_against_f32() {
     let paths = TRIALS.map(|trial| recordings::trial("integer_network_against_f32", trial));
     let [Some(_), Some(_)] = paths else { return };
     let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
-    let mut table =
-        String::from("trial      static   1 s f32  1 s int    ratio  output RMS  windows  clamped\n");
+    let mut table = String::from(
+        "trial      static   1 s f32  1 s int    ratio  output RMS  scale RMS  windows  clamped\n",
+    );
     let mut failures = Vec::new();
     for (trial, path) in TRIALS.into_iter().zip(paths.into_iter().flatten()) {
         let recording = Recording::read(&path).expect("a recording");
@@ -36,11 +39,12 @@ fn integer_network_against_f32() {
         let ratio = errors.gyronet_int / errors.gyronet_f32;
         let difference = both.error();
         table += &format!(
-            "{trial:02}      {:.6}  {:.6}  {:.6}  {ratio:.4}      {:.4}   {:6}  {:7}\n",
+            "{trial:02}      {:.6}  {:.6}  {:.6}  {ratio:.4}      {:.4}     {:.4}   {:6}  {:7}\n",
             errors.static_init,
             errors.gyronet_f32,
             errors.gyronet_int,
             difference.relative_rms(),
+            difference.scale_rms(),
             difference.windows,
             difference.clamped_inputs,
         );
@@ -48,6 +52,7 @@ fn integer_network_against_f32() {
             |holds: bool, what: &str| failures.extend((!holds).then(|| format!("trial {trial:02}: {what}")));
         must((ratio - 1.0).abs() <= YAW_ERROR, "1 s yaw errors differ by more than 3 %");
         must(difference.relative_rms() <= OUTPUT, "outputs differ by more than 2 % RMS");
+        must(difference.scale_rms() <= SCALE, "scales differ by more than 2 % RMS");
         must(difference.clamped_inputs == 0, "inputs were clamped");
         must(difference.windows > 2_000, "too few windows were run");
     }

@@ -74,7 +74,8 @@ fn header_fields() {
     let p = provenance_len();
     for (at, bytes, error) in [
         (0, &b"GYRX"[..], BlobError::Magic(*b"GYRX")),
-        (4, &[2, 0], BlobError::Version(2)),
+        (4, &[1, 0], BlobError::Version(1)),
+        (4, &[3, 0], BlobError::Version(3)),
         (4, &[0, 1], BlobError::Version(256)),
         (6, &[2, 0], topology([2, window, features, hidden, 2])),
         (8, &(len as u32 + 4).to_le_bytes(), length(len + 4, len)),
@@ -98,8 +99,8 @@ fn header_fields() {
         HEADER_LEN
             + (direction_at(1, 1) - direction_at(1, 0)) * 2
             + 2 * (direction_at(0, 1) - direction_at(0, 0))
-            + 4 * HIDDEN
-            + 12
+            + 2 * (4 * HIDDEN + 8)
+            + 8
     );
 }
 
@@ -152,9 +153,11 @@ fn rows_that_could_overflow() {
 
 #[test]
 fn output_that_could_overflow() {
-    let dense = file_len(provenance_len()) - 4 - 8 - 4 * HIDDEN;
-    assert_eq!(File::with(dense + 4 * HIDDEN, &i32::MAX.to_le_bytes()).error(), BlobError::Scale);
-    assert_eq!(File::with(dense, &[0xFF, 0x7F].repeat(2 * HIDDEN)).error(), BlobError::Scale);
+    let unit = file_len(provenance_len()) - 8;
+    for row in [unit - 4 * HIDDEN - 8, unit - 2 * (4 * HIDDEN + 8)] {
+        assert_eq!(File::with(row + 4 * HIDDEN, &i32::MAX.to_le_bytes()).error(), BlobError::Scale);
+        assert_eq!(File::with(row, &[0xFF, 0x7F].repeat(2 * HIDDEN)).error(), BlobError::Scale);
+    }
 }
 
 #[test]
@@ -183,7 +186,7 @@ fn every_flipped_bit_is_noticed() {
 fn refusals_say_why() {
     for (error, text) in [
         (BlobError::Magic(*b"ELF!"), "magic is [45, 4c, 46, 21], not [47, 59, 52, 4e]"),
-        (BlobError::Version(7), "format version 7, this reads 1"),
+        (BlobError::Version(7), "format version 7, this reads 2"),
         (BlobError::Length { expected: 10, found: 9 }, "9 bytes, should be 10"),
         (BlobError::Misaligned, "not on a 4-byte boundary"),
         (BlobError::Crc { computed: 1, stored: 0xABCD }, "checksum is 00000001, the file says 0000abcd"),

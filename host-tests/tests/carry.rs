@@ -3,7 +3,7 @@
 
 use gyronet::compensate::{CompensateConfig, DELAY, SETTLED_AFTER};
 use gyronet::health::Status;
-use gyronet::model::Estimate;
+use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
 use gyronet::units::AngularRate;
@@ -109,7 +109,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
             let mean = faults.spread * noise.normal();
             let corrections = [(); WINDOW].map(|()| rate(mean + faults.spread * noise.normal()));
             ledger.out = Some((due.end, corrections.map(|c| c.0.into())));
-            pipeline.deliver(due.end, Estimate { corrections, clamped_inputs: 0 });
+            pipeline.deliver(due.end, Estimate { corrections, scale: SCALE_MIN, clamped_inputs: 0 });
         }
     }
     assert!(ready > 2_000, "only {ready} samples were corrected");

@@ -9,7 +9,7 @@ use gyronet::can::feeds::Feeds;
 use gyronet::compensate::{CompensateConfig, DELAY, HOP};
 use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init, Ready};
-use gyronet::model::Estimate;
+use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{DueWindow, Output};
 use gyronet::units::AngularRate;
 use gyronet::window::WINDOW;
@@ -81,7 +81,7 @@ fn an_implausible_estimate_is_not_believed() {
     let limit = CompensateConfig::DEFAULT.max_mean;
     let corrections = |due: &DueWindow| if due.end < 350 { limit } else { AngularRate(limit.0 + 1) };
     let outputs = run(&mut pipeline, drive(0..400), |due| {
-        Some(Estimate { corrections: [corrections(due); WINDOW], clamped_inputs: 1 })
+        Some(Estimate { corrections: [corrections(due); WINDOW], scale: SCALE_MIN, clamped_inputs: 1 })
     });
     assert_eq!(statuses(&outputs), [(Init, 300), (Degraded, 11), (Ready, 45), (Degraded, 44)]);
     assert_eq!((pipeline.counters().implausible, pipeline.counters().clamped_inputs), (9, 18));

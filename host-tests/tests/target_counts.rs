@@ -68,7 +68,7 @@ fn selftest() {
     assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
 }
 
-/// What the self-test computes: CRC-32 over the corrections of sixteen random windows.
+/// What the self-test computes: CRC-32 over the corrections and scales of sixteen random windows.
 fn hash() -> u32 {
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
     let mut digest = gyronet::model::blob::CRC.digest();
@@ -83,8 +83,9 @@ fn hash() -> u32 {
                 (state >> 1) as i32 % (2 * limit + 1) - limit
             })
         });
-        for correction in network.estimate(&window).corrections {
-            digest.update(&correction.0.to_le_bytes());
+        let estimate = network.estimate(&window);
+        for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+            digest.update(&rate.0.to_le_bytes());
         }
     }
     digest.finalize()

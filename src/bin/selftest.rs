@@ -106,7 +106,7 @@ mod firmware {
         differences
     }
 
-    /// CRC-32 over the corrections of sixteen random windows.
+    /// CRC-32 over the corrections and scales of sixteen random windows.
     fn hash() -> Option<u32> {
         let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).ok()?);
         let mut numbers = Numbers::new(7);
@@ -119,8 +119,9 @@ mod firmware {
                     *value = numbers.within(if k < 3 { 10 << 20 } else { 1 << 25 });
                 }
             }
-            for correction in network.estimate(&window).corrections {
-                digest.update(&correction.0.to_le_bytes());
+            let estimate = network.estimate(&window);
+            for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+                digest.update(&rate.0.to_le_bytes());
             }
         }
         Some(digest.finalize())

@@ -5,7 +5,7 @@
 //! | offset | type | field |
 //! |---|---|---|
 //! | 0 | 4 bytes | magic `GYRN` |
-//! | 4 | u16 | format version, 1 |
+//! | 4 | u16 | format version, 2 |
 //! | 6 | u16 | network, 1 = GyroNet |
 //! | 8 | u32 | length of the whole file, checksum included |
 //! | 12 | u16 x 4 | window, inputs, hidden units a direction, layers |
@@ -14,7 +14,9 @@
 //! | 28 | (i32, i32) x inputs | offset and multiplier of each input, see [`Normalisation`] |
 //! | 76 | P bytes | provenance, UTF-8 JSON |
 //! | 76 + P | | four directions: layer 1 forward, backward, layer 2 forward, backward |
-//! | ... | i16 x 2H, i32, i32 | output weights, bias, multiplier |
+//! | ... | i16 x 2H, i32, i32 | gyro error: weights, bias, multiplier to a rate code |
+//! | ... | i16 x 2H, i32, i32 | log2 of its scale: weights, bias, multiplier to Q16 |
+//! | ... | u32 | [`Blob::scale_unit`] |
 //! | end - 4 | u32 | CRC-32 (ISO-HDLC, as in zip and Ethernet) of everything before it |
 //!
 //! A direction is its input records, then its recurrent records, as [`crate::nn::lstm`] lays
@@ -28,7 +30,7 @@ use serde::{Deserialize, Serialize};
 /// First bytes of a weight file.
 pub const MAGIC: [u8; 4] = *b"GYRN";
 /// The format version that this code reads.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Network number of GyroNet.
 pub const GYRONET: u16 = 1;
 /// Units of GyroNet a direction (section III-B of the paper).
@@ -73,7 +75,7 @@ pub enum BlobError {
     },
     /// The provenance is not UTF-8.
     Provenance,
-    /// The input clamp is not within 1 to 32767, or the output could overflow.
+    /// The input clamp is not within 1 to 32767, or an output could overflow.
     Scale,
     /// A gate row could overflow its accumulator.
     RowBound {
@@ -135,8 +137,12 @@ pub struct Blob<'w> {
     pub input_clamp: i16,
     /// The two Bi-LSTM layers.
     pub layers: [Layer<'w>; 2],
-    /// The output layer.
-    pub dense: Dense<'w>,
+    /// Row of the output layer that gives a step's gyro error, as a rate code.
+    pub gyro_error: Dense<'w>,
+    /// Row whose sum over the steps is log2 of the scale over [`Blob::scale_unit`], in Q16.
+    pub log_scale: Dense<'w>,
+    /// The scale whose log is zero, as a rate code.
+    pub scale_unit: u32,
     /// The file's own checksum: the name of this set of weights.
     pub crc: u32,
 }
@@ -144,8 +150,16 @@ pub struct Blob<'w> {
 /// Bytes of a GyroNet file with `provenance` bytes of padded text.
 #[must_use]
 pub const fn file_len(provenance: usize) -> usize {
-    HEADER_LEN + provenance + 2 * (direction_len(FEATURES) + direction_len(2 * HIDDEN)) + 4 * HIDDEN + 8 + 4
+    HEADER_LEN
+        + provenance
+        + 2 * (direction_len(FEATURES) + direction_len(2 * HIDDEN))
+        + 2 * DENSE_LEN
+        + 4
+        + 4
 }
+
+/// Bytes of one row of the output layer.
+const DENSE_LEN: usize = 2 * (2 * HIDDEN) + 8;
 
 const fn direction_len(inputs: usize) -> usize {
     4 * (Direction::input_words(HIDDEN, inputs) + Direction::recurrent_words(HIDDEN))
@@ -203,14 +217,16 @@ impl<'w> Blob<'w> {
         let mut layer =
             |inputs| Ok(Layer { forward: reader.direction(inputs)?, backward: reader.direction(inputs)? });
         let layers = [layer(FEATURES)?, layer(2 * HIDDEN)?];
-        let dense =
-            Dense { weights: reader.slice(2 * HIDDEN)?, bias: reader.i32()?, multiplier: reader.i32()? };
+        let (gyro_error, log_scale) = (reader.dense()?, reader.dense()?);
+        let scale_unit = reader.i32()? as u32;
         let blob = Self {
             provenance: provenance.trim_end_matches(' '),
             normalisation,
             input_clamp,
             layers,
-            dense,
+            gyro_error,
+            log_scale,
+            scale_unit,
             crc,
         };
         blob.check_bounds()?;
@@ -235,9 +251,11 @@ impl<'w> Blob<'w> {
                 }
             }
         }
-        let sum: i64 = self.dense.weights.iter().map(|w| i64::from(*w).abs() * i64::from(HIDDEN_MAX)).sum();
-        if sum + i64::from(self.dense.bias).abs() >= 1 << 31 {
-            return Err(BlobError::Scale);
+        for row in [&self.gyro_error, &self.log_scale] {
+            let sum: i64 = row.weights.iter().map(|w| i64::from(*w).abs() * i64::from(HIDDEN_MAX)).sum();
+            if sum + i64::from(row.bias).abs() >= 1 << 31 {
+                return Err(BlobError::Scale);
+            }
         }
         Ok(())
     }
@@ -277,6 +295,10 @@ impl<'w> Reader<'w> {
             return Err(BlobError::Misaligned);
         }
         bytemuck::try_cast_slice(bytes).map_err(|_| BlobError::Misaligned)
+    }
+
+    fn dense(&mut self) -> Result<Dense<'w>, BlobError> {
+        Ok(Dense { weights: self.slice(2 * HIDDEN)?, bias: self.i32()?, multiplier: self.i32()? })
     }
 
     fn direction(&mut self, inputs: usize) -> Result<Direction<'w>, BlobError> {

@@ -1,10 +1,11 @@
-//! GyroNet in integers: ten samples in, the yaw gyro's error at each of them out.
+//! GyroNet in integers: ten samples in, the yaw gyro's error at each of them out, and how far off
+//! that may be.
 
 use super::blob::{Blob, HIDDEN, Normalisation};
-use super::{Estimate, WindowNetwork};
+use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::nn::bilstm::{self, Pass, Run, Way};
 use crate::nn::lstm::Scratch;
-use crate::nn::{dense::Dense, pack};
+use crate::nn::{dense::Dense, exp2::times_exp2, pack};
 use crate::units::AngularRate;
 use crate::window::{FEATURES, Features, WINDOW};
 
@@ -17,7 +18,8 @@ pub struct GyroNetState {
     input: [u32; WINDOW * FEATURES / 2],
     layer1: [u32; WINDOW * HIDDEN],
     scratch: Scratch<HIDDEN, HIDDEN_WORDS>,
-    sums: [i32; WINDOW],
+    /// Of the gyro error's row, then of the log scale's row.
+    sums: [[i32; 2]; WINDOW],
     clamped_inputs: u16,
     run: Option<Run>,
 }
@@ -28,7 +30,7 @@ impl GyroNetState {
         input: [0; _],
         layer1: [0; _],
         scratch: Scratch::ZERO,
-        sums: [0; _],
+        sums: [[0; _]; _],
         clamped_inputs: 0,
         run: None,
     };
@@ -58,7 +60,7 @@ impl<'w> GyroNet<'w> {
     /// is dropped.
     pub fn start(&mut self, window: &[Features; WINDOW]) {
         self.state.clamped_inputs = self.load(window);
-        self.state.sums = [self.blob.dense.bias; WINDOW];
+        self.state.sums = [[self.blob.gyro_error.bias, self.blob.log_scale.bias]; WINDOW];
         self.state.run = Some(Run::new());
     }
 
@@ -68,10 +70,11 @@ impl<'w> GyroNet<'w> {
     pub fn advance(&mut self) -> Option<Estimate> {
         let Self { blob, state } = self;
         let GyroNetState { input, layer1, scratch, sums, clamped_inputs, run } = state;
-        let (forward, backward) = blob.dense.weights.split_at_checked(HIDDEN).unwrap_or_default();
         let more = run.as_mut()?.advance(&blob.layers, input, layer1, scratch, |way, step, hidden| {
-            let weights = if way == Way::Forward { forward } else { backward };
-            if let Some(sum) = sums.get_mut(step) {
+            let Some(sums) = sums.get_mut(step) else { return };
+            for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
+                let (forward, backward) = row.weights.split_at_checked(HIDDEN).unwrap_or_default();
+                let weights = if way == Way::Forward { forward } else { backward };
                 *sum = sum.wrapping_add(Dense::partial(weights, hidden));
             }
         });
@@ -79,16 +82,19 @@ impl<'w> GyroNet<'w> {
             return None;
         }
         *run = None;
-        let corrections = sums.map(|sum| AngularRate(blob.dense.scale(sum)));
-        Some(Estimate { corrections, clamped_inputs: *clamped_inputs })
+        let corrections = sums.map(|[error, _]| AngularRate(blob.gyro_error.scale(error)));
+        let log_scale =
+            sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
+        let scale = AngularRate(times_exp2(blob.scale_unit, log_scale)).clamp(SCALE_MIN, SCALE_MAX);
+        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs })
     }
 
-    /// The newest sample's correction only, and the clamped inputs. The backward half of layer 2
+    /// The newest sample's correction only, without a scale, and the clamped inputs. The backward half of layer 2
     /// needs just its first steps for that, which saves a third of the work; the result is the
     /// last of [`WindowNetwork::estimate`]'s, bit for bit.
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
         let clamped_inputs = self.load(window);
-        let Self { blob: Blob { layers: [first, second], dense, .. }, state } = self;
+        let Self { blob: Blob { layers: [first, second], gyro_error: dense, .. }, state } = self;
         let GyroNetState { input, layer1, scratch, .. } = state;
         for (direction, way, offset) in
             [(&first.forward, Way::Forward, 0), (&first.backward, Way::Backward, HIDDEN)]

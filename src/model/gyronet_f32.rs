@@ -1,7 +1,7 @@
 //! GyroNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
 
 use super::blob::HIDDEN;
-use super::{Estimate, WindowNetwork};
+use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::nn::reference::{LstmWeights, dense, lstm};
 use crate::units::{AngularRate, SpecificForce};
 use crate::window::{FEATURES, Features, WINDOW};
@@ -19,10 +19,10 @@ pub struct GyroNetF32<'w> {
     pub lstm1: [LstmWeights<'w>; 2],
     /// Layer 2: forward, backward.
     pub lstm2: [LstmWeights<'w>; 2],
-    /// (2H)
+    /// (2, 2H): gyro error, log of its scale.
     pub fc_weight: &'w [f32],
-    /// Scalar.
-    pub fc_bias: f32,
+    /// (2)
+    pub fc_bias: [f32; 2],
 }
 
 /// Every layer's output for one window.
@@ -36,6 +36,8 @@ pub struct LayerOutputs {
     pub layer2: [[f32; 2 * HIDDEN]; WINDOW],
     /// Gyro error, rad/s.
     pub gyro_error: [f32; WINDOW],
+    /// Log of the scale of the mean's Laplace error, in units of the output scale.
+    pub log_scale: f32,
 }
 
 impl GyroNetF32<'_> {
@@ -52,8 +54,11 @@ impl GyroNetF32<'_> {
         for (way, backward) in [false, true].into_iter().enumerate() {
             lstm::<_, HIDDEN, _>(&self.lstm2[way], &layer1, backward, &mut layer2, way * HIDDEN);
         }
-        let gyro_error = layer2.map(|h| dense(self.fc_weight, self.fc_bias, &h) * self.output_scale);
-        LayerOutputs { normalised, layer1, layer2, gyro_error }
+        let (error_weight, log_weight) = self.fc_weight.split_at(2 * HIDDEN);
+        let [error_bias, log_bias] = self.fc_bias;
+        let gyro_error = layer2.map(|h| dense(error_weight, error_bias, &h) * self.output_scale);
+        let log_scale = layer2.iter().map(|h| dense(log_weight, log_bias, h)).sum::<f32>() / WINDOW as f32;
+        LayerOutputs { normalised, layer1, layer2, gyro_error, log_scale }
     }
 }
 
@@ -66,10 +71,13 @@ impl WindowNetwork for GyroNetF32<'_> {
                 features[k] as f32 / per_unit
             })
         });
-        let corrections = self.layers(&units).gyro_error.map(|error| {
+        let LayerOutputs { gyro_error, log_scale, .. } = self.layers(&units);
+        let corrections = gyro_error.map(|error| {
             // A number that does not fit is as implausible as the largest one that does.
             AngularRate::from_rad_per_sec(error).unwrap_or(AngularRate(i32::MAX))
         });
-        Estimate { corrections, clamped_inputs: 0 }
+        let scale = AngularRate::from_rad_per_sec(self.output_scale * libm::expf(log_scale))
+            .map_or(SCALE_MAX, |scale| scale.clamp(SCALE_MIN, SCALE_MAX));
+        Estimate { corrections, scale, clamped_inputs: 0 }
     }
 }

@@ -14,6 +14,11 @@ use crate::window::{Features, WINDOW};
 /// Estimates of the yaw gyro's error, one for each sample of a window, oldest first.
 pub type Corrections = [AngularRate; WINDOW];
 
+/// The smallest [`Estimate::scale`]: 2^-20 rad/s (0.2 deg/h), far below what a window can tell.
+pub const SCALE_MIN: AngularRate = AngularRate(1 << 7);
+/// The largest [`Estimate::scale`]: 1 rad/s, which says that the estimate is worth nothing.
+pub const SCALE_MAX: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
+
 /// Whatever turns a window into corrections: the integer network, the f32 reference.
 pub trait WindowNetwork {
     /// Runs the network over one window.
@@ -26,6 +31,9 @@ pub trait WindowNetwork {
 pub struct Estimate {
     /// The corrections.
     pub corrections: Corrections,
+    /// Scale of the Laplace error that the mean of the window's corrected rates has: the
+    /// absolute error to expect of it. Between [`SCALE_MIN`] and [`SCALE_MAX`].
+    pub scale: AngularRate,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
 }

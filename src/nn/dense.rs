@@ -1,4 +1,4 @@
-//! The fully-connected layer on top: one output a step, from both directions' hidden states.
+//! The fully-connected layer on top: outputs of a step from both directions' hidden states.
 
 use super::unpack;
 

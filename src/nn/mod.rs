@@ -29,6 +29,7 @@
 pub mod activation;
 pub mod bilstm;
 pub mod dense;
+pub mod exp2;
 pub mod lstm;
 pub mod reference;
 mod simd;

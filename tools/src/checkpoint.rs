@@ -81,8 +81,8 @@ const TENSORS: [(&str, &[usize]); 21] = [
     ("lstm2.weight_hh_l0_reverse", &[4 * HIDDEN, HIDDEN]),
     ("lstm2.bias_ih_l0_reverse", &[4 * HIDDEN]),
     ("lstm2.bias_hh_l0_reverse", &[4 * HIDDEN]),
-    ("fc.weight", &[1, 2 * HIDDEN]),
-    ("fc.bias", &[1]),
+    ("fc.weight", &[2, 2 * HIDDEN]),
+    ("fc.bias", &[2]),
 ];
 
 /// A checkpoint in memory: every tensor present, of the right shape and finite.
@@ -169,7 +169,7 @@ impl Checkpoint {
             lstm1: [self.direction(1, false), self.direction(1, true)],
             lstm2: [self.direction(2, false), self.direction(2, true)],
             fc_weight: self.tensor("fc.weight"),
-            fc_bias: self.tensor("fc.bias")[0],
+            fc_bias: std::array::from_fn(|row| self.tensor("fc.bias")[row]),
         }
     }
 }

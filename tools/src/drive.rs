@@ -132,7 +132,7 @@ impl Drive {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gyronet::model::Estimate;
+    use gyronet::model::{Estimate, SCALE_MIN};
     use gyronet::window::{Features, WINDOW};
     use std::fmt::Write;
 
@@ -141,7 +141,7 @@ mod tests {
 
     impl WindowNetwork for Constant {
         fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
-            Estimate { corrections: [AngularRate(100); WINDOW], clamped_inputs: 0 }
+            Estimate { corrections: [AngularRate(100); WINDOW], scale: SCALE_MIN, clamped_inputs: 0 }
         }
     }
 

@@ -9,7 +9,7 @@ use crate::checkpoint::Checkpoint;
 use gyronet::model::blob::{self, Blob, HIDDEN};
 use gyronet::nn::lstm::ROW_LIMIT;
 use gyronet::nn::reference::LstmWeights;
-use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, dense::Dense, pack};
+use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, dense::Dense, exp2, pack};
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet::window::{FEATURES, WINDOW};
 use serde_json::json;
@@ -83,7 +83,7 @@ pub fn quantize(checkpoint: &Checkpoint) -> Result<(Vec<u8>, Report), QuantizeEr
             pack_direction(&mut body, &rows);
         }
     }
-    dense(&mut body, checkpoint)?;
+    output(&mut body, checkpoint)?;
     let provenance = provenance(checkpoint);
     let mut file = header(checkpoint, provenance.len(), clamp)?;
     file.extend(provenance);
@@ -174,20 +174,32 @@ fn pack_columns(out: &mut Vec<u8>, [i, f, g, o]: [&[i8]; GATES]) {
     }
 }
 
-fn dense(out: &mut Vec<u8>, checkpoint: &Checkpoint) -> Result<(), QuantizeError> {
-    let weights = checkpoint.tensor("fc.weight");
+/// Both rows of the output layer.
+fn output(out: &mut Vec<u8>, checkpoint: &Checkpoint) -> Result<(), QuantizeError> {
+    let (error, log_scale) = checkpoint.tensor("fc.weight").split_at(2 * HIDDEN);
+    let bias = checkpoint.tensor("fc.bias");
+    let unit = f64::from(checkpoint.tensor("output_scale")[0]) * f64::from(AngularRate::PER_RAD_PER_SEC);
+    dense(out, "gyro error", error, bias[0], unit)?;
+    // The sum over the window is the mean of the logs.
+    let log2 = f64::from(1 << exp2::FRACTION_BITS) * std::f64::consts::LOG2_E / WINDOW as f64;
+    dense(out, "log of the scale", log_scale, bias[1], log2)?;
+    out.extend(fixed("output scale", unit)?.to_le_bytes());
+    Ok(())
+}
+
+/// One row of the output layer; `codes` of its output make one unit.
+fn dense(out: &mut Vec<u8>, what: &str, weights: &[f32], bias: f32, codes: f64) -> Result<(), QuantizeError> {
     let largest = weights.iter().fold(0.0f64, |max, w| max.max(f64::from(w.abs())));
-    // 120 products of 14 and 10 bits stay inside 31.
-    let scale = largest.max(f64::MIN_POSITIVE) / f64::from(1 << 14);
+    let sum: f64 = weights.iter().chain([&bias]).map(|w| f64::from(w.abs())).sum();
+    // Weights of 14 bits, unless the sum, in units of scale x 2^-10, would pass 31.
+    let scale = (largest / f64::from(1 << 14)).max(1.001 * sum / f64::from(1 << 21)).max(f64::MIN_POSITIVE);
     for weight in weights {
         out.extend(((f64::from(*weight) / scale).round() as i16).to_le_bytes());
     }
     let lsb = scale / f64::from(HIDDEN_MAX);
-    let bias = f64::from(checkpoint.tensor("fc.bias")[0]) / lsb;
-    out.extend(fixed("output bias", bias)?.to_le_bytes());
-    let rad_per_sec = f64::from(checkpoint.tensor("output_scale")[0]) * lsb;
-    let multiplier = rad_per_sec * f64::from(AngularRate::PER_RAD_PER_SEC) * f64::from(1u32 << Dense::SHIFT);
-    out.extend(fixed("output scale", multiplier)?.to_le_bytes());
+    out.extend(fixed(&format!("{what}: bias"), f64::from(bias) / lsb)?.to_le_bytes());
+    let multiplier = lsb * codes * f64::from(1u32 << Dense::SHIFT);
+    out.extend(fixed(&format!("{what}: multiplier"), multiplier)?.to_le_bytes());
     Ok(())
 }
 

@@ -123,7 +123,9 @@ pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
 
 /// Compiles the instruction counter; `None` where there is no C compiler.
 fn plugin(workspace: &Path) -> Option<PathBuf> {
-    let library = workspace.join("target").join("m4count.so");
+    let folder = workspace.join("target");
+    std::fs::create_dir_all(&folder).ok()?;
+    let library = folder.join("m4count.so");
     let source = workspace.join("tools/bench/m4count.c");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
     let mut cc = Command::new(compiler);

@@ -53,6 +53,6 @@ pub fn network() -> Option<GyroNetF32<'static>> {
         lstm1: [direction!("1", "")?, direction!("1", "_reverse")?],
         lstm2: [direction!("2", "")?, direction!("2", "_reverse")?],
         fc_weight: tensor("\"fc.weight\"")?,
-        fc_bias: *tensor("\"fc.bias\"")?.first()?,
+        fc_bias: tensor("\"fc.bias\"")?.try_into().ok()?,
     })
 }

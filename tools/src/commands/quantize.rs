@@ -44,9 +44,10 @@ pub fn run(args: &Args, _common: Common) -> super::Result {
         Drive::run(drive, &mut both, || {})?;
         let error = both.error();
         println!(
-            "{}: quantisation adds {:.2} % RMS over {} windows, {} inputs clamped",
+            "{}: quantisation adds {:.2} % RMS ({:.2} % to the scale) over {} windows, {} inputs clamped",
             drive.name(),
             100.0 * error.relative_rms(),
+            100.0 * error.scale_rms(),
             error.windows,
             error.clamped_inputs
         );

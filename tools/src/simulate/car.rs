@@ -39,6 +39,9 @@ pub struct Config {
     pub road_grade: f64,
     /// Amplitude of the road's bank, rad: the same.
     pub road_bank: f64,
+    /// Wave lengths of the bank, m. Where grade and bank share one, pitch and roll turn in step
+    /// for hours, and their product turns a gyro steadily away: by several deg/h. No road does.
+    pub bank_waves: [f64; 2],
 }
 
 impl Config {
@@ -56,6 +59,8 @@ impl Config {
         suspension_damping: 0.35,
         road_grade: 0.008,
         road_bank: 0.008,
+        // In 90 s, with these amplitudes, what they share is far below the gyro's bias.
+        bank_waves: GRADE_WAVES,
     };
 }
 
@@ -100,21 +105,22 @@ impl Spring {
 #[derive(Debug, Clone, Copy)]
 struct Slope {
     amplitude: f64,
+    waves: [f64; 2],
     phase: [f64; 2],
 }
 
-impl Slope {
-    /// Wave lengths, m.
-    const WAVES: [f64; 2] = [310.0, 97.0];
+/// Wave lengths of the grade, m.
+const GRADE_WAVES: [f64; 2] = [310.0, 97.0];
 
-    fn new(amplitude: f64, random: &mut Random) -> Self {
-        Self { amplitude, phase: [random.between(0.0, TAU), random.between(0.0, TAU)] }
+impl Slope {
+    fn new(amplitude: f64, waves: [f64; 2], random: &mut Random) -> Self {
+        Self { amplitude, waves, phase: [random.between(0.0, TAU), random.between(0.0, TAU)] }
     }
 
     /// Angle at a place and its change per metre.
     fn at(&self, metres: f64) -> (f64, f64) {
         let (mut angle, mut change) = (0.0, 0.0);
-        for (wave, phase) in Self::WAVES.into_iter().zip(self.phase) {
+        for (wave, phase) in self.waves.into_iter().zip(self.phase) {
             let argument = TAU * metres / wave + phase;
             angle += 0.5 * self.amplitude * libm::sin(argument);
             change += 0.5 * self.amplitude * libm::cos(argument) * TAU / wave;
@@ -165,8 +171,8 @@ impl Car {
             acceleration: 0.0,
             roll: Spring::default(),
             pitch: Spring::default(),
-            bank: Slope::new(config.road_bank, &mut road),
-            grade: Slope::new(config.road_grade, &mut road),
+            bank: Slope::new(config.road_bank, config.bank_waves, &mut road),
+            grade: Slope::new(config.road_grade, GRADE_WAVES, &mut road),
             wheel_noise: Random::new(seed, Purpose::Wheels),
         }
     }

@@ -21,6 +21,7 @@
 //! | waiting at a junction; share of junctions | 5 to 45 s; 0.4 | signal cycles of 60 to 120 s [A] |
 //! | acceleration, braking, comfort in corners | 2.0, 1.8, 2.0 m/s^2 | as [`super::car::Config::DEFAULT`]; calm drivers |
 //! | grade, bank | 0.03, 0.015 rad | streets are drained by 1.5 to 2 % of bank; grades up to 3 % [A] |
+//! | wave lengths of the bank | 223 and 71 m | [A]: other ones than the grade's, see [`super::car::Config::bank_waves`] |
 //! | shaking | [`super::vibration::Config::DEFAULT`] | measured on a car (WID recordings) |
 //! | KAIST latitude | 36.37 deg N | Daejeon |
 //! | KAIST delay of a stamp | 0.1 ms, exponential | [A]: the paper's Fig. 11 shows it small |
@@ -78,6 +79,7 @@ pub const KAIST: Vehicle = Vehicle {
             track: 1.5285,
             road_grade: 0.03,
             road_bank: 0.015,
+            bank_waves: [223.0, 71.0],
             ..car::Config::DEFAULT
         },
         vibration: vibration::Config::DEFAULT,
@@ -135,6 +137,7 @@ pub const NCLT: Vehicle = Vehicle {
             suspension_hz: 0.8,
             road_grade: 0.03,
             road_bank: 0.015,
+            bank_waves: [223.0, 71.0],
             ..car::Config::DEFAULT
         },
         vibration: vibration::Config { road_speed: 2.0, ..vibration::Config::DEFAULT },

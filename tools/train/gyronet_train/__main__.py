@@ -1,28 +1,25 @@
 """python -m gyronet_train DATA --out FOLDER: train GyroNet on a folder of drives.
 
-As in the paper: Adam with an initial rate of 0.0015, mean absolute error, windows of 0.1 s
-taken every 0.01 s and shuffled. The rate follows one cycle; the epoch that does best on the
-validation drive is kept. Test drives are never read here. Other than the paper, turns are added
-to half of the windows (augment.py); --no-turns leaves them as they are.
+Trains once for each seed, prints what each is worth on the validation drive with mean and spread,
+and keeps the best of them there. Test drives are never read here. training.py says how it is
+trained and in what that departs from the paper.
 """
 
 from __future__ import annotations
 
 import argparse
-import copy
+import dataclasses
 import datetime
+import statistics
 from pathlib import Path
 
-import numpy as np
 import torch
 from tqdm import tqdm
 
-from .augment import turn
 from .export import export
-from .model import GyroNet, overlap_mean
-from .recordings import WINDOW, Drive, load_drive, mean_1s_error, windows
-
-HOP = 5
+from .recordings import load_drive, mean_1s_error
+from .training import Settings, Trained, train
+from .validation import Validation
 
 
 def arguments() -> argparse.Namespace:
@@ -33,75 +30,67 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NN")
     parser.add_argument("--validate", default="08", metavar="NN")
     parser.add_argument("--epochs", type=int, default=20)
-    parser.add_argument("--batch", type=int, default=512)
+    parser.add_argument("--batch", type=int, default=512, help="windows of a batch")
     parser.add_argument("--lr", type=float, default=0.0015)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--no-turns", dest="turns", action="store_false", help="as in the paper: add no turns")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], metavar="N")
+    parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="CPU threads")
+    parser.add_argument("--no-turns", dest="turns", action="store_false", help="add no turns")
+    parser.add_argument("--no-units", dest="units", action="store_false", help="add no other units")
     return parser.parse_args()
 
 
-@torch.no_grad()
-def validation_error(model: GyroNet, drive: Drive) -> float:
-    """1 s yaw error (rad) with overlapping windows every HOP samples, as the firmware runs."""
-    model.eval()
-    x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::HOP]))
-    correction = overlap_mean(model(x), HOP, len(drive.gyro_error)).numpy()
-    return mean_1s_error(drive.gyro_error - correction)
+def line(what: str, validation: Validation) -> str:
+    """The errors of one network, for people."""
+    return (
+        f"{what}: 1 s error {validation.mean_1s_rad:.6f} rad, over any 1 s {validation.any_1s_rad:.6f}, "
+        f"window mean {validation.window_rad_per_sec:.6f} rad/s at {validation.scale_ratio:.2f} of its scale"
+    )
 
 
 def main() -> None:
     args = arguments()
-    torch.manual_seed(args.seed)
+    torch.set_num_threads(args.threads)
     drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in tqdm(args.train, "reading")]
-    validate = load_drive(args.data / f"trial{args.validate}_100hz.csv")
-    features = np.concatenate([d.features for d in drives])
-    labels = np.concatenate([d.gyro_error for d in drives])
-    model = GyroNet(
-        torch.from_numpy(features.mean(axis=0)), torch.from_numpy(features.std(axis=0)), float(labels.std())
+    validation_drive = load_drive(args.data / f"trial{args.validate}_100hz.csv")
+    static = mean_1s_error(validation_drive.gyro_error)
+    print(f"static initialisation: 1 s error {static:.6f} rad")
+    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units)
+    networks: dict[int, Trained] = {}
+    for seed in args.seeds:
+        networks[seed] = train(
+            drives,
+            validation_drive,
+            settings,
+            seed,
+            lambda epoch, validation: tqdm.write(line(f"seed {seed} epoch {epoch}", validation)),
+        )
+        print(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
+    errors = [network.validation.mean_1s_rad for network in networks.values()]
+    spread = statistics.stdev(errors) if len(errors) > 1 else 0.0
+    seconds = sum(network.seconds for network in networks.values())
+    print(
+        f"{len(errors)} seeds in {seconds:.0f} s: 1 s error {statistics.mean(errors):.6f} rad, "
+        f"standard deviation {spread:.6f}"
     )
-    x = torch.from_numpy(np.concatenate([windows(d.features) for d in drives]))
-    y = torch.from_numpy(np.concatenate([windows(d.gyro_error) for d in drives]))
-    optimiser = torch.optim.Adam(model.parameters(), lr=args.lr)
-    batches = len(x) // args.batch
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, args.lr, total_steps=batches * args.epochs)
-    static = mean_1s_error(validate.gyro_error)
-    best = (float("inf"), 0, None)
-    for epoch in range(1, args.epochs + 1):
-        model.train()
-        order = torch.randperm(len(x))
-        bar = tqdm(range(batches), f"epoch {epoch}/{args.epochs}")
-        for b in bar:
-            pick = order[b * args.batch : (b + 1) * args.batch]
-            loss = (model(turn(x[pick]) if args.turns else x[pick]) - y[pick]).abs().mean()
-            optimiser.zero_grad()
-            (loss / model.output_scale.item()).backward()
-            optimiser.step()
-            schedule.step()
-            bar.set_postfix(mae_rad_s=f"{loss.item():.5f}")
-        error = validation_error(model, validate)
-        print(f"epoch {epoch}: validation 1 s error {error:.6f} rad (static initialisation {static:.6f})")
-        if error < best[0]:
-            best = (error, epoch, copy.deepcopy(model.state_dict()))
-    model.load_state_dict(best[2])
-    model.eval()
+    seed = min(networks, key=lambda seed: networks[seed].validation.any_1s_rad)
+    chosen = networks[seed]
     provenance = {
         "network": "gyronet",
         "train": [d.name for d in drives],
-        "validate": validate.name,
-        "sha256": {d.name: d.sha256 for d in [*drives, validate]},
-        "validation_mean_1s_rad": round(best[0], 7),
+        "validate": validation_drive.name,
+        "sha256": {d.name: d.sha256 for d in [*drives, validation_drive]},
+        "validation_mean_1s_rad": round(chosen.validation.mean_1s_rad, 7),
         "validation_static_mean_1s_rad": round(static, 7),
-        "epoch": best[1],
-        "epochs": args.epochs,
-        "batch": args.batch,
-        "lr": args.lr,
-        "seed": args.seed,
-        "turns_added": args.turns,
+        "validation_mean_1s_rad_of_seeds": {s: round(e, 7) for s, e in zip(networks, errors)},
+        "epoch": chosen.epoch,
+        "seed": seed,
+        "seconds": round(seconds),
+        **dataclasses.asdict(settings),
         "torch": torch.__version__.split("+")[0],
         "date": datetime.date.today().isoformat(),
     }
     args.out.mkdir(parents=True, exist_ok=True)
-    for path in export(model, provenance, args.out, args.stem):
+    for path in export(chosen.model, provenance, args.out, args.stem):
         print(path)
 
 

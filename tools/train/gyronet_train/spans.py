@@ -1,0 +1,57 @@
+"""Spans of drives, each cut into windows as the firmware runs them: HOP samples apart.
+
+A span of k windows has k - 1 stretches of HOP samples that two windows cover. Their mean is what
+the firmware uses, so it is what the loss looks at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+
+from .recordings import WINDOW, Drive
+
+HOP = 5
+
+
+class Spans:
+    """Every span of `windows` windows in some drives, wherever it begins."""
+
+    def __init__(self, drives: list[Drive], windows: int):
+        self.windows = windows
+        self.length = WINDOW + (windows - 1) * HOP
+        self.features = torch.from_numpy(np.concatenate([d.features for d in drives]))
+        self.gyro_error = torch.from_numpy(np.concatenate([d.gyro_error for d in drives]))
+        ends = np.cumsum([len(d.gyro_error) for d in drives])
+        starts = [np.arange(end - len(d.gyro_error), end - self.length + 1) for d, end in zip(drives, ends)]
+        self.starts = torch.from_numpy(np.concatenate(starts))
+
+    def batches(self, windows: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+        """Shuffled batches of about `windows` windows: features (S, L, 6), gyro error (S, L).
+
+        One epoch holds as many windows as the drives have samples.
+        """
+        spans = windows // self.windows
+        order = self.starts[torch.randperm(len(self.starts))]
+        within = torch.arange(self.length)
+        for chosen in order[: self.epoch(windows) * spans].view(-1, spans):
+            rows = chosen[:, None] + within
+            yield self.features[rows], self.gyro_error[rows]
+
+    def epoch(self, windows: int) -> int:
+        """Batches of an epoch."""
+        return len(self.starts) // (windows // self.windows * self.windows)
+
+
+def cut(span: torch.Tensor) -> torch.Tensor:
+    """The windows of spans: (S, L, ...) -> (S, k, WINDOW, ...)."""
+    return torch.stack(
+        [span[:, at : at + WINDOW] for at in range(0, span.shape[1] - WINDOW + 1, HOP)], dim=1
+    )
+
+
+def overlapped(windows: torch.Tensor) -> torch.Tensor:
+    """Mean of both estimates of the samples that two windows cover: (S, k, WINDOW) -> (S, (k - 1) HOP)."""
+    return ((windows[:, :-1, HOP:] + windows[:, 1:, :HOP]) / 2).flatten(1)

@@ -1,0 +1,53 @@
+"""What a network is worth on a drive, run as the firmware runs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from .model import GyroNet, overlap_mean
+from .recordings import RATE_HZ, STATIC_SAMPLES, Drive, mean_1s_error, windows
+from .spans import HOP
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Errors after the static phase, with overlapping windows HOP apart."""
+
+    mean_1s_rad: float
+    """Mean |yaw error| over consecutive 1 s windows: the number that the tools print."""
+    any_1s_rad: float
+    """The same over all 1 s windows, one beginning at each sample: it scatters less."""
+    window_rad_per_sec: float
+    """Mean |error| of the mean of a window's corrected rates."""
+    scale_ratio: float
+    """That error over the scale that the network gives: 1 where it is calibrated."""
+    log_loss: float
+    """Mean Laplace log loss of the windows' errors, scale in rad/s."""
+
+
+@torch.no_grad()
+def corrections(model: GyroNet, features: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
+    """Outputs (W, N) and scales (W,) of the windows HOP apart."""
+    model.eval()
+    return model(torch.from_numpy(np.ascontiguousarray(windows(features)[::HOP])))
+
+
+def validate(model: GyroNet, drive: Drive) -> Validation:
+    """Runs the network over a drive."""
+    output, scale = corrections(model, drive.features)
+    rate_error = drive.gyro_error - overlap_mean(output, HOP, len(drive.gyro_error)).numpy()
+    yaw_error = np.cumsum(np.append(0.0, rate_error[STATIC_SAMPLES:])) / RATE_HZ
+    moving = slice(STATIC_SAMPLES // HOP, None)
+    label = windows(drive.gyro_error)[::HOP].mean(axis=1)[moving]
+    window_error = np.abs(output.numpy().mean(axis=1)[moving] - label)
+    scale = scale.numpy()[moving]
+    return Validation(
+        mean_1s_rad=mean_1s_error(rate_error),
+        any_1s_rad=float(np.abs(yaw_error[RATE_HZ:] - yaw_error[:-RATE_HZ]).mean()),
+        window_rad_per_sec=float(window_error.mean()),
+        scale_ratio=float((window_error / scale).mean()),
+        log_loss=float((window_error / scale + np.log(scale)).mean()),
+    )
