@@ -156,7 +156,7 @@ impl F405 {
         for word in words {
             let erased = match hit {
                 Some(Cut::Front) => word < middle,
-                Some(Cut::Anywhere | Cut::Zeros) => self.noise.byte() % 2 == 0,
+                Some(Cut::Anywhere | Cut::Zeros) => self.noise.byte().is_multiple_of(2),
                 _ => true,
             };
             if erased {

@@ -1,5 +1,6 @@
 //! The firmware images, built as `cargo fw` builds them.
 
+use crate::qemu;
 use crate::recordings::workspace;
 use crate::require::{self, Need};
 use gyronet_tools::target_bench::{self, TARGET};
@@ -19,6 +20,13 @@ pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
     require::wants(test, Need::Qemu, target_installed())?;
     let folder = Path::new(scratch).join("fw");
     Some(target_bench::build(workspace(), image, &folder).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// The image that is flashed, for a test that is skipped (aloud) where it cannot be built or run.
+#[must_use]
+pub fn coprocessor(test: &str, scratch: &str) -> Option<PathBuf> {
+    qemu::available(test)?;
+    firmware(test, scratch, "coprocessor")
 }
 
 /// Whether rustc has a standard library for the target.

@@ -3,14 +3,14 @@
 //! The harness listens on ports that the system picks, and QEMU connects to them before the
 //! machine starts: no port is guessed, and nothing that the board sends is lost. What is sent to
 //! a receiver that the image has not switched on yet would be lost, as on a desk; so
-//! [`Board::send`] first looks at its enable bits through QEMU's monitor. Every wait has a
+//! [`Board::send`] first looks at its enable bits through QEMU's test port. Every wait has a
 //! limit, and QEMU is killed when the [`Board`] goes. Bytes travel at the host's pace, not at a
 //! baud rate.
 
 use crate::require::{self, Need};
 use std::fmt::Display;
 use std::io::{Read, Write};
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -21,10 +21,16 @@ const PROGRAM: &str = "qemu-system-arm";
 /// How long QEMU may take to connect its lines, and the image to switch a receiver on.
 const START: Duration = Duration::from_secs(20);
 const POLL: Duration = Duration::from_millis(5);
+/// How long a client is given to speak first.
+const HELLO: Duration = Duration::from_secs(2);
 
 /// Control register 1 of USART 1 to 6 (RM0090, table 1 and 30.6.4), and its bits UE and RE.
 const CR1: [u32; 6] = [0x4001_100C, 0x4000_440C, 0x4000_480C, 0x4000_4C0C, 0x4000_500C, 0x4001_140C];
 const RECEIVER_ENABLED: u32 = 1 << 13 | 1 << 2;
+/// Status register, which lies before it; its bit TXE. The emulated one takes a word beyond ten
+/// bits as a mask, any other as a value with TXE set.
+const SR_BEFORE_CR1: u32 = 0x0C;
+const ALL_BUT_TXE: u32 = !(1 << 7);
 
 /// Whether QEMU is there, for a test that is skipped (aloud) without it.
 #[must_use]
@@ -50,6 +56,26 @@ impl Collected {
             .wait_timeout_while(bytes, limit, |bytes| !enough(bytes))
             .unwrap_or_else(PoisonError::into_inner);
         (bytes.clone(), !timeout.timed_out())
+    }
+}
+
+impl Collected {
+    /// Hands on what comes until the sink takes no more, or nothing has come for [`START`].
+    fn copy_to(&self, mut sink: impl Write) {
+        let mut copied = 0;
+        loop {
+            let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
+            let (bytes, timeout) = self
+                .more
+                .wait_timeout_while(bytes, START, |bytes| bytes.len() == copied)
+                .unwrap_or_else(PoisonError::into_inner);
+            let new = bytes[copied..].to_vec();
+            drop(bytes);
+            if timeout.timed_out() || sink.write_all(&new).is_err() {
+                return;
+            }
+            copied += new.len();
+        }
     }
 }
 
@@ -138,11 +164,18 @@ struct Line {
     received: Arc<Collected>,
 }
 
+/// Whole lines without their ends.
+fn split(bytes: &[u8], end: u8) -> Vec<Vec<u8>> {
+    let mut lines: Vec<Vec<u8>> = bytes.split(|byte| *byte == end).map(<[u8]>::to_vec).collect();
+    lines.pop();
+    lines
+}
+
 /// An emulated board that runs an image.
 #[derive(Debug)]
 pub struct Board {
     process: Process,
-    monitor: Line,
+    registers: Line,
     usarts: Vec<Line>,
 }
 
@@ -159,13 +192,13 @@ impl Board {
             let port = listener.local_addr().expect("it is bound").port();
             format!("tcp:127.0.0.1:{port},nodelay=on")
         };
-        let monitor = listen();
+        let registers = listen();
         let listeners: Vec<TcpListener> = (0..usarts).map(|_| listen()).collect();
         let mut command = Command::new(PROGRAM);
         command
             .args(["-machine", "netduinoplus2", "-nographic"])
             .args(["-semihosting-config", "enable=on,target=native"])
-            .args(["-monitor", &address(&monitor)])
+            .args(["-monitor", "none", "-qtest", &address(&registers), "-qtest-log", "/dev/null"])
             .args(arguments);
         for listener in &listeners {
             command.args(["-serial", &address(listener)]);
@@ -175,9 +208,9 @@ impl Board {
         }
         command.arg("-kernel").arg(image);
         let mut process = Process::start(command);
-        let monitor = process.accept(&monitor);
+        let registers = process.accept(&registers);
         let usarts = listeners.iter().map(|listener| process.accept(listener)).collect();
-        Self { process, monitor, usarts }
+        Self { process, registers, usarts }
     }
 
     /// Sends bytes into USART `n` (1 to 6) once its receiver is on, waiting while the board
@@ -210,29 +243,88 @@ impl Board {
             self.process
                 .fail(format!("USART{n} sent {} lines in {limit:?} instead of {count}", ends(&bytes)));
         }
-        let mut lines: Vec<Vec<u8>> = bytes.split(|byte| *byte == end).map(<[u8]>::to_vec).collect();
-        lines.pop();
-        lines
+        split(&bytes, end)
+    }
+
+    /// The same, once they are what is awaited.
+    ///
+    /// # Panics
+    /// When they are not within `limit`.
+    #[must_use]
+    pub fn lines_until(
+        &self,
+        n: usize,
+        end: u8,
+        limit: Duration,
+        enough: impl Fn(&[Vec<u8>]) -> bool,
+    ) -> Vec<Vec<u8>> {
+        let (bytes, is_enough) = self.usarts[n - 1].received.wait(limit, |bytes| enough(&split(bytes, end)));
+        if !is_enough {
+            self.process.fail(format!("USART{n} did not send in {limit:?} what is awaited"));
+        }
+        split(&bytes, end)
+    }
+
+    /// USART `n` takes no more bytes from the image (its transmit register stays full), or does
+    /// again.
+    ///
+    /// # Panics
+    /// When QEMU does not answer.
+    pub fn stall(&mut self, n: usize, stalled: bool) {
+        let value = if stalled { ALL_BUT_TXE } else { 0 };
+        self.ask(&format!("writel {:#x} {value:#x}", CR1[n - 1] - SR_BEFORE_CR1));
+    }
+
+    /// An address at which one TCP client can talk to USART `n`, and reads everything that it
+    /// has sent since the start. It comes once the client has said something, or said nothing for
+    /// a while: pyserial throws away what is there when it opens a line.
+    ///
+    /// # Panics
+    /// When the system gives no port.
+    #[must_use]
+    pub fn serve(&mut self, n: usize) -> SocketAddr {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port on the loopback");
+        let address = listener.local_addr().expect("it is bound");
+        let Line { stream, received } = &self.usarts[n - 1];
+        let (mut board, received) =
+            (stream.try_clone().expect("a socket can be cloned"), Arc::clone(received));
+        // Both threads end with the client or, at the latest, with the board's end of the line.
+        std::thread::spawn(move || {
+            let Ok((client, _)) = listener.accept() else { return };
+            let Ok(mut from_client) = client.try_clone() else { return };
+            let _ = client.set_read_timeout(Some(HELLO));
+            let _ = client.peek(&mut [0]);
+            let _ = client.set_read_timeout(None);
+            std::thread::spawn(move || std::io::copy(&mut from_client, &mut board));
+            received.copy_to(client);
+        });
+        address
     }
 
     /// A word of the board's memory or registers.
     ///
     /// # Panics
-    /// When QEMU's monitor does not answer.
+    /// When QEMU does not answer.
     pub fn word(&mut self, address: u32) -> u32 {
-        let Line { stream, received } = &mut self.monitor;
+        let answer = self.ask(&format!("readl {address:#x}"));
+        let word = answer.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
+        word.unwrap_or_else(|| self.process.fail(format!("the test port answers {answer:?}")))
+    }
+
+    /// What QEMU's test port answers to a command, behind its "OK".
+    fn ask(&mut self, command: &str) -> String {
+        let Line { stream, received } = &mut self.registers;
         let asked = received.wait(Duration::ZERO, |_| true).0.len();
-        if let Err(error) = stream.write_all(format!("xp /1xw {address:#x}\n").as_bytes()) {
-            self.process.fail(format!("the monitor does not listen: {error}"));
+        if let Err(error) = stream.write_all(format!("{command}\n").as_bytes()) {
+            self.process.fail(format!("the test port does not listen: {error}"));
         }
-        // "0000000040011c0c: 0x0000202c"; before it, the echo of what was typed.
         let answer = |bytes: &[u8]| {
             let text = String::from_utf8_lossy(bytes.get(asked..)?).into_owned();
-            let (_, rest) = text.split_once(&format!("{address:016x}: 0x"))?;
-            u32::from_str_radix(rest.get(..8)?, 16).ok()
+            Some(text.strip_prefix("OK")?.strip_suffix('\n')?.trim().to_owned())
         };
         let (bytes, _) = received.wait(START, |bytes| answer(bytes).is_some());
-        answer(&bytes).unwrap_or_else(|| self.process.fail("the monitor does not answer"))
+        answer(&bytes)
+            .unwrap_or_else(|| self.process.fail(format!("the test port does not answer {command}")))
     }
 
     /// Waits until QEMU ends by itself (semihosting) and returns its exit code.

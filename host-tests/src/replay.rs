@@ -9,7 +9,7 @@ use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sensor::xsens::{MtData2, Mti};
 
 /// What the image sends.
-pub const CONFIG: Config = Config::SLCAN_115200;
+pub const CONFIG: Config = Config::DEFAULT;
 
 /// The message that an MTi would send for a row.
 #[must_use]
@@ -22,6 +22,18 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
         temperature: None,
         status: Some(3),
     }
+}
+
+/// What it sends when the vehicle is level and turns at `yaw_rate`, rad/s, 10 ms after 10 ms.
+#[must_use]
+pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
+    let row = Row {
+        time: number as f64 * 0.01,
+        acceleration: [0.0, 0.0, 9.81],
+        rate_of_turn: [0.0, 0.0, yaw_rate],
+        reference: 0.0,
+    };
+    message(number, &row).emit().to_vec()
 }
 
 /// What the board must send for these bytes, line by line without the CR.

@@ -22,8 +22,7 @@ const LIMIT: Duration = Duration::from_secs(120);
 
 /// The image, where it can be built and run.
 fn coprocessor(test: &str) -> Option<PathBuf> {
-    qemu::available(test)?;
-    image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")
+    image::coprocessor(test, env!("CARGO_TARGET_TMPDIR"))
 }
 
 fn simulated_drive() -> PathBuf {

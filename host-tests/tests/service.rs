@@ -32,8 +32,8 @@ const IDENTITY: Identity = Identity {
 
 fn start(flash: &Rc<RefCell<F405>>) -> Board {
     let records = Region::new(flash, layout::STORE);
-    let mut board =
-        Device::start(Some(records), Some(MappedRegion::new(flash)), &[ImuPart::XsensMti], IDENTITY);
+    let mut board = Board::new(&[ImuPart::XsensMti]);
+    board.begin(Some(records), Some(MappedRegion::new(flash)), IDENTITY);
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &weights::DEFAULT.0);
     assert!(blob.is_some());
@@ -42,7 +42,8 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
 
 /// Without a flash controller, as in the emulator.
 fn bare() -> Board {
-    let mut board = Board::start(None, None, &[ImuPart::XsensMti], IDENTITY);
+    let mut board = Board::new(&[ImuPart::XsensMti]);
+    board.begin(None, None, IDENTITY);
     board.weights(None, &weights::DEFAULT.0);
     board
 }

@@ -19,23 +19,9 @@ fn intel(start: u8, len: u8) -> BitField {
     BitField::new(start, len, ByteOrder::Intel, false).expect("inside a frame")
 }
 
-/// The wheel speed frame of a common car: four big-endian values of 0.01 km/h from -67.67.
+/// The wheel speed frame of a common car.
 fn car() -> WheelFrame {
-    let signal = |wheel, start| {
-        Some(WheelSignal {
-            wheel,
-            field: BitField::new(start, 16, ByteOrder::Motorola, false).expect("inside a frame"),
-            factor_q16: WheelSignal::per_bit_kmh(0.01),
-            offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
-            invalid: Some(0xFFFF),
-        })
-    };
-    WheelFrame {
-        id: ID,
-        signals: [signal(1, 7), signal(0, 23), signal(3, 39), signal(2, 55)],
-        counter: None,
-        checksum: Checksum::None,
-    }
+    WheelSettings::TOYOTA.frames[0].expect("one frame")
 }
 
 /// Two wheels, little-endian, signed, a counter in byte 6, byte 7 left for a checksum.

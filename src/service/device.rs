@@ -60,23 +60,18 @@ pub struct Device<R: NorFlash, W> {
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Reads what is stored; what is not whole or not in its range is not used and noted.
+    /// With built-in values, before [`Device::begin`]. A constant: it can be made where it stays.
     #[must_use]
-    pub fn start(
-        records: Option<R>,
-        slots: Option<W>,
-        parts: &'static [ImuPart],
-        identity: Identity,
-    ) -> Self {
-        let mut device = Self {
+    pub const fn new(parts: &'static [ImuPart]) -> Self {
+        Self {
             store: None,
-            slots,
+            slots: None,
             parts,
-            identity,
+            identity: Identity::UNKNOWN,
             flash: FlashState::Absent,
             configuration: Configuration::DEFAULT,
             configuration_origin: Origin::BuiltIn,
-            calibration: Calibration::default(),
+            calibration: Calibration::NONE,
             calibration_origin: Origin::BuiltIn,
             calibrator: None,
             calibration_state: State::Idle,
@@ -89,20 +84,25 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             tick: 0,
             log: EventLog::new(),
             deframer: Deframer::new(),
-            lines: LineCounters::default(),
+            lines: LineCounters::NONE,
             restart: false,
-        };
-        device.note(EventKind::Started(identity.reset));
+        }
+    }
+
+    /// Reads what is stored; what is not whole or not in its range is not used and noted.
+    pub fn begin(&mut self, records: Option<R>, slots: Option<W>, identity: Identity) {
+        self.identity = identity;
+        self.slots = slots;
+        self.note(EventKind::Started(identity.reset));
         if let Some(crash) = identity.crash {
-            device.note(EventKind::Crashed(crash));
+            self.note(EventKind::Crashed(crash));
         }
         if let Some(records) = records {
             match Store::open(records, 0) {
-                Ok(store) => device.load(store),
-                Err(error) => device.flash = FlashState::Failed(error),
+                Ok(store) => self.load(store),
+                Err(error) => self.flash = FlashState::Failed(error),
             }
         }
-        device
     }
 
     fn load(&mut self, mut store: Store<R>) {

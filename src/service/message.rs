@@ -190,6 +190,12 @@ pub struct Identity {
     pub crash: Option<Crash>,
 }
 
+impl Identity {
+    /// Before anything is known.
+    pub const UNKNOWN: Self =
+        Self { firmware: [0; 3], device_id: None, clock_hz: 0, reset: ResetCause::Unknown, crash: None };
+}
+
 /// State of the flash.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum FlashState {
@@ -242,10 +248,13 @@ pub struct AllCounters {
 pub struct LineCounters {
     /// Samples or frames of the sensor that were refused.
     pub sensor_errors: u32,
-    /// Bytes of frames that the line did not take.
+    /// Frames that the SLCAN line did not take.
     pub unsent: u32,
     /// Service frames that were none.
     pub service_errors: u32,
-    /// Bytes of the service line that came too fast.
-    pub service_overruns: u32,
+}
+
+impl LineCounters {
+    /// Nothing yet.
+    pub const NONE: Self = Self { sensor_errors: 0, unsent: 0, service_errors: 0 };
 }

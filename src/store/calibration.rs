@@ -49,6 +49,9 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// Nothing is known.
+    pub const NONE: Self = Self { gyro_bias: None, temperature_table: Vec::new(), level: None };
+
     /// Takes over the bias of a static calibration, and into the table where the part gives its
     /// temperature: instead of a point that is nearer than 5 deg C, else as a new one. A full
     /// table gives up its nearest point.
@@ -64,7 +67,14 @@ impl Calibration {
         }
         // There is room: a full table has just lost a point.
         let _ = self.temperature_table.push(BiasPoint { temperature, gyro_bias });
-        self.temperature_table.sort_unstable_by_key(|point| point.temperature);
+        // All others are in order: one way through takes the new one to its place.
+        for k in (1..self.temperature_table.len()).rev() {
+            if let Some([low, high]) = self.temperature_table.get_mut(k - 1..=k)
+                && low.temperature > high.temperature
+            {
+                core::mem::swap(low, high);
+            }
+        }
     }
 
     /// The bias at a temperature, linear between the table's points and level beyond its ends;

@@ -79,11 +79,11 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// An Xsens MTi, level, on a car, with what its SLCAN line can take.
+    /// An Xsens MTi, level, on a car, with the Bosch set and our own messages.
     pub const DEFAULT: Self = Self {
         imu: ImuPart::XsensMti,
         fog: None,
-        can: Settings::SLCAN_115200,
+        can: Settings::DEFAULT,
         latitude_deg: None,
         mounting: Mounting { roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 0.0 },
         static_init: StaticConfig::DEFAULT,

@@ -82,8 +82,10 @@ impl Raw {
     }
 
     fn is_whole(&self) -> bool {
-        let checked = self.bytes().split_last_chunk::<WORD>();
-        checked.is_some_and(|(content, crc)| CRC.checksum(content).to_le_bytes() == *crc)
+        let bytes = self.bytes();
+        let content = bytes.get(..bytes.len().wrapping_sub(WORD));
+        let crc = content.map(|content| CRC.checksum(content).to_le_bytes());
+        crc.is_some_and(|crc| bytes.ends_with(&crc))
     }
 
     fn decode<R: Record>(&self) -> Result<R, StoreError> {

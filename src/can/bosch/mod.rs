@@ -177,10 +177,15 @@ impl YawRateSignal {
                 Ok(raw)
             }
             Err(_) => {
-                self.residual = 0;
+                self.reset();
                 Err(OutOfRange(if code < 0 { 0 } else { u16::MAX }))
             }
         }
+    }
+
+    /// Forgets what is owed: after a message that was marked bad.
+    pub fn reset(&mut self) {
+        self.residual = 0;
     }
 }
 

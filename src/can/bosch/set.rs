@@ -175,6 +175,10 @@ impl SetEncoder {
                 message.rate_status = SignalStatus(message.rate_status.0 | SignalStatus::FAILURE.0);
                 limit.0
             });
+            if message.rate_status != SignalStatus::OK {
+                // Nobody sums these up.
+                signal.reset();
+            }
         }
         messages
     }

@@ -2,6 +2,7 @@
 
 pub mod assembler;
 pub mod host;
+pub mod port;
 
 use crate::units::Micros;
 use embedded_can::{Frame, Id};

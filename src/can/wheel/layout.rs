@@ -2,10 +2,10 @@
 
 use crate::can::bosch;
 use crate::can::e2e::{Fault, Profile};
-use crate::can::signal::BitField;
+use crate::can::signal::{BitField, ByteOrder};
 use crate::sample::WHEELS;
 use crate::units::WheelSpeed;
-use embedded_can::Id;
+use embedded_can::{Id, StandardId};
 
 /// One wheel's speed in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,6 +78,28 @@ pub struct WheelFrame {
     pub counter: Option<BitField>,
     /// Its protection.
     pub checksum: Checksum,
+}
+
+impl WheelFrame {
+    pub(super) const TOYOTA: Self = Self {
+        id: Id::Standard(StandardId::new(0xAA).unwrap()),
+        signals: [toyota(1, 7), toyota(0, 23), toyota(3, 39), toyota(2, 55)],
+        counter: None,
+        checksum: Checksum::None,
+    };
+}
+
+const fn toyota(wheel: usize, start: u8) -> Option<WheelSignal> {
+    match BitField::new(start, 16, ByteOrder::Motorola, false) {
+        Ok(field) => Some(WheelSignal {
+            wheel,
+            field,
+            factor_q16: WheelSignal::per_bit_kmh(0.01),
+            offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
+            invalid: Some(0xFFFF),
+        }),
+        Err(_) => None,
+    }
 }
 
 /// Why a frame gives no wheel speeds.

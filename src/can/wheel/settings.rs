@@ -53,6 +53,16 @@ impl core::fmt::Display for WheelConfigError {
 impl core::error::Error for WheelConfigError {}
 
 impl WheelSettings {
+    /// Wheel speeds as many cars of one large maker send them: identifier 0xAA, four big-endian
+    /// values of 0.01 km/h from -67.67, front right, front left, rear right, rear left (opendbc,
+    /// `WHEEL_SPEEDS`). Still below 0.1 km/h for half a second, silent after 0.1 s.
+    pub const TOYOTA: Self = Self {
+        frames: [Some(WheelFrame::TOYOTA), None, None, None],
+        timeout_us: 100_000,
+        still_speed: WheelSpeed(1_820),
+        still_for_us: 500_000,
+    };
+
     /// The wheels that there are, each in one signal.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
         let mut expected = [false; WHEELS];
