@@ -6,6 +6,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
+pub const STANDARD_GRAVITY: f32 = 9.806_65;
+
 /// Why a reading cannot be taken over into fixed point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

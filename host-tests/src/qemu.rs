@@ -10,9 +10,10 @@
 use crate::require::{self, Need};
 use std::fmt::Display;
 use std::io::{Read, Write};
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -45,6 +46,7 @@ pub fn available(test: &str) -> Option<()> {
 struct Collected {
     bytes: Mutex<Vec<u8>>,
     more: Condvar,
+    ended: AtomicBool,
 }
 
 impl Collected {
@@ -60,18 +62,19 @@ impl Collected {
 }
 
 impl Collected {
-    /// Hands on what comes until the sink takes no more, or nothing has come for [`START`].
+    /// Hands on what comes until there is no more, or the sink takes no more.
     fn copy_to(&self, mut sink: impl Write) {
         let mut copied = 0;
         loop {
             let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
-            let (bytes, timeout) = self
+            let ended = || self.ended.load(Ordering::Acquire);
+            let (bytes, _) = self
                 .more
-                .wait_timeout_while(bytes, START, |bytes| bytes.len() == copied)
+                .wait_timeout_while(bytes, START, |bytes| bytes.len() == copied && !ended())
                 .unwrap_or_else(PoisonError::into_inner);
             let new = bytes[copied..].to_vec();
             drop(bytes);
-            if timeout.timed_out() || sink.write_all(&new).is_err() {
+            if (new.is_empty() && ended()) || sink.write_all(&new).is_err() {
                 return;
             }
             copied += new.len();
@@ -106,6 +109,8 @@ impl Process {
                 sink.bytes.lock().unwrap_or_else(PoisonError::into_inner).extend(&chunk[..len]);
                 sink.more.notify_all();
             }
+            sink.ended.store(true, Ordering::Release);
+            sink.more.notify_all();
         }));
         collected
     }
@@ -296,7 +301,8 @@ impl Board {
             let _ = client.peek(&mut [0]);
             let _ = client.set_read_timeout(None);
             std::thread::spawn(move || std::io::copy(&mut from_client, &mut board));
-            received.copy_to(client);
+            received.copy_to(&client);
+            let _ = client.shutdown(Shutdown::Both);
         });
         address
     }

@@ -112,6 +112,13 @@ fn e2e_identifiers_tell_the_messages_apart() {
 }
 
 #[test]
+fn the_drop_in_set_takes_57_percent_of_a_slow_line() {
+    let config = Config::new(Settings { yaw: None, ..Settings::DEFAULT }).expect("checked");
+    // 22 characters, three messages, 100 Hz: 66 kbit/s of 115.2.
+    assert_eq!(config.line_load_per_mille(115_200, false), 573);
+}
+
+#[test]
 fn what_comes_with_the_library_is_checked() {
     assert_eq!(Config::new(Settings::DEFAULT), Ok(Config::DEFAULT));
     assert_eq!(Config::new(Settings::SLCAN_115200), Ok(Config::SLCAN_115200));

@@ -109,8 +109,10 @@ fn samples_carry_angle_time_and_temperature() {
 #[test]
 fn resynchronises() {
     let (recorded, other) = (bytes(RECORDED), bytes(PLUS_10_DPS));
-    let stream = [&[0xFE, 0x81, 0xFE, 0x81, 0xFF], &other[16..], &recorded[..]].concat();
-    assert_eq!(feed_new(&stream).len(), 1);
+    let false_start = [0xFE, 0x81, 0xFE, 0x81, 0xFF];
+    for before in [&false_start[..], &other[16..], &[&false_start, &other[16..]].concat()] {
+        assert_eq!(feed_new(&[before, &recorded].concat()), feed_new(&recorded), "after {before:02x?}");
+    }
     // A header inside the payload: an acceleration whose bits are FE 81 FF 55.
     let hidden = Message { acceleration: [f32::from_bits(0xFE81_FF55), 0.0, 0.0], ..message(3, 1e-5) }.emit();
     assert_eq!(feed_new(&[&hidden[10..], &hidden[..], &recorded[..]].concat()).len(), 2);

@@ -1,7 +1,9 @@
 //! KVH DSP-3000: lines of text and binary words.
 
 use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, LineError, Reading};
-use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word, WordError};
+use gyronet::sensor::dsp3000::binary::{
+    ANGLE_LSB, Dsp3000Binary, INCREMENT_LSB, LOCK, RATE_LSB, Word, WordError,
+};
 use gyronet::sensor::dsp3000::{Command, Mode};
 use gyronet::units::Micros;
 use proptest::prelude::*;
@@ -19,6 +21,9 @@ fn words() {
         // 10 deg/s to half a bit.
         assert!((word.degrees().abs() - 10.0).abs() < 30e-6, "{}", word.degrees());
     }
+    // 60 and 6 millionths; 360 deg in 23 bits.
+    assert_eq!((RATE_LSB, INCREMENT_LSB), (60e-6, 6e-6));
+    assert!((ANGLE_LSB - 42.915_34e-6).abs() < 5e-12);
     let turn = Word { mode: Mode::Integrated, ..rate(1 << 23 | 1 << 22) };
     assert!((turn.degrees() - 540.0).abs() < 1e-9);
     let increment = Word { mode: Mode::Incremental, ..rate(-1_000_000) };

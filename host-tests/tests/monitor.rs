@@ -5,8 +5,11 @@ use gyronet::can::config::{Config, Settings};
 use gyronet::can::feeds::Feeds;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::units::{AngularRate, Micros, Yaw};
-use gyronet_host_tests::synthetic;
-use gyronet_tools::monitor::{Counts, Monitor, NoFrame, parse_line};
+use gyronet_host_tests::{image, qemu, replay, synthetic};
+use gyronet_tools::monitor::line::{NoFrame, Splitter, parse_line};
+use gyronet_tools::monitor::source::{Lines, Source, SourceError};
+use gyronet_tools::monitor::{Counts, Monitor};
+use std::time::{Duration, Instant};
 
 /// Frames of a car that turns at 50 deg/s, and how far it has turned, deg.
 fn drive(config: Config, samples: u32) -> (Vec<DataFrame>, f64) {
@@ -31,17 +34,17 @@ fn a_good_line() {
         let text = |line: &[u8]| String::from_utf8_lossy(line).into_owned();
         assert_eq!(parse_line(&text(&line)), Ok((None, *frame)));
         assert_eq!(parse_line(&text(&stamped)), Ok((Some(k as f64 / 1000.0), *frame)));
-        monitor.take(frame);
+        assert_eq!(monitor.take(frame, k as f64 / 600.0), k % 6 == 5, "a set is whole with its detail");
     }
-    // TX2 and TX3 are no yaw.
-    let counts = Counts { frames: 4000, foreign: 2000, ..Counts::default() };
-    assert_eq!(monitor.counts, counts);
-    assert!((monitor.state.yaw - turned).abs() < 1e-6, "{} {turned}", monitor.state.yaw);
+    assert_eq!(monitor.counts, Counts { frames: 6000, ..Counts::default() });
+    let yaw = monitor.state.yaw.expect("known");
+    assert!((yaw - turned).abs() < 1e-6, "{yaw} {turned}");
+    assert!((monitor.frames_per_second().expect("ten seconds") - 600.0).abs() < 1.0);
     assert!((monitor.state.rate.expect("known") - 50.0).abs() < 1e-5);
     assert!((monitor.state.drop_in.expect("known") - 50.0).abs() < 0.006);
     let row = monitor.row(9.99);
     assert_eq!(row.split(',').count(), Monitor::HEADING.split(',').count());
-    assert!(row.contains(",GyroNet,Good,0,0,,"), "{row}");
+    assert!(row.contains(",GyroNet,good,none,0.0000,,,"), "{row}");
     println!("{}\n{row}\n{monitor}", Monitor::HEADING);
 }
 
@@ -56,22 +59,37 @@ fn a_bad_line() {
             // Three angles are lost.
             (100..=102, 4) => {}
             (200, 3) => {
-                monitor.take(frame);
-                monitor.take(frame);
+                monitor.take(frame, 0.0);
+                monitor.take(frame, 0.0);
             }
             (300, 5) | (400, 0) => {
                 let mut data = [0; 8];
                 data.copy_from_slice(frame.data());
                 data[4] ^= 0x80;
-                monitor.take(&DataFrame::new(frame.id(), &data).expect("eight bytes"));
+                monitor.take(&DataFrame::new(frame.id(), &data).expect("eight bytes"), 0.0);
             }
-            _ => monitor.take(frame),
+            // So is a TX3.
+            (500, 2) => {}
+            _ => drop(monitor.take(frame, 0.0)),
         }
     }
+    let other = DataFrame::new(StandardId::new(0x123).expect("11 bits"), &[]).expect("no bytes");
+    monitor.take(&other, 0.0);
+    assert_eq!(monitor.take_line("t17480080004B0080", 0.0), None);
+    assert_eq!(monitor.take_line("V0101", 0.0), None);
     // A damaged message is missing too, when the next one comes.
-    let due = Counts { frames: 3998, foreign: 2000, lost: 5, repeated: 1, damaged: 2, out_of_sequence: 0 };
+    let due = Counts {
+        frames: 5997,
+        foreign: 1,
+        lost: 6,
+        repeated: 1,
+        damaged: 2,
+        out_of_sequence: 0,
+        unreadable: 1,
+    };
     assert_eq!(monitor.counts, due);
-    assert!((monitor.state.yaw - turned).abs() < 1e-6, "{} {turned}", monitor.state.yaw);
+    let yaw = monitor.state.yaw.expect("known");
+    assert!((yaw - turned).abs() < 1e-6, "{yaw} {turned}");
 }
 
 #[test]
@@ -95,4 +113,40 @@ fn logs() {
     ] {
         assert_eq!(parse_line(line), Err(NoFrame), "{line:?}");
     }
+}
+
+#[test]
+fn bytes_become_lines() {
+    let mut splitter = Splitter::default();
+    let bytes = [&b"V0101\r\r\x07t1230\r\n"[..], &[b'x'; 1_000_000], b"\rN\r", b"\xFF\r", b"no end"].concat();
+    let lines: Vec<String> = bytes.iter().filter_map(|byte| splitter.push(*byte)).collect();
+    let long = "x".repeat(128);
+    assert_eq!(lines, ["V0101", "t1230", &long, "N", "\u{FFFD}"]);
+}
+
+#[test]
+fn the_board_over_tcp() {
+    const NAME: &str = "the_board_over_tcp";
+    const LIMIT: Duration = Duration::from_secs(60);
+    const SAMPLES: usize = 500;
+    let Some(elf) = image::coprocessor(NAME, env!("CARGO_TARGET_TMPDIR")) else { return };
+    let mut board = qemu::Board::boot(&elf, 2, &[]);
+    let config = Config::DEFAULT;
+    let address = board.serve(2).to_string();
+    let mut source = Source::open(&address, 0, config.settings().bits_per_second).expect("it listens");
+    let bytes: Vec<u8> = (0..SAMPLES).flat_map(|number| replay::turning(number, 0.001)).collect();
+    board.send(1, &bytes, LIMIT);
+    let (mut monitor, mut sets, start) = (Monitor::new(&config), 0, Instant::now());
+    while sets < SAMPLES && start.elapsed() < LIMIT {
+        let Lines::Some(lines) = source.read().expect("the line holds") else { break };
+        let mut done = |line: &String| monitor.take_line(line, start.elapsed().as_secs_f64()).is_some();
+        sets += lines.into_iter().filter(|line| done(line)).count();
+    }
+    println!("{monitor}");
+    assert_eq!(monitor.counts, Counts { frames: 6 * SAMPLES as u64, ..Counts::default() });
+    // The board goes: that is an end, not a wait.
+    drop(board);
+    let end = std::iter::from_fn(|| (start.elapsed() < LIMIT).then(|| source.read()))
+        .find(|read| !matches!(read, Ok(Lines::Some(lines)) if lines.is_empty()));
+    assert!(matches!(end, Some(Ok(Lines::End) | Err(SourceError::Read { .. }))), "{end:?}");
 }

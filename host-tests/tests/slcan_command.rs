@@ -70,6 +70,16 @@ fn what_is_refused() {
 }
 
 #[test]
+fn bit_rates_have_their_digits() {
+    let rates = [10, 20, 50, 100, 125, 250, 500, 800, 1_000];
+    for (digit, kilobits) in rates.into_iter().enumerate() {
+        let line = format!("S{digit}\r");
+        assert_eq!(converse(&mut Session::new(kilobits * 1_000), line.as_bytes()).0, b"\r", "{kilobits}");
+        assert_eq!(converse(&mut Session::new(kilobits * 1_000 + 1), line.as_bytes()).0, b"\x07");
+    }
+}
+
+#[test]
 fn status_is_told() {
     let flags =
         StatusFlags(StatusFlags::BUS_ERROR.0 | StatusFlags::TRANSMIT_FULL.0 | StatusFlags::ERROR_PASSIVE.0);

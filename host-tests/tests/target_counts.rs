@@ -1,4 +1,4 @@
-//! What the kernels cost on the target, counted in the emulator, against the bars that the
+//! What the kernels and the parsers cost on the target, counted in the emulator, against the bars that the
 //! project has set itself; and that they are right there. Instructions are exact where a C
 //! compiler is found (QEMU plugin), else good to six; modelled cycles need the compiler.
 
@@ -6,7 +6,22 @@ use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::window::{Features, WINDOW};
 use gyronet_host_tests::{image, qemu};
 use gyronet_tools::image_size::ImageSize;
-use gyronet_tools::target_bench;
+use gyronet_tools::parser_load::{FRAMES, ParserLoad};
+use gyronet_tools::target_bench::{self, Counts};
+
+/// Largest part of the processor's time that a part's frames may take.
+const SHARES: [(&str, f64); 3] =
+    [("sensor/dsp1760_frame", 0.02), ("sensor/dsp1760_timed_frame", 0.02), ("sensor/mtdata2_frame", 0.002)];
+
+/// The largest frame of each parser, and what it may hold beside it: clock, counters, settings.
+const PARSERS: [(&str, u64, u64); 6] = [
+    ("sensor/dsp1760_parser", 40, 100),
+    ("sensor/mtdata2_parser", 259, 61),
+    ("sensor/dsp3000_line_parser", 32, 16),
+    ("sensor/dsp3000_word_parser", 4, 16),
+    ("sensor/icm42688_packet_parser", 20, 40),
+    ("sensor/adis16465_burst_parser", 20, 0),
+];
 
 struct Bar {
     name: &'static str,
@@ -43,6 +58,22 @@ fn counts_and_sizes() {
     assert!(size("fognet/state") <= 36_000);
     let stack = counts.get("gyronet/window").expect("measured").stack;
     assert!(stack <= 1_024, "{stack} bytes of stack for a window");
+    parsers(&counts);
+}
+
+fn parsers(counts: &Counts) {
+    let loads = ParserLoad::all(counts);
+    assert_eq!(loads.len(), FRAMES.len(), "{loads:?}");
+    for (name, limit) in SHARES {
+        let load = loads.iter().find(|load| load.name == name).expect(name);
+        println!("{load}");
+        assert!(load.share().is_none_or(|share| share <= limit), "{load}");
+    }
+    for (name, frame, beside) in PARSERS {
+        let (_, bytes) = counts.sizes.iter().find(|(n, _)| n == name).expect(name);
+        println!("{name}: {bytes} bytes");
+        assert!(*bytes <= frame + beside, "{name}: {bytes} bytes");
+    }
 }
 
 #[test]

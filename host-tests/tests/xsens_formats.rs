@@ -82,6 +82,17 @@ proptest! {
         prop_assert_eq!(Precision::Single.parse(&Precision::Single.emit(single)), Some(single));
     }
 
+    /// What the board reads without f64 is the exact number, rounded once.
+    #[test]
+    fn f32_is_rounded_once(code in any::<i64>()) {
+        let bytes = code.to_be_bytes();
+        for precision in ALL {
+            let bytes = &bytes[..precision.bytes()];
+            let exact = precision.parse(bytes).map(|value| (value as f32).to_bits());
+            prop_assert_eq!(precision.parse_f32(bytes).map(f32::to_bits), exact, "{:?}", precision);
+        }
+    }
+
     /// The sum finds every single flipped bit.
     #[test]
     fn damage_is_refused(

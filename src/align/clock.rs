@@ -77,6 +77,20 @@ pub struct ClockCounters {
     pub jumps: u32,
 }
 
+impl ClockCounters {
+    /// What has happened since `before`.
+    #[must_use]
+    pub const fn since(&self, before: &Self) -> Self {
+        Self {
+            samples: self.samples.wrapping_sub(before.samples),
+            late: self.late.wrapping_sub(before.late),
+            duplicates: self.duplicates.wrapping_sub(before.duplicates),
+            out_of_order: self.out_of_order.wrapping_sub(before.out_of_order),
+            jumps: self.jumps.wrapping_sub(before.jumps),
+        }
+    }
+}
+
 /// A sample's time by the board's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

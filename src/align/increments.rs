@@ -4,15 +4,16 @@
 //! - An increment belongs to the time since the one before it. One that straddles a grid step
 //!   is split there in proportion; what the first part rounds away the second one gets, so the
 //!   sum over all steps is the sum of all increments, to the last bit.
-//! - After lost messages an increment belongs to its own span only. What was turned meanwhile
+//! - After lost messages, or where the one before ended more than one and a half spans ago, an
+//!   increment belongs to its own span only. What was turned meanwhile
 //!   is not known and not guessed: the step says how much of its time is covered.
 //! - What comes after its step has gone out is not used, and counted.
 //! - An axis that was not good in any part of the step has no sum in it.
 //! - A span longer than a grid step is refused: set the part to 100 Hz or more.
 
 use crate::health::count;
-use crate::sample::{FogSample, PERIOD_US};
-use crate::units::{Angle, Micros};
+use crate::sample::{FogSample, PERIOD_US, RATE_HZ};
+use crate::units::{Angle, AngularRate, Micros};
 use heapless::Deque;
 
 /// Increments kept: what a 1 kHz part sends in the 20 ms that a step can be waited for, and
@@ -30,6 +31,21 @@ pub struct Turn {
     pub covered: u32,
 }
 
+impl Turn {
+    /// The mean rate about an axis over the step, rounded to nearest; `None` where the axis was
+    /// not good throughout, or a part of the step is not covered: nothing is guessed.
+    #[must_use]
+    pub fn rate(&self, axis: usize) -> Option<AngularRate> {
+        let Angle(angle) = self.angle.get(axis).copied().flatten()?;
+        if u64::from(self.covered) != PERIOD_US {
+            return None;
+        }
+        const SHIFT: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
+        let per_second = angle.checked_mul(i64::from(RATE_HZ))?.checked_add(1 << (SHIFT - 1))? >> SHIFT;
+        i32::try_from(per_second).ok().map(AngularRate)
+    }
+}
+
 /// How often each kind of event happened. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -42,6 +58,19 @@ pub struct IncrementCounters {
     pub too_long: u32,
     /// Increments that had to go before a step asked for them.
     pub dropped: u32,
+}
+
+impl IncrementCounters {
+    /// What has happened since `before`.
+    #[must_use]
+    pub const fn since(&self, before: &Self) -> Self {
+        Self {
+            gaps: self.gaps.wrapping_sub(before.gaps),
+            late: self.late.wrapping_sub(before.late),
+            too_long: self.too_long.wrapping_sub(before.too_long),
+            dropped: self.dropped.wrapping_sub(before.dropped),
+        }
+    }
 }
 
 /// An increment and the time that it belongs to.
@@ -66,8 +95,9 @@ impl Increments {
         let (end, span) = (time.0, u64::from(sample.span));
         let own = end.saturating_sub(span);
         let begin = match self.last_end {
-            // Jitter moves the ends about by less than the span itself.
-            Some(last) if sample.lost == 0 && end.saturating_sub(last) <= 2 * span => last,
+            // Jitter moves the ends about by less than half the span; a part without a sequence
+            // number tells one lost message by nothing but a distance of two spans.
+            Some(last) if sample.lost == 0 && 2 * end.saturating_sub(last) <= 3 * span => last,
             Some(last) => {
                 count(&mut self.counters.gaps, 1);
                 own.max(last)

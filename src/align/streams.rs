@@ -16,6 +16,18 @@ pub const MAX_DELAY_US: u64 = 10_000;
 /// After a silence of this length the grid starts anew, at the next step: one second.
 pub const MAX_SILENCE_US: u64 = 1_000_000;
 
+/// How often each kind of event happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Events {
+    /// To the inertial sensor's clock.
+    pub imu: ClockCounters,
+    /// To the fibre-optic gyro's clock.
+    pub fog: ClockCounters,
+    /// To its increments.
+    pub increments: IncrementCounters,
+}
+
 /// What is known of one grid step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -26,6 +38,8 @@ pub struct Step {
     pub imu: Option<(ImuSample, Quality)>,
     /// What the fibre-optic gyro has turned since the step before.
     pub fog: Turn,
+    /// What has happened since the step before; `samples` are those that have come.
+    pub events: Events,
 }
 
 /// Which streams there are.
@@ -50,6 +64,8 @@ pub struct Streams {
     /// The step that comes next; set by the first sample.
     next: Option<u64>,
     restarts: u32,
+    /// All events up to the last step.
+    told: Events,
 }
 
 impl Streams {
@@ -65,6 +81,7 @@ impl Streams {
             fog: Increments::default(),
             next: None,
             restarts: 0,
+            told: Events::default(),
         }
     }
 
@@ -122,7 +139,21 @@ impl Streams {
         }
         self.next = Some(next + PERIOD_US);
         let time = Micros(next);
-        Some(Step { time, imu: self.imu.at(time), fog: self.fog.take(time) })
+        let (imu, fog) = (self.imu.at(time), self.fog.take(time));
+        let all = self.events();
+        let events = Events {
+            imu: all.imu.since(&self.told.imu),
+            fog: all.fog.since(&self.told.fog),
+            increments: all.increments.since(&self.told.increments),
+        };
+        self.told = all;
+        Some(Step { time, imu, fog, events })
+    }
+
+    /// All events since the start.
+    #[must_use]
+    pub fn events(&self) -> Events {
+        Events { imu: *self.imu_clock(), fog: *self.fog_clock(), increments: *self.increments() }
     }
 
     /// Events of the inertial sensor's clock.

@@ -7,21 +7,13 @@
 
 use heapless::Vec;
 
-/// What the bytes received so far can be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Candidate {
-    /// No frame begins here.
-    No,
-    /// Perhaps a frame; more bytes must say.
-    Incomplete,
-    /// A frame of this many bytes, if its checksum fits.
-    Frame(usize),
-}
-
 /// What a framed protocol must say of itself.
 pub trait Protocol {
-    /// Looks at the first bytes of what might be a frame.
-    fn candidate(bytes: &[u8]) -> Candidate;
+    /// Bytes that tell whether a frame begins with them, and how long it is.
+    const HEADER: usize;
+    /// Length of the frame that begins with these [`Protocol::HEADER`] bytes, no less than they
+    /// are themselves; `None`: none does.
+    fn length(header: &[u8]) -> Option<usize>;
     /// Checks a whole frame's checksum.
     fn check(frame: &[u8]) -> bool;
 }
@@ -32,6 +24,9 @@ pub struct Framer<P, const N: usize> {
     buffer: Vec<u8, N>,
     /// Bytes of `buffer` that belonged to the frame handed out last.
     used: usize,
+    /// With fewer bytes than this there is nothing new to be seen in `buffer`: a header is
+    /// looked at once, not at every byte. 0 while a frame is out.
+    needed: usize,
     bad_checksums: u32,
     skipped: u32,
     protocol: core::marker::PhantomData<P>,
@@ -44,6 +39,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         Self {
             buffer: Vec::new(),
             used: 0,
+            needed: 0,
             bad_checksums: 0,
             skipped: 0,
             protocol: core::marker::PhantomData,
@@ -51,36 +47,30 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
     }
 
     /// Takes one byte. Call [`Framer::next_frame`] until `None` before the next one.
+    #[inline]
     pub fn push(&mut self, byte: u8) {
-        self.release();
+        if self.used > 0 {
+            self.release();
+        }
         if self.buffer.push(byte).is_err() {
             // Only when the caller left frames waiting: the oldest byte gives way, counted.
-            self.skip();
+            self.skip(1);
+            self.needed = 0;
             let _ = self.buffer.push(byte);
         }
     }
 
     /// The next intact frame, if one is complete.
     pub fn next_frame(&mut self) -> Option<&[u8]> {
-        self.release();
-        loop {
-            if self.buffer.is_empty() {
-                return None;
-            }
-            match P::candidate(&self.buffer) {
-                Candidate::Incomplete => return None,
-                Candidate::Frame(len) if len <= N => {
-                    let frame = self.buffer.get(..len)?;
-                    if P::check(frame) {
-                        self.used = len;
-                        return self.buffer.get(..len);
-                    }
-                    self.bad_checksums = self.bad_checksums.saturating_add(1);
-                    self.skip();
-                }
-                Candidate::No | Candidate::Frame(_) => self.skip(),
-            }
-        }
+        if self.is_waiting() { None } else { self.search() }
+    }
+
+    /// Whether [`Framer::next_frame`] has nothing to give before more bytes come: a caller that
+    /// asks this first spends a few instructions on most bytes.
+    #[inline]
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.buffer.len() < self.needed
     }
 
     /// Candidates whose checksum did not fit.
@@ -95,25 +85,52 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         self.skipped
     }
 
+    fn search(&mut self) -> Option<&[u8]> {
+        self.release();
+        let mut start = 0;
+        let found = loop {
+            let bytes = self.buffer.get(start..).unwrap_or_default();
+            let Some(header) = bytes.get(..P::HEADER) else {
+                self.needed = P::HEADER;
+                break None;
+            };
+            if let Some(length) = P::length(header).filter(|length| *length <= N) {
+                match bytes.get(..length) {
+                    None => {
+                        self.needed = length;
+                        break None;
+                    }
+                    Some(frame) if P::check(frame) => break Some(length),
+                    Some(_) => self.bad_checksums = self.bad_checksums.saturating_add(1),
+                }
+            }
+            start += 1;
+        };
+        self.skip(start);
+        self.used = found?;
+        self.needed = 0;
+        self.buffer.get(..self.used)
+    }
+
     /// Drops the frame that was handed out.
     fn release(&mut self) {
         self.drop_front(self.used);
         self.used = 0;
+        self.needed = 0;
     }
 
-    fn skip(&mut self) {
-        self.drop_front(1);
-        self.skipped = self.skipped.saturating_add(1);
+    fn skip(&mut self, count: usize) {
+        self.drop_front(count);
+        self.skipped = self.skipped.saturating_add(count as u32);
     }
 
     fn drop_front(&mut self, count: usize) {
-        if count == 0 {
-            // At nearly every byte: moving the buffer onto itself would cost its length.
-            return;
-        }
         let count = count.min(self.buffer.len());
         let left = self.buffer.len() - count;
-        self.buffer.copy_within(count.., 0);
+        // Nearly always all of it goes, or nothing.
+        if count > 0 && left > 0 {
+            self.buffer.copy_within(count.., 0);
+        }
         self.buffer.truncate(left);
     }
 }

@@ -12,6 +12,24 @@
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
 //! | ADI ADIS16465, 16470 | SPI | [`adis16465::Adis16465`] | [`ImuSample`], timed by data ready |
 //!
+//! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`,
+//! and brought to their configuration by [`serial::configure`]; SPI parts take an
+//! `embedded_hal::spi::SpiDevice`. Either way the firmware names one type, a [`Source`].
+//!
+//! # What a parser finds out about damage
+//!
+//! | frame | check | a flipped bit | what is not found |
+//! |---|---|---|---|
+//! | MTData2 | sum of bytes, 8 bits | refused | one of 256 other damages |
+//! | DSP-1760 | CRC of 32 bits | refused | one of 4 x 10^9 |
+//! | ADIS164xx burst | sum of bytes, 16 bits | refused | bytes that change places |
+//! | DSP-3000 word | one parity bit | refused | every second damage of more bits |
+//! | DSP-3000 line | none, but its form | a digit may become another one | that digit |
+//! | ICM-42688 packet | none, but its header | a reading may be another one | that reading |
+//!
+//! The last two have no check on the wire at all: keep their lines short, and let the pipeline's
+//! own limits judge the numbers.
+//!
 //! # Adding a part, in five steps
 //!
 //! 1. Write down its bytes: a file of its own with `parse` and `emit` over byte slices, and an
@@ -21,10 +39,12 @@
 //!    `embedded_hal::spi::SpiDevice` with bounded waits.
 //! 3. Turn a frame into a sample: units by the types of [`crate::units`], axes x forward, y
 //!    left, z up, time unwrapped, what the part marks as bad left out, never replaced.
-//! 4. Implement [`Source`] (and [`ByteSource`] for a stream) for it. A part without a clock of
-//!    its own takes the arrival time as an argument instead, as [`adis16465`] and [`dsp3000`] do.
+//! 4. Implement [`Source`] (and [`ByteSource`] for a stream) for it, and
+//!    [`serial::Dialogue`] where it must be told what to send. A part without a clock of its own
+//!    takes the arrival time as an argument instead, as [`adis16465`] and [`dsp3000`] do.
 //! 5. Test it with recorded or published frames both ways, every truncation and every flipped
-//!    bit, noise with frames strewn in, a mocked bus; and add a fuzz target.
+//!    bit, noise with frames strewn in, a mocked bus; add a fuzz target (`host-tests/fuzz`) and
+//!    a line in the bench image (`src/bin/support/parsers.rs`).
 
 pub mod adis16465;
 pub mod crc;
@@ -32,6 +52,7 @@ pub mod dsp1760;
 pub mod dsp3000;
 pub mod framer;
 pub mod icm42688;
+pub mod serial;
 pub mod xsens;
 
 use crate::sample::{FogSample, ImuSample};

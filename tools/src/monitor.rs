@@ -1,60 +1,24 @@
 //! What a receiver of our messages sees: rate, yaw, quality, and everything that was lost.
 //!
-//! [`parse_line`] takes SLCAN lines (with time stamps or without) and `candump -L` logs;
-//! [`Monitor`] checks the frames as an ECU would and keeps the accounts. Opening ports and
-//! drawing the screen is for whoever calls.
+//! [`mod@line`] reads text, [`source`] opens what it comes from; [`Monitor`] checks the frames as an
+//! ECU would and keeps the accounts.
 
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
-use gyronet::can::bosch::{self, TX1_ID};
+pub mod line;
+pub mod source;
+mod view;
+
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
 use gyronet::can::e2e::{Checker, Fault, Sequence, Verdict};
-use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, Quality, RateMessage, Source};
-use gyronet::can::{DataFrame, slcan};
-use std::fmt::{self, Write};
+use gyronet::can::j1939::{VDC2_PGN, Vdc2};
+use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, LATENCY_UNKNOWN, Quality, RateMessage};
+use gyronet::can::yaw::{SIGMA_UNKNOWN, Source};
 
 /// Loss of up to this many messages in a row is counted message by message.
 const MAX_DELTA: u8 = 10;
-
-/// A line that holds no frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("neither an SLCAN line nor a line of a candump log")]
-pub struct NoFrame;
-
-/// Reads one line. The time stamp is in seconds: a log's own, or SLCAN's, which wraps every
-/// minute.
-///
-/// # Errors
-/// [`NoFrame`], also for answers to commands and empty lines.
-pub fn parse_line(line: &str) -> Result<(Option<f64>, DataFrame), NoFrame> {
-    let line = line.trim();
-    if let Some(rest) = line.strip_prefix('(') {
-        return candump(rest).ok_or(NoFrame);
-    }
-    let line = line.as_bytes();
-    if let Ok(frame) = slcan::parse(line) {
-        return Ok((None, frame));
-    }
-    let (frame, ms) = slcan::parse_stamped(line).map_err(|_| NoFrame)?;
-    Ok((Some(f64::from(ms) / 1000.0), frame))
-}
-
-/// `seconds) interface ID#DATA`; eight digits of identifier are an extended one.
-fn candump(rest: &str) -> Option<(Option<f64>, DataFrame)> {
-    let (time, rest) = rest.split_once(')')?;
-    let (id, digits) = rest.split_whitespace().nth(1)?.split_once('#')?;
-    let raw = u32::from_str_radix(id, 16).ok()?;
-    let id = match id.len() {
-        3 => Id::Standard(StandardId::new(u16::try_from(raw).ok()?)?),
-        8 => Id::Extended(ExtendedId::new(raw)?),
-        _ => return None,
-    };
-    if digits.len() % 2 != 0 || !digits.is_ascii() {
-        return None;
-    }
-    let byte = |at: usize| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
-    let data: Vec<u8> = (0..digits.len()).step_by(2).map(byte).collect::<Option<_>>()?;
-    Some((Some(time.parse().ok()?), DataFrame::new(id, &data)?))
-}
+/// Frames are counted for so long, in seconds, to say how many come in one.
+const PACE_SECONDS: f64 = 1.0;
 
 /// What happened to the messages so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -71,6 +35,8 @@ pub struct Counts {
     pub out_of_sequence: u64,
     /// Messages whose checksum did not fit.
     pub damaged: u64,
+    /// Lines that should be frames and are not.
+    pub unreadable: u64,
 }
 
 /// The newest values.
@@ -81,15 +47,19 @@ pub struct State {
     /// Where it comes from, and what it is worth.
     pub judgement: Option<(Source, Quality)>,
     /// Yaw turned since the first angle message, deg, not wrapped.
-    pub yaw: f64,
+    pub yaw: Option<f64>,
     /// What is wrong at present.
     pub faults: Faults,
     /// What was taken off, deg/s.
-    pub correction: f64,
-    /// Code of the expected error.
+    pub correction: Option<f64>,
+    /// Expected error, 1 sigma, deg/s.
     pub sigma: Option<f64>,
+    /// From the sample to the message, ms.
+    pub latency: Option<f64>,
     /// Yaw rate of the drop-in message, deg/s, where its status is good.
     pub drop_in: Option<f64>,
+    /// Yaw rate of VDC2, deg/s, where it is one.
+    pub vdc2: Option<f64>,
 }
 
 /// Checks and reads our messages.
@@ -97,9 +67,12 @@ pub struct State {
 pub struct Monitor {
     /// Identifiers of rate, angle, detail, and their checks.
     yaw: Vec<(Id, Checker)>,
-    tx1: Sequence,
+    bosch: [Sequence; LAYOUTS.len()],
     last_yaw: Option<i32>,
     turned: i64,
+    /// Start of the second that is being counted, and frames in it.
+    pace: Option<(f64, u32)>,
+    frames_per_second: Option<f64>,
     /// Accounts.
     pub counts: Counts,
     /// Newest values.
@@ -117,32 +90,77 @@ impl Monitor {
         });
         Self {
             yaw: yaw.collect(),
-            tx1: Sequence::new(16, MAX_DELTA),
+            bosch: [Sequence::new(16, MAX_DELTA); LAYOUTS.len()],
             last_yaw: None,
             turned: 0,
+            pace: None,
+            frames_per_second: None,
             counts: Counts::default(),
             state: State::default(),
         }
     }
 
-    /// Takes a frame.
-    pub fn take(&mut self, frame: &impl Frame) {
-        let data = frame.data();
-        if frame.id() == Id::Standard(TX1_ID) {
-            return self.take_tx1(data);
-        }
-        let Some(index) = self.yaw.iter().position(|(id, _)| *id == frame.id()) else {
-            self.counts.foreign += 1;
-            return;
-        };
-        let verdict = self.yaw[index].1.check(data);
-        if self.account(verdict) {
-            match index {
-                0 => self.take_rate(data),
-                1 => self.take_angle(data),
-                _ => self.take_detail(data),
+    /// Takes a line; gives the time, in seconds, where it completed a set of our own messages: the
+    /// line's own where it has one, else `time`.
+    ///
+    /// Answers to commands are passed over; what begins as a frame and is none is counted.
+    pub fn take_line(&mut self, line: &str, time: f64) -> Option<f64> {
+        match line::parse_line(line) {
+            Ok((stamp, frame)) => {
+                let time = stamp.unwrap_or(time);
+                self.take(&frame, time).then_some(time)
+            }
+            Err(line::NoFrame) => {
+                self.counts.unreadable += u64::from(line.starts_with(['t', 'T', '(']));
+                None
             }
         }
+    }
+
+    /// Takes a frame; gives whether it completed a set of our own messages. `time` in seconds.
+    pub fn take(&mut self, frame: &impl Frame, time: f64) -> bool {
+        self.keep_pace(time);
+        let (id, data) = (frame.id(), frame.data());
+        if let Some(index) = LAYOUTS.iter().position(|layout| Id::Standard(layout.id) == id) {
+            self.take_bosch(index, data);
+        } else if let Some(index) = self.yaw.iter().position(|(own, _)| *own == id) {
+            let verdict = self.yaw[index].1.check(data);
+            if self.account(verdict) {
+                match index {
+                    0 => self.take_rate(data),
+                    1 => self.take_angle(data),
+                    _ => self.take_detail(data),
+                }
+                return index == 2;
+            }
+        } else if is_vdc2(id) {
+            self.counts.frames += 1;
+            self.state.vdc2 = Vdc2::parse(data).ok().and_then(|message| message.yaw_rate_rad_per_sec());
+            self.state.vdc2 = self.state.vdc2.map(f64::to_degrees);
+        } else {
+            self.counts.foreign += 1;
+        }
+        false
+    }
+
+    /// Frames in a second, ours and others', once a second is over.
+    #[must_use]
+    pub fn frames_per_second(&self) -> Option<f64> {
+        self.frames_per_second
+    }
+
+    fn keep_pace(&mut self, time: f64) {
+        let (start, frames) = self.pace.get_or_insert((time, 0));
+        let elapsed = time - *start;
+        if (0.0..PACE_SECONDS).contains(&elapsed) {
+            *frames += 1;
+            return;
+        }
+        // SLCAN's stamps begin anew every minute.
+        if elapsed >= PACE_SECONDS {
+            self.frames_per_second = Some(f64::from(*frames) / elapsed);
+        }
+        self.pace = Some((time, 1));
     }
 
     /// Counts a verdict; whether the message may be used.
@@ -158,14 +176,14 @@ impl Monitor {
         verdict.is_ok_and(Verdict::usable)
     }
 
-    fn take_tx1(&mut self, data: &[u8]) {
+    fn take_bosch(&mut self, index: usize, data: &[u8]) {
         let Ok(message) = bosch::Message::parse(data) else {
             self.counts.frames += 1;
             self.counts.damaged += 1;
             return;
         };
-        let verdict = self.tx1.process(message.counter);
-        if self.account(Ok(verdict)) {
+        let verdict = self.bosch[index].process(message.counter);
+        if self.account(Ok(verdict)) && index == 0 {
             let good = message.rate_status == bosch::SignalStatus::OK;
             self.state.drop_in = good.then(|| f64::from(message.rate) * 0.005 - 163.84);
         }
@@ -184,60 +202,20 @@ impl Monitor {
             if let Some(last) = self.last_yaw.replace(message.yaw) {
                 self.turned += i64::from(message.yaw.wrapping_sub(last));
             }
-            self.state.yaw = self.turned as f64 * (360.0 / 4_294_967_296.0);
+            self.state.yaw = Some(self.turned as f64 * (360.0 / 4_294_967_296.0));
             self.state.faults = message.faults;
         }
     }
 
     fn take_detail(&mut self, data: &[u8]) {
-        if let Ok(message) = DetailMessage::parse(data) {
-            self.state.correction = f64::from(message.correction) * 2e-4;
-            self.state.sigma = (message.sigma != u16::MAX).then(|| f64::from(message.sigma) * 1e-5);
+        if let Ok(DetailMessage { correction, sigma, latency }) = DetailMessage::parse(data) {
+            self.state.correction = Some(f64::from(correction) * 2e-4);
+            self.state.sigma = (sigma != SIGMA_UNKNOWN).then(|| f64::from(sigma) * 1e-5);
+            self.state.latency = (latency != LATENCY_UNKNOWN).then(|| f64::from(latency) * 0.1);
         }
-    }
-
-    /// Heading of the table that [`Monitor::row`] gives a line of.
-    pub const HEADING: &str =
-        "time,rate,yaw,source,quality,faults,correction,sigma,drop_in,lost,repeated,out_of_sequence,damaged";
-
-    /// The newest values as one line of a CSV file; empty where not known.
-    #[must_use]
-    pub fn row(&self, time: f64) -> String {
-        let known = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-        let (source, quality) = self.judgement();
-        let State { rate, yaw, faults: Faults(faults), correction, sigma, drop_in, .. } = self.state;
-        let Counts { lost, repeated, out_of_sequence, damaged, .. } = self.counts;
-        let (rate, sigma, drop_in) = (known(rate), known(sigma), known(drop_in));
-        format!(
-            "{time},{rate},{yaw},{source},{quality},{faults},{correction},{sigma},{drop_in},\
-             {lost},{repeated},{out_of_sequence},{damaged}"
-        )
-    }
-
-    fn judgement(&self) -> (String, String) {
-        let text = |(source, quality)| (format!("{source:?}"), format!("{quality:?}"));
-        self.state.judgement.map(text).unwrap_or_default()
     }
 }
 
-/// A few lines for a terminal.
-impl fmt::Display for Monitor {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut known = |name: &str, value: Option<f64>| match value {
-            Some(value) => writeln!(f, "{name:<15}{value:>14.6} deg/s"),
-            None => writeln!(f, "{name:<15}{:>14}", "-"),
-        };
-        known("rate", self.state.rate)?;
-        known("expected error", self.state.sigma)?;
-        known("correction", Some(self.state.correction))?;
-        known("drop-in rate", self.state.drop_in)?;
-        writeln!(f, "{:<15}{:>14.6} deg", "yaw", self.state.yaw)?;
-        let (source, quality) = self.judgement();
-        writeln!(f, "{:<15}{source:>14} {}", "source", quality.to_lowercase())?;
-        let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged } = self.counts;
-        writeln!(f, "{:<15}{frames:>14} and {foreign} of others", "messages")?;
-        write!(f, "{:<15}{lost:>14}, repeated {repeated}, ", "lost")?;
-        writeln!(f, "out of sequence {out_of_sequence}, damaged {damaged}")?;
-        f.write_char('\n')
-    }
+fn is_vdc2(id: Id) -> bool {
+    matches!(id, Id::Extended(id) if id.as_raw() >> 8 & 0x3_FFFF == VDC2_PGN)
 }

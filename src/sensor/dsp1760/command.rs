@@ -79,6 +79,7 @@ impl Command {
 }
 
 /// The lines that bring a part to a configuration, in order. Its messages stop meanwhile.
+/// [`super::dialogue`] sends them and asks whether they were heard.
 #[must_use]
 pub const fn setup(config: &Dsp1760Config) -> [Command; 5] {
     [

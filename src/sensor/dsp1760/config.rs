@@ -55,11 +55,6 @@ impl OutputRate {
     pub const fn hertz(self) -> u16 {
         self.0
     }
-
-    /// When message `n` is due, microseconds; 750 Hz has no whole period.
-    pub(super) const fn time(self, n: u64) -> u64 {
-        n * 1_000_000 / self.0 as u64
-    }
 }
 
 /// What the bytes do not say.

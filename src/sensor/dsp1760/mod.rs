@@ -7,8 +7,11 @@
 //! not seen in a number that wraps at 128; format B tells it, or the arrival times do
 //! ([`crate::align`]).
 
+mod clock;
 pub mod command;
 mod config;
+pub mod dialogue;
+mod format;
 mod framing;
 pub mod message;
 
@@ -19,7 +22,8 @@ use super::framer::Framer;
 use crate::health::count;
 use crate::sample::FogSample;
 use crate::units::{Angle, CentiCelsius, Micros};
-use framing::BIT_HEADER;
+use clock::{MessageClock, StampClock};
+use framing::is_self_test;
 use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity};
 
 /// Why an intact frame gives no sample.
@@ -76,10 +80,10 @@ pub struct Dsp1760 {
     config: Dsp1760Config,
     framer: Framer<Kvh, MAX_MESSAGE>,
     last_sequence: Option<u8>,
-    /// Messages since the start, lost ones included.
-    messages: u64,
-    /// Last time stamp of format B and the time it stands for.
-    stamp: Option<(u32, u64)>,
+    /// Counts all messages, lost ones included.
+    messages: MessageClock,
+    /// Of format B.
+    stamps: StampClock,
     settling: u8,
     counters: Dsp1760Counters,
 }
@@ -92,8 +96,8 @@ impl Dsp1760 {
             config,
             framer: Framer::new(),
             last_sequence: None,
-            messages: 0,
-            stamp: None,
+            messages: MessageClock::START,
+            stamps: StampClock::START,
             settling: 0,
             counters: Dsp1760Counters {
                 gaps: 0,
@@ -112,25 +116,33 @@ impl Dsp1760 {
         self.config.rate = rate;
         self.settling = SETTLING;
         self.last_sequence = None;
-        self.messages = 0;
-        self.stamp = None;
+        self.messages = MessageClock::START;
+        self.stamps = StampClock::START;
     }
 
     /// Takes one byte. Call [`Dsp1760::next_sample`] until `None` before the next one.
+    #[inline]
     pub fn push(&mut self, byte: u8) {
         self.framer.push(byte);
     }
 
     /// The next sample, or why an intact frame is none. Built-in-test messages and those that
     /// settle are passed over.
+    #[inline]
     pub fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
+        // Of 36 bytes one ends a message: the others are not to pay for a call.
+        if self.framer.is_waiting() { None } else { self.next_message() }
+    }
+
+    #[inline(never)]
+    fn next_message(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
         loop {
             let frame = self.framer.next_frame()?;
-            if frame.starts_with(&BIT_HEADER) {
+            if is_self_test(frame) {
                 count(&mut self.counters.self_tests, 1);
                 continue;
             }
-            let message = match Message::parse(frame) {
+            let message = match Message::parse_checked(frame) {
                 Ok(message) => message,
                 Err(error) => return Some(Err(Dsp1760Error::Message(error))),
             };
@@ -166,12 +178,11 @@ impl Dsp1760 {
         let lost = u32::from(steps) - 1;
         count(&mut self.counters.gaps, u32::from(lost > 0));
         count(&mut self.counters.lost, lost);
-        let begin = self.config.rate.time(self.messages + u64::from(lost));
-        self.messages += u64::from(steps);
-        let end = self.config.rate.time(self.messages);
+        let begin = self.messages.advance(self.config.rate, lost);
+        let end = self.messages.advance(self.config.rate, 1);
         let (time, temperature) = match message.extra {
             Extra::Temperature(temperature) => (end, Some(temperature)),
-            Extra::Timed { time, temperature } => (self.unwrap_stamp(time), Some(temperature)),
+            Extra::Timed { time, temperature } => (self.stamps.unwrap(time), Some(temperature)),
             Extra::Slow(_) => (end, None),
         };
         let span = (end - begin) as u32;
@@ -180,6 +191,7 @@ impl Dsp1760 {
         Ok(FogSample { time: Micros(time), span, lost, increment, temperature })
     }
 
+    #[inline]
     fn increments(&mut self, rotation: &[f32; 3], validity: Validity, span: u32) -> [Option<Angle>; 3] {
         let seconds = span as f32 * 1e-6;
         let per_unit = match self.config.angle {
@@ -207,16 +219,5 @@ impl Dsp1760 {
             TemperatureUnit::Hundredths => Some(CentiCelsius(code)),
             TemperatureUnit::Whole => code.checked_mul(100).map(CentiCelsius),
         }
-    }
-
-    /// Microseconds of 32 bits (71 minutes) to ones that never wrap. A stamp that goes back by
-    /// less than half the range is a step back, not a wrap.
-    fn unwrap_stamp(&mut self, stamp: u32) -> u64 {
-        let time = match self.stamp {
-            None => u64::from(stamp),
-            Some((last, base)) => base.saturating_add_signed(i64::from(stamp.wrapping_sub(last) as i32)),
-        };
-        self.stamp = Some((stamp, time));
-        time
     }
 }

@@ -5,82 +5,20 @@
 //! configuration is read back in turn, so that a part that has reset itself or lost a bit is
 //! noticed within [`SETTINGS`] reads, not never.
 
+mod config;
 pub mod packet;
 pub mod registers;
+mod sample;
+
+pub use config::{Icm42688Config, OutputRate, SETTINGS};
 
 use crate::sample::ImuSample;
-use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Operation, SpiDevice};
-use packet::{MAX_PACKET, Packet, PacketError, Resolution};
-use registers::{self as reg, Register, Setting, aaf_258_hz};
+use packet::{MAX_PACKET, Packet, PacketError};
+use registers::{self as reg, Register, Setting};
+use sample::Clock;
 
-/// Samples per second.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum OutputRate {
-    /// 100.
-    #[default]
-    Hz100,
-    /// 1000.
-    Hz1000,
-}
-
-impl OutputRate {
-    /// Low nibble of the two configuration registers.
-    const fn code(self) -> u8 {
-        match self {
-            Self::Hz1000 => 6,
-            Self::Hz100 => 8,
-        }
-    }
-}
-
-/// How the part is set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Icm42688Config {
-    /// Samples per second.
-    pub rate: OutputRate,
-    /// Of the FIFO's packets.
-    pub resolution: Resolution,
-}
-
-impl Icm42688Config {
-    /// What the registers must hold, in the order in which they are written: filters and ranges
-    /// before the sensors are switched on.
-    #[must_use]
-    pub const fn settings(&self) -> [Setting; SETTINGS] {
-        const fn set(register: Register, mask: u8, value: u8) -> Setting {
-            Setting { register, mask, value }
-        }
-        let [square_high, square_low] = aaf_258_hz::DELTSQR.to_be_bytes();
-        let shift = aaf_258_hz::BITSHIFT << 4 | square_high;
-        let content = match self.resolution {
-            Resolution::Bits16 => reg::FIFO_16_BIT,
-            Resolution::Bits20 => reg::FIFO_20_BIT,
-        };
-        [
-            set(reg::INTF_CONFIG0, 0x70, reg::BIG_ENDIAN),
-            set(reg::INTF_CONFIG1, 0xC0, reg::AFSR_OFF),
-            set(reg::GYRO_CONFIG0, 0xEF, reg::GYRO_250_DPS | self.rate.code()),
-            set(reg::ACCEL_CONFIG0, 0xEF, reg::ACCEL_16_G | self.rate.code()),
-            set(reg::GYRO_CONFIG_STATIC2, 0x03, 0),
-            set(reg::GYRO_CONFIG_STATIC3, 0x3F, aaf_258_hz::DELT),
-            set(reg::GYRO_CONFIG_STATIC4, 0xFF, square_low),
-            set(reg::GYRO_CONFIG_STATIC5, 0xFF, shift),
-            set(reg::ACCEL_CONFIG_STATIC2, 0x7F, aaf_258_hz::DELT << 1),
-            set(reg::ACCEL_CONFIG_STATIC3, 0xFF, square_low),
-            set(reg::ACCEL_CONFIG_STATIC4, 0xFF, shift),
-            set(reg::FIFO_CONFIG1, 0x17, content),
-            set(reg::FIFO_CONFIG, 0xC0, reg::FIFO_STREAM),
-            set(reg::PWR_MGMT0, 0x2F, reg::LOW_NOISE),
-        ]
-    }
-}
-
-/// Registers that are set, and checked in turn.
-pub const SETTINGS: usize = 14;
 /// Looks at the reset bit, 1 ms apart.
 const RESET_POLLS: u8 = 10;
 /// The gyro needs this long from switched on to good, ms.
@@ -202,7 +140,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         match Packet::parse(self.config.resolution, packet) {
             Ok(packet) => {
                 let time = self.clock.unwrap(packet.time);
-                sample(&packet, time).map(Some).ok_or(Icm42688Error::NoReading)
+                packet.sample(time).map(Some).ok_or(Icm42688Error::NoReading)
             }
             Err(PacketError::Empty) => Ok(None),
             Err(error) => {
@@ -264,65 +202,4 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Icm42688Error<SPI::Error>> {
         self.spi.transaction(operations).map_err(Icm42688Error::Bus)
     }
-}
-
-/// The part's 16-bit microseconds, unwrapped: right as long as two samples are less than
-/// 65 ms apart. A longer silence is told by the arrival times ([`crate::align`]).
-#[derive(Debug, Clone, Copy, Default)]
-struct Clock {
-    last: Option<(u16, u64)>,
-}
-
-impl Clock {
-    fn unwrap(&mut self, time: u16) -> Micros {
-        let now = self.last.map_or(u64::from(time), |(last, at)| at + u64::from(time.wrapping_sub(last)));
-        self.last = Some((time, now));
-        Micros(now)
-    }
-}
-
-/// m/s^2 in a g.
-const GRAVITY: f32 = 9.806_65;
-
-/// The packet's readings in the pipeline's units; `None` where an axis has no reading.
-fn sample(packet: &Packet, time: Micros) -> Option<ImuSample> {
-    let (per_dps, per_g) = match packet.resolution {
-        // At 250 deg/s eight times the 16.4 counts per deg/s that there are at 2000; 16 g.
-        Resolution::Bits16 => (131.0, 2048.0),
-        // Halved they are 131 counts per deg/s, quartered 8192 per g.
-        Resolution::Bits20 => (262.0, 32_768.0),
-    };
-    let rate =
-        |reading: Option<i32>| AngularRate::from_rad_per_sec((reading? as f32 / per_dps).to_radians()).ok();
-    let force =
-        |reading: Option<i32>| SpecificForce::from_metre_per_sec2(reading? as f32 / per_g * GRAVITY).ok();
-    let ([ax, ay, az], [gx, gy, gz]) = (packet.acceleration, packet.rate);
-    let (centi, offset) = match packet.resolution {
-        Resolution::Bits16 => (100.0 / 2.07, 2500.0),
-        Resolution::Bits20 => (100.0 / 132.48, 2500.0),
-    };
-    Some(ImuSample {
-        time,
-        specific_force: [force(ax)?, force(ay)?, force(az)?],
-        angular_rate: [rate(gx)?, rate(gy)?, rate(gz)?],
-        temperature: packet.temperature.map(|code| {
-            // At most 27,000.
-            CentiCelsius(libm::roundf(f32::from(code) * centi + offset) as i16)
-        }),
-        clipped: packet
-            .acceleration
-            .iter()
-            .chain(&packet.rate)
-            .flatten()
-            .any(|r| clipped(packet.resolution, *r)),
-    })
-}
-
-/// The ends of the range. The bits below 16 say nothing there.
-const fn clipped(resolution: Resolution, reading: i32) -> bool {
-    let high = match resolution {
-        Resolution::Bits16 => reading,
-        Resolution::Bits20 => reading >> 4,
-    };
-    high >= 32_767 || high <= -32_767
 }

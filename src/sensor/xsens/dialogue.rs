@@ -7,100 +7,25 @@
 //! - The part may set other outputs than asked for, and says so in its acknowledgement: an
 //!   acceleration or rate of turn at another rate ends the dialogue.
 //! - A part that wakes up (MID 3E) is answered within 500 ms if the caller polls that often; it
-//!   is in configuration mode then.
+//!   is in configuration mode then. One that starts again and again is given up, as a part that
+//!   does not answer is.
 //! - Measurements that still come in are passed over.
 //!
 //! No port, no clock: bytes and the time come in, frames to send come out.
 
+pub use super::setup::{OUTPUTS, Output, Step, mid};
+pub use crate::sensor::serial::Action;
+
 use super::mtdata2::id;
 use super::xbus::{self, MAX_FRAME, Xbus};
 use crate::sensor::framer::Framer;
+use crate::sensor::serial;
 use crate::units::Micros;
-use heapless::Vec;
-
-/// Message identifiers; an acknowledgement is one more.
-pub mod mid {
-    /// Asks for the device identifier.
-    pub const REQ_DID: u8 = 0x00;
-    /// Starts measuring.
-    pub const GO_TO_MEASUREMENT: u8 = 0x10;
-    /// Stops measuring.
-    pub const GO_TO_CONFIG: u8 = 0x30;
-    /// The part has started.
-    pub const WAKE_UP: u8 = 0x3E;
-    /// The answer to it.
-    pub const WAKE_UP_ACK: u8 = 0x3F;
-    /// The part refuses a message; one byte says why.
-    pub const ERROR: u8 = 0x42;
-    /// Which data at which rate.
-    pub const SET_OUTPUT_CONFIGURATION: u8 = 0xC0;
-}
 
 /// How long an answer may take.
 pub const TIMEOUT: Micros = Micros(500_000);
 /// How often a message is sent before the part is given up.
 pub const ATTEMPTS: u8 = 3;
-/// "With every message": the rate of counters and time stamps.
-const EVERY_MESSAGE: u16 = 0xFFFF;
-
-/// One output of the part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Output {
-    /// Data identifier.
-    pub id: u16,
-    /// Hz.
-    pub rate: u16,
-}
-
-/// What the pipeline wants, 100 Hz, all in single precision.
-pub const OUTPUTS: [Output; 6] = [
-    Output { id: id::PACKET_COUNTER, rate: EVERY_MESSAGE },
-    Output { id: id::SAMPLE_TIME_FINE, rate: EVERY_MESSAGE },
-    Output { id: id::ACCELERATION, rate: 100 },
-    Output { id: id::RATE_OF_TURN, rate: 100 },
-    Output { id: id::TEMPERATURE, rate: 1 },
-    Output { id: id::STATUS_WORD, rate: EVERY_MESSAGE },
-];
-
-/// Bytes of the longest frame that the dialogue sends.
-pub const MAX_SENT: usize = 32;
-
-/// A message of the dialogue.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Step {
-    /// Stop measuring.
-    GoToConfig,
-    /// Send [`OUTPUTS`].
-    SetOutputConfiguration,
-    /// Start measuring.
-    GoToMeasurement,
-}
-
-impl Step {
-    const fn mid(self) -> u8 {
-        match self {
-            Self::GoToConfig => mid::GO_TO_CONFIG,
-            Self::SetOutputConfiguration => mid::SET_OUTPUT_CONFIGURATION,
-            Self::GoToMeasurement => mid::GO_TO_MEASUREMENT,
-        }
-    }
-
-    /// The step's frame.
-    #[must_use]
-    pub fn emit(self) -> Vec<u8, MAX_SENT> {
-        let mut data = Vec::<u8, 24>::new();
-        if self == Self::SetOutputConfiguration {
-            for output in OUTPUTS {
-                let _ = data.extend_from_slice(&output.id.to_be_bytes());
-                let _ = data.extend_from_slice(&output.rate.to_be_bytes());
-            }
-        }
-        xbus::emit(self.mid(), &data).unwrap_or_default()
-    }
-}
-
 /// Why the dialogue has ended without a part that measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -118,6 +43,8 @@ pub enum DialogueError {
         /// The part's error code.
         code: u8,
     },
+    /// The part has woken up more than [`ATTEMPTS`] times: its supply fails, or it resets itself.
+    Restarts,
     /// The part has set another rate than asked for, or left the output out (rate 0).
     Output {
         /// Data identifier.
@@ -132,23 +59,13 @@ impl core::fmt::Display for DialogueError {
         match self {
             Self::Silent { step } => write!(f, "MTi: no answer to {step:?} after {ATTEMPTS} attempts"),
             Self::Refused { step, code } => write!(f, "MTi: {step:?} is refused with error {code}"),
+            Self::Restarts => write!(f, "MTi: started anew more than {ATTEMPTS} times"),
             Self::Output { id, rate } => write!(f, "MTi: output {id:04x} is set to {rate} Hz"),
         }
     }
 }
 
 impl core::error::Error for DialogueError {}
-
-/// What is to be done now.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Action {
-    /// Send these bytes.
-    Send(Vec<u8, MAX_SENT>),
-    /// Nothing; poll again when bytes have come or time has passed.
-    Wait,
-    /// The part measures.
-    Done,
-}
 
 /// Where the dialogue stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -171,6 +88,8 @@ pub struct Dialogue {
     last_error: Option<u8>,
     /// The part has woken up and waits for the answer.
     woken: bool,
+    /// Times that it has woken up.
+    starts: u8,
 }
 
 impl Default for Dialogue {
@@ -184,7 +103,7 @@ impl Dialogue {
     #[must_use]
     pub const fn new() -> Self {
         let state = State::Due(Step::GoToConfig);
-        Self { framer: Framer::new(), state, attempts: 0, last_error: None, woken: false }
+        Self { framer: Framer::new(), state, attempts: 0, last_error: None, woken: false, starts: 0 }
     }
 
     /// Takes one byte from the part.
@@ -231,8 +150,13 @@ impl Dialogue {
 
     fn answer(&mut self, mid: u8, reply: Reply) {
         if mid == mid::WAKE_UP && !matches!(self.state, State::Done | State::Failed(_)) {
-            self.woken = true;
-            self.proceed(Step::SetOutputConfiguration);
+            self.starts += 1;
+            if self.starts > ATTEMPTS {
+                self.state = State::Failed(DialogueError::Restarts);
+            } else {
+                self.woken = true;
+                self.proceed(Step::SetOutputConfiguration);
+            }
             return;
         }
         let State::Sent(step, _) = self.state else { return };
@@ -254,6 +178,18 @@ impl Dialogue {
     fn proceed(&mut self, step: Step) {
         self.state = State::Due(step);
         self.attempts = 0;
+    }
+}
+
+impl serial::Dialogue for Dialogue {
+    type Error = DialogueError;
+
+    fn push(&mut self, byte: u8) {
+        self.push(byte);
+    }
+
+    fn poll(&mut self, now: Micros) -> Result<Action, DialogueError> {
+        self.poll(now)
     }
 }
 

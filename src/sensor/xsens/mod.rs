@@ -6,6 +6,7 @@
 pub mod dialogue;
 pub mod mtdata2;
 pub mod precision;
+mod setup;
 pub mod xbus;
 
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
@@ -35,12 +36,20 @@ impl Mti {
     }
 
     /// Takes one byte. Call [`Mti::next_sample`] until `None` before the next one.
+    #[inline]
     pub fn push(&mut self, byte: u8) {
         self.framer.push(byte);
     }
 
     /// The next sample, or why an intact data message is none. Other messages are passed over.
+    #[inline]
     pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
+        // Of 54 bytes one ends a message: the others are not to pay for a call.
+        if self.framer.is_waiting() { None } else { self.next_message() }
+    }
+
+    #[inline(never)]
+    fn next_message(&mut self) -> Option<Result<ImuSample, XsensError>> {
         loop {
             let frame = self.framer.next_frame()?;
             if frame.get(2) == Some(&MID_MT_DATA2) {

@@ -111,8 +111,7 @@ impl MtData2 {
                 id::SAMPLE_TIME_FINE => message.sample_time_fine = Some(word(packet).ok_or(format)?),
                 id::STATUS_WORD => message.status = Some(word(packet).ok_or(format)?),
                 id::TEMPERATURE => {
-                    let value = Precision::of(full_id).parse(packet).ok_or(format)?;
-                    message.temperature = Some(value as f32);
+                    message.temperature = Some(Precision::of(full_id).parse_f32(packet).ok_or(format)?);
                 }
                 id::ACCELERATION => message.acceleration = Some(vector(full_id, packet).ok_or(format)?),
                 id::RATE_OF_TURN => message.rate_of_turn = Some(vector(full_id, packet).ok_or(format)?),
@@ -180,7 +179,7 @@ fn word(packet: &[u8]) -> Option<u32> {
 fn vector(id: u16, packet: &[u8]) -> Option<[f32; 3]> {
     let precision = Precision::of(id);
     let mut numbers = packet.chunks_exact(precision.bytes());
-    let mut next = || numbers.next().and_then(|bytes| precision.parse(bytes)).map(|value| value as f32);
+    let mut next = || numbers.next().and_then(|bytes| precision.parse_f32(bytes));
     let values = [next()?, next()?, next()?];
     (packet.len() == 3 * precision.bytes()).then_some(values)
 }

@@ -68,6 +68,20 @@ impl Precision {
         }
     }
 
+    /// The same, rounded once to f32: without f64 where the form needs none, for a target that
+    /// computes f64 in software.
+    #[must_use]
+    pub fn parse_f32(self, bytes: &[u8]) -> Option<f32> {
+        match (self, bytes) {
+            (Self::Single, &[a, b, c, d]) => Some(f32::from_be_bytes([a, b, c, d])),
+            // Conversion rounds; the division by a power of two does not.
+            (Self::Fixed1220, &[a, b, c, d]) => {
+                Some(i32::from_be_bytes([a, b, c, d]) as f32 / (1 << 20) as f32)
+            }
+            _ => self.parse(bytes).map(|value| value as f32),
+        }
+    }
+
     /// The nearest number's bytes; the fixed-point forms clamp to their ends.
     #[must_use]
     pub fn emit(self, value: f64) -> Vec<u8, 8> {

@@ -1,6 +1,6 @@
 //! Xbus frames: `FA FF MID LEN DATA.. CS`, all of it after FA adding up to 0 modulo 256.
 
-use crate::sensor::framer::{Candidate, Protocol};
+use crate::sensor::framer::Protocol;
 use heapless::Vec;
 
 const PREAMBLE: u8 = 0xFA;
@@ -17,15 +17,12 @@ pub const MAX_FRAME: usize = 254 + OVERHEAD;
 pub struct Xbus;
 
 impl Protocol for Xbus {
-    fn candidate(bytes: &[u8]) -> Candidate {
-        match *bytes {
-            [PREAMBLE] | [PREAMBLE, BUS_ID] | [PREAMBLE, BUS_ID, _] => Candidate::Incomplete,
-            [PREAMBLE, BUS_ID, _, EXTENDED_LENGTH, ..] => Candidate::No,
-            [PREAMBLE, BUS_ID, _, len, ..] => {
-                let len = usize::from(len) + OVERHEAD;
-                if bytes.len() < len { Candidate::Incomplete } else { Candidate::Frame(len) }
-            }
-            _ => Candidate::No,
+    const HEADER: usize = 4;
+
+    fn length(header: &[u8]) -> Option<usize> {
+        match *header {
+            [PREAMBLE, BUS_ID, _, len] if len != EXTENDED_LENGTH => Some(usize::from(len) + OVERHEAD),
+            _ => None,
         }
     }
 

@@ -1,13 +1,16 @@
-//! `gyronet bench-target`: instructions and modelled cycles of every kernel and network.
+//! `gyronet bench-target`: instructions and modelled cycles of every kernel, network and parser.
 
 use super::Common;
 use gyronet_tools::image_size::ImageSize;
+use gyronet_tools::parser_load::ParserLoad;
 use gyronet_tools::target_bench::{self, Count, Counts};
 
-/// Counts instructions and modelled Cortex-M4 cycles of every kernel and network, in QEMU.
+/// Counts instructions and modelled Cortex-M4 cycles of every kernel, network and sensor parser,
+/// in QEMU.
 ///
 /// Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
-/// `name instructions=N cycles=N stack=BYTES`. Cycles are modelled (zero wait states), not
+/// `name instructions=N cycles=N stack=BYTES`, then sizes, then what the parsers cost for a byte
+/// and of the processor's time. Cycles are modelled (zero wait states), not
 /// measured on silicon. Exit status 1 when the count of a window depends on its input.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -58,6 +61,9 @@ fn print(counts: &Counts, coprocessor: &ImageSize) {
     println!("coprocessor/flash bytes={flash}");
     println!("coprocessor/static_ram bytes={static_ram}");
     println!("kernels/code bytes={kernels}");
+    for load in ParserLoad::all(counts) {
+        println!("{load}");
+    }
     for (name, instructions, cycles) in CMSIS_NN_S8 {
         if let Some(count) = counts.get(name) {
             let fewer = |peer: u64, ours: u64| peer as f64 / ours.max(1) as f64;
@@ -91,6 +97,7 @@ fn json(counts: &Counts, coprocessor: &ImageSize) -> serde_json::Value {
     serde_json::json!({
         "regions": regions,
         "sizes": sizes,
+        "parsers": ParserLoad::all(counts),
         "flash": coprocessor.flash,
         "static_ram": coprocessor.static_ram,
         "kernels": coprocessor.kernels,

@@ -1,9 +1,11 @@
 //! What the binary can do: one file for each subcommand, arguments in, text and files out.
 
 pub mod bench_target;
+pub mod bus;
 pub mod demo;
 pub mod device;
 pub mod evaluate;
+pub mod monitor;
 mod networks;
 mod progress;
 pub mod quantize;

@@ -7,6 +7,8 @@ use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::recording::Recording;
+use gyronet_tools::via::compare::{Bound, Difference, STAND_INS};
+use gyronet_tools::via::{Part, Via};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -16,6 +18,11 @@ use std::path::{Path, PathBuf};
 ///
 /// The log goes to stdout unless --out names a file; the summary goes to stderr. can-utils'
 /// canplayer and python-can can play the log.
+///
+/// With --via the samples go through the bytes of a part first: encoded as it would send them,
+/// read back by the parser that the board runs. The summary then says how far the corrected yaw
+/// is from that of the direct replay, next to the bound that follows from the part's rounding;
+/// exit status 1 beyond it.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {
     /// Recording.
@@ -27,6 +34,9 @@ pub struct Args {
     /// Weight file, instead of the one that comes with the library.
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
+    /// Send the recording through the bytes of this part.
+    #[arg(long, value_name = "PART")]
+    via: Option<Part>,
 }
 
 /// Runs the subcommand.
@@ -34,10 +44,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = Weights::open(args.weights.as_deref())?;
     let mut network = GyroNet::new(weights.blob()?);
     let recording = Recording::read(&args.file)?;
-    let bar = progress::bar(common, recording.rows.len(), recording.name());
-    let drive = Drive::run(&recording, &mut network, || bar.inc(1));
+    let replays = if args.via.is_some() { 2 + STAND_INS as usize } else { 1 };
+    let bar = progress::bar(common, replays * recording.rows.len(), recording.name());
+    let replayed = replay(&recording, args.via, &mut network, || bar.inc(1));
     bar.finish_and_clear();
-    let drive = drive?;
+    let (drive, detour) = replayed?;
     let mut feeds = Feeds::new(Config::DEFAULT);
     let frames = match &args.out {
         Some(path) => write_file(&drive, &mut feeds, path)?,
@@ -48,7 +59,68 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let statuses = drive.status_counts().map(|(status, count)| format!("{status:?} {count}").to_lowercase());
     writeln!(err, "status: {}", statuses.join(", "))?;
     writeln!(err, "events: {}", events(&drive, &feeds))?;
+    if let Some(detour) = detour {
+        write!(err, "{detour}")?;
+        if !detour.bound.holds(&detour.difference) {
+            return Err(
+                format!("the {} changes the yaw by more than its rounding explains", detour.part).into()
+            );
+        }
+    }
     Ok(())
+}
+
+/// The drive, through a part's bytes where one is named, and what they did to it.
+fn replay(
+    recording: &Recording,
+    part: Option<Part>,
+    network: &mut GyroNet<'_>,
+    mut tick: impl FnMut(),
+) -> Result<(Drive, Option<Detour>), Box<dyn std::error::Error>> {
+    let direct = Drive::run(recording, network, &mut tick)?;
+    let Some(part) = part else { return Ok((direct, None)) };
+    let via = part.send(recording)?;
+    let drive = Drive::run(&via.recording, network, &mut tick)?;
+    let bound = Bound::new(via.quantisation, recording, &direct, network, &mut tick)?;
+    let difference = Difference::of_rates(&direct, &drive);
+    Ok((drive, Some(Detour { part, via, difference, bound })))
+}
+
+/// A recording's way through a part, and what came of it.
+struct Detour {
+    part: Part,
+    via: Via,
+    difference: Difference,
+    bound: Bound,
+}
+
+impl std::fmt::Display for Detour {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { part, via, difference, bound } = self;
+        let rows = via.recording.rows.len();
+        writeln!(f, "via {part}: {rows} samples in {} bytes", via.bytes)?;
+        let step = |value: f64, unit: &str| {
+            if value > 0.0 { format!("{value:.3e} {unit}") } else { "none".to_owned() }
+        };
+        let (rate, force) = (via.quantisation.rate, via.quantisation.force);
+        writeln!(f, "rounding: rate {}, acceleration {}", step(rate, "rad/s"), step(force, "m/s^2"))?;
+        writeln!(
+            f,
+            "yaw against the direct replay: at most {:.3e} rad, at the end {:.3e} rad; bound {:.3e} rad = \
+             rounding {:.1e} + static bias {:.1e} + network {:.1e}",
+            difference.yaw_largest,
+            difference.yaw_final,
+            bound.yaw(),
+            bound.rounding,
+            bound.bias,
+            bound.network,
+        )?;
+        writeln!(
+            f,
+            "yaw rate: rms {:.3e} rad/s; bound {:.3e} rad/s; {} rows compared, {} not in both",
+            difference.rate_rms, bound.rate_rms, difference.rows, difference.unpaired
+        )
+    }
 }
 
 /// Writes a drive's frames to a file.

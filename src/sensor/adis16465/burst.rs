@@ -1,7 +1,4 @@
-//! Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
-//!
-//! One burst gives everything: the command 68 00, then twenty bytes, big-endian, at 1 MHz at
-//! most.
+//! The burst of an ADIS16465 or ADIS16470: twenty bytes, big-endian.
 //!
 //! | offset | content |
 //! |---|---|
@@ -16,14 +13,11 @@
 //! that is what a part without power and a cut line look like.
 
 use crate::sample::ImuSample;
-use crate::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
-use embedded_hal::spi::{Operation, SpiDevice};
+use crate::units::{AngularRate, CentiCelsius, Micros, RangeError, STANDARD_GRAVITY, SpecificForce};
 
 /// Bytes of a burst behind its command.
 pub const BURST: usize = 20;
-/// Asks for a burst.
-const BURST_COMMAND: [u8; 2] = [0x68, 0x00];
-/// Words of a burst that are summed.
+/// Bytes of a burst that are summed.
 const SUMMED: usize = 18;
 
 /// Which part; its scales.
@@ -202,7 +196,7 @@ impl Burst {
             AngularRate::from_rad_per_sec(dps.to_radians())
         };
         let force = |count: i16| {
-            SpecificForce::from_metre_per_sec2(f32::from(count) / model.counts_per_g() * GRAVITY)
+            SpecificForce::from_metre_per_sec2(f32::from(count) / model.counts_per_g() * STANDARD_GRAVITY)
         };
         let ([gx, gy, gz], [ax, ay, az]) = (self.rate, self.acceleration);
         let converted = || {
@@ -218,78 +212,6 @@ impl Burst {
     }
 }
 
-/// m/s^2 in a g.
-const GRAVITY: f32 = 9.806_65;
-
 fn sum(bytes: &[u8; BURST]) -> u16 {
     bytes.iter().take(SUMMED).map(|byte| u16::from(*byte)).sum()
-}
-
-/// What can go wrong with a read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum AdisError<E> {
-    /// The bus failed.
-    Bus(E),
-    /// What came over it gives no sample.
-    Burst(BurstError),
-}
-
-impl<E: core::fmt::Debug> core::fmt::Display for AdisError<E> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Bus(error) => write!(f, "ADIS164xx: the bus failed: {error:?}"),
-            Self::Burst(error) => error.fmt(f),
-        }
-    }
-}
-
-impl<E: core::fmt::Debug> core::error::Error for AdisError<E> {}
-
-/// The part on its bus.
-#[derive(Debug)]
-pub struct Adis16465<SPI> {
-    spi: SPI,
-    model: Model,
-    last_counter: Option<u16>,
-    /// Readings that were not fetched, by the data counter.
-    lost: u32,
-}
-
-impl<SPI: SpiDevice> Adis16465<SPI> {
-    /// The part as it comes; it needs no setting. Give it 300 ms after power-up.
-    #[must_use]
-    pub const fn new(spi: SPI, model: Model) -> Self {
-        Self { spi, model, last_counter: None, lost: 0 }
-    }
-
-    /// The bus back.
-    pub fn destroy(self) -> SPI {
-        self.spi
-    }
-
-    /// Fetches the newest readings. The part carries no time: `now` is the data-ready signal's.
-    ///
-    /// # Errors
-    /// [`AdisError`].
-    pub fn read(&mut self, now: Micros) -> Result<ImuSample, AdisError<SPI::Error>> {
-        let mut bytes = [0; BURST];
-        let mut burst = [Operation::Write(&BURST_COMMAND), Operation::Read(&mut bytes)];
-        self.spi.transaction(&mut burst).map_err(AdisError::Bus)?;
-        let burst = Burst::parse(&bytes).map_err(AdisError::Burst)?;
-        let steps = self.last_counter.map_or(1, |last| burst.counter.wrapping_sub(last));
-        if steps == 0 {
-            return Err(AdisError::Burst(BurstError::Repeated { counter: burst.counter }));
-        }
-        self.last_counter = Some(burst.counter);
-        self.lost = self.lost.saturating_add(u32::from(steps) - 1);
-        burst.sample(self.model, now).map_err(AdisError::Burst)
-    }
-
-    /// Readings that were not fetched. At 2000 a second and 100 reads this grows by 19 a read.
-    #[must_use]
-    pub fn lost(&self) -> u32 {
-        self.lost
-    }
 }

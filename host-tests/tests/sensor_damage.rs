@@ -1,0 +1,236 @@
+//! Every truncation and every flipped bit of the frames whose own tests do not try it: those of the
+//! dialogues, built-in-test messages, and the kinds without a checksum, for which the tests say what
+//! is found out and what is not. MTData2 has its own in `xsens_formats` and `xsens_stream`, the
+//! DSP-1760's data messages in `kvh_dsp1760`, the DSP-3000's words in `kvh_dsp3000`, the ADIS burst
+//! in `adis16465`.
+
+use gyronet::sensor::dsp1760::command::{Command, Reply};
+use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config, OutputRate};
+use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, LineError, Reading};
+use gyronet::sensor::icm42688::packet::{Packet, PacketError, Resolution};
+use gyronet::sensor::xsens::dialogue::{Step, mid};
+use gyronet::sensor::xsens::xbus;
+use gyronet_host_tests::noise::Noise;
+
+/// All copies of some bytes with one bit flipped.
+fn flips(bytes: &[u8]) -> impl Iterator<Item = Vec<u8>> {
+    (0..bytes.len() * 8).map(|bit| {
+        let mut damaged = bytes.to_vec();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        damaged
+    })
+}
+
+#[test]
+fn messages_of_the_mti_dialogue() {
+    let steps = [Step::GoToConfig, Step::SetOutputConfiguration, Step::GoToMeasurement];
+    let sent = steps.map(|step| step.emit().to_vec());
+    let answers = [
+        (mid::GO_TO_CONFIG + 1, &[][..]),
+        (mid::GO_TO_MEASUREMENT + 1, &[]),
+        (mid::SET_OUTPUT_CONFIGURATION + 1, &sent[1][4..28]),
+        (mid::ERROR, &[4]),
+        (mid::WAKE_UP, &[]),
+        (mid::REQ_DID, &[]),
+        (mid::REQ_DID + 1, &[3, 0x80, 0, 1]),
+    ];
+    let answers = answers.map(|(mid, data)| xbus::emit::<64>(mid, data).expect("short").to_vec());
+    for frame in sent.iter().chain(&answers) {
+        let (mid, data) = xbus::parse(frame).expect("it is intact");
+        assert_eq!(xbus::emit::<64>(mid, data).expect("short")[..], frame[..]);
+        for length in 0..frame.len() {
+            assert_eq!(xbus::parse(&frame[..length]), None, "{frame:02x?}");
+        }
+        for damaged in flips(frame) {
+            assert_eq!(xbus::parse(&damaged), None, "{damaged:02x?}");
+        }
+    }
+}
+
+fn data_message() -> Vec<u8> {
+    let message = Message {
+        rotation: [1e-6, -2e-6, 3e-6],
+        acceleration: [0.0; 3],
+        extra: Extra::Temperature(25),
+        validity: Validity::GYRO,
+        sequence: 7,
+    };
+    message.emit().to_vec()
+}
+
+/// Samples that a DSP-1760 gives for these bytes.
+fn samples(bytes: &[u8]) -> usize {
+    let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
+    let mut samples = 0;
+    for byte in bytes {
+        part.push(*byte);
+        samples += std::iter::from_fn(|| part.next_sample()).count();
+    }
+    samples
+}
+
+/// Damaged as they may be, they give no sample and take none away.
+#[test]
+fn built_in_test_messages() {
+    let data = data_message();
+    for message in
+        [&b"\xFE\x81\x00\xAA\x7F\x01\x40\x00\x2A\x15\x55"[..], b"\xFE\x81\x00\xAB\x7F\x01\0\0\0\0\0\x7F\x55"]
+    {
+        for length in 0..=message.len() {
+            assert_eq!(samples(&message[..length]), 0);
+            assert_eq!(samples(&[&message[..length], &data].concat()), 1, "{length} bytes");
+        }
+        for damaged in flips(message) {
+            assert_eq!(samples(&damaged), 0);
+            assert_eq!(samples(&[&damaged[..], &data].concat()), 1, "{damaged:02x?}");
+        }
+    }
+}
+
+/// Lines of text without a checksum, but of few words: a flipped bit makes another rate of the same
+/// list, another case of a letter (which means the same), or nothing.
+#[test]
+fn commands_and_answers_of_the_dsp1760() {
+    for hertz in OutputRate::OFFERED {
+        let rate = OutputRate::new(hertz).expect("offered");
+        let (command, reply) = (Command::Rate(rate), Reply::Rate(rate));
+        for damaged in flips(command.emit().as_bytes()) {
+            assert!(matches!(Command::parse(&damaged), None | Some(Command::Rate(_))), "{damaged:?}");
+        }
+        for damaged in flips(reply.emit().as_bytes()) {
+            assert!(matches!(Reply::parse(&damaged), None | Some(Reply::Rate(_))), "{damaged:?}");
+        }
+        let line = reply.emit();
+        for length in 0..line.len() {
+            let cut = Reply::parse(&line.as_bytes()[..length]);
+            // "DR,1000" cut short is "DR,100", and no one can tell: the line end must have come.
+            assert!(matches!(cut, None | Some(Reply::Rate(_))), "{length} bytes of {line:?}");
+        }
+    }
+}
+
+/// No checksum: a bit that flips on the bus is found in the header, and anywhere else it changes
+/// exactly one reading, or makes it none.
+#[test]
+fn packets_of_the_icm42688() {
+    let narrow = Packet {
+        resolution: Resolution::Bits16,
+        acceleration: [12, -40, 2048].map(Some),
+        rate: [3, -2, 1310].map(Some),
+        temperature: Some(10),
+        time: 1_000,
+    };
+    let wide = Packet {
+        resolution: Resolution::Bits20,
+        acceleration: [12, -4, 32_768].map(Some),
+        rate: [6, -2, 2_620].map(Some),
+        temperature: Some(662),
+        time: 1_000,
+    };
+    for packet in [narrow, wide] {
+        let bytes = packet.emit();
+        for length in 0..bytes.len() {
+            let got = Packet::parse(packet.resolution, &bytes[..length]);
+            assert_eq!(got, Err(PacketError::Length { got: length, expected: bytes.len() }));
+        }
+        let (mut refused, mut same, mut wrong) = (0, 0, 0);
+        for (bit, damaged) in flips(&bytes).enumerate() {
+            match Packet::parse(packet.resolution, &damaged) {
+                Err(_) => refused += 1,
+                Ok(read) if read == packet => same += 1,
+                Ok(read) => {
+                    let axes = |a: &[Option<i32>; 3], b: &[Option<i32>; 3]| {
+                        a.iter().zip(b).filter(|(a, b)| a != b).count()
+                    };
+                    let changed = axes(&read.acceleration, &packet.acceleration)
+                        + axes(&read.rate, &packet.rate)
+                        + usize::from(read.temperature != packet.temperature)
+                        + usize::from(read.time != packet.time);
+                    assert_eq!(changed, 1, "bit {bit}");
+                    wrong += 1;
+                }
+            }
+        }
+        println!(
+            "{:?}: {refused} flips refused, {same} without effect, {wrong} not found",
+            packet.resolution
+        );
+        // Six bits of the header tell the content; the two others a change of rate.
+        assert_eq!((refused, same, wrong), (6, 2, 8 * (bytes.len() - 1)));
+    }
+}
+
+fn lines(bytes: &[u8]) -> Vec<Result<Reading, LineError>> {
+    let mut part = Dsp3000Ascii::new();
+    bytes.iter().filter_map(|byte| part.push(*byte)).collect()
+}
+
+/// No checksum: a flipped bit is found where it leaves the form of a line; else it changes a digit,
+/// or the mark of validity.
+#[test]
+fn lines_of_the_dsp3000() {
+    let (mut refused, mut same, mut wrong) = (0, 0, 0);
+    let next = Reading { millionths: 5_000_000, valid: true };
+    for millionths in [10_000_000, -123, 359_999_999, -12_345_678] {
+        let reading = Reading { millionths, valid: true };
+        let line = reading.emit();
+        for damaged in flips(line.as_bytes()) {
+            // A line end that is hit glues the next line on: then there is one line less.
+            let got = lines(&[&damaged[..], next.emit().as_bytes()].concat());
+            assert!(matches!(got.len(), 1 | 2), "{damaged:?}: {got:?}");
+            match got[0] {
+                Err(_) => refused += 1,
+                Ok(read) if read == reading => same += 1,
+                Ok(read) => {
+                    let digits = |reading: &Reading| format!("{:09}", reading.millionths.unsigned_abs());
+                    let pairs = digits(&read).into_bytes().into_iter().zip(digits(&reading).into_bytes());
+                    let changed = pairs.filter(|(a, b)| a != b).count();
+                    let signs = read.millionths.signum() * reading.millionths.signum() < 0;
+                    let changed = changed + usize::from(signs) + usize::from(read.valid != reading.valid);
+                    assert_eq!(changed, 1, "{damaged:?}: {read:?}");
+                    wrong += 1;
+                }
+            }
+        }
+        // Cut off behind, nothing comes until the next line's end, and that has not the form, but
+        // where a few digits are left over: they stand before the next line's number.
+        for length in 1..line.len() - 2 {
+            let got = lines(&[&line.as_bytes()[..length], next.emit().as_bytes()].concat());
+            assert_eq!(got.len(), 1);
+            let glued = line.as_bytes()[..length].iter().all(|byte| b"-0123456789".contains(byte));
+            assert!(got[0].is_err() || glued, "{length} bytes of {line:?}: {got:?}");
+        }
+    }
+    println!("DSP-3000 line: {refused} flips refused, {same} without effect, {wrong} not found");
+    assert!(refused > 5 * wrong / 4 && wrong > 0);
+}
+
+/// A million random bytes in lines of noise, good lines strewn in, one of ten damaged.
+#[test]
+fn lines_of_the_dsp3000_in_noise() {
+    let mut noise = Noise::new(17);
+    let (mut stream, mut sent, mut random) = (Vec::new(), Vec::new(), 0);
+    while random < 1_000_000 {
+        let run = noise.int(0, 400);
+        random += run;
+        // A line of noise ends like any other.
+        stream.extend((0..run).map(|_| noise.byte()));
+        stream.push(b'\n');
+        let reading =
+            Reading { millionths: noise.int(-359_999_999, 359_999_999) as i32, valid: noise.int(0, 1) > 0 };
+        let mut line = reading.emit().into_bytes();
+        if noise.int(0, 9) == 0 {
+            // Its decimal point: that is found out.
+            let point = line.iter().position(|byte| *byte == b'.').expect("a point");
+            line[point] = noise.byte() | 0x80;
+        } else {
+            sent.push(reading);
+        }
+        stream.extend(line);
+    }
+    let got: Vec<Reading> = lines(&stream).into_iter().filter_map(Result::ok).collect();
+    println!("DSP-3000: {} of {} intact lines among {random} random bytes", got.len(), sent.len());
+    // A line of noise could be a reading by chance; with a fixed seed none is.
+    assert_eq!(got, sent);
+}

@@ -1,0 +1,138 @@
+//! What a sensor's bytes cost: a frame of each kind, byte by byte as a receive interrupt hands
+//! them over, through the parser that the pipeline is given. Each parser has taken a frame
+//! before, so that its clock and its counter run.
+
+use crate::meter::Meter;
+use core::hint::black_box;
+use cortex_m_semihosting::hprintln;
+use gyronet::sensor::ByteSource;
+use gyronet::sensor::adis16465::{Burst, DiagStat, Model};
+use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
+use gyronet::sensor::dsp3000::Mode;
+use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, Reading};
+use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word};
+use gyronet::sensor::icm42688::packet::{Packet, Resolution};
+use gyronet::sensor::xsens::precision::Precision;
+use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::units::Micros;
+
+/// Every parser.
+pub fn run(meter: &mut Meter) {
+    dsp1760(meter);
+    mtdata2(meter);
+    dsp3000(meter);
+    bursts(meter);
+    hprintln!("sensor/dsp1760_parser bytes={}", size_of::<Dsp1760>());
+    hprintln!("sensor/mtdata2_parser bytes={}", size_of::<Mti>());
+    hprintln!("sensor/dsp3000_line_parser bytes={}", size_of::<Dsp3000Ascii>());
+    hprintln!("sensor/dsp3000_word_parser bytes={}", size_of::<Dsp3000Binary>());
+    hprintln!("sensor/icm42688_packet_parser bytes={}", size_of::<Packet>());
+    hprintln!("sensor/adis16465_burst_parser bytes={}", size_of::<Burst>());
+}
+
+/// The second of two frames through a parser.
+fn stream<P: ByteSource>(meter: &mut Meter, name: &str, part: &mut P, frames: [&[u8]; 2]) {
+    let [first, second] = frames;
+    let mut samples = 0;
+    let mut feed = |bytes: &[u8]| {
+        for byte in bytes {
+            part.push(*byte);
+            while let Some(sample) = part.next_sample() {
+                samples += u32::from(black_box(sample).is_ok());
+            }
+        }
+    };
+    feed(first);
+    meter.run(name, || feed(black_box(second)));
+    hprintln!("{} bytes={}", name, second.len());
+    if samples != 2 {
+        hprintln!("FAILED: {} gives {} samples of 2", name, samples);
+    }
+}
+
+fn dsp1760(meter: &mut Meter) {
+    let message = |sequence, extra| Message {
+        rotation: [1.25e-5, -3.1e-6, 1.745_329_3e-4],
+        acceleration: [0.0; 3],
+        extra,
+        validity: Validity::GYRO,
+        sequence,
+    };
+    let untimed = [0, 1].map(|n| message(n, Extra::Temperature(25)).emit());
+    let timed =
+        [0, 1].map(|n| message(n, Extra::Timed { time: 1_000 * u32::from(n) + 7, temperature: 25 }).emit());
+    let part = || Dsp1760::new(Dsp1760Config::DEFAULT);
+    stream(meter, "sensor/dsp1760_frame", &mut part(), untimed.each_ref().map(|frame| &frame[..]));
+    stream(meter, "sensor/dsp1760_timed_frame", &mut part(), timed.each_ref().map(|frame| &frame[..]));
+}
+
+fn mtdata2(meter: &mut Meter) {
+    let message = |n: u16| MtData2 {
+        packet_counter: Some(n),
+        sample_time_fine: Some(100 * u32::from(n)),
+        acceleration: Some([0.25, -0.5, 9.81]),
+        rate_of_turn: Some([0.012, -0.003, 0.174_532_93]),
+        temperature: None,
+        status: Some(3),
+    };
+    let single = [1, 2].map(|n| message(n).emit());
+    let double = [1, 2].map(|n| message(n).emit_as(Precision::Double));
+    stream(meter, "sensor/mtdata2_frame", &mut Mti::new(), single.each_ref().map(|frame| &frame[..]));
+    stream(meter, "sensor/mtdata2_f64_frame", &mut Mti::new(), double.each_ref().map(|frame| &frame[..]));
+}
+
+fn dsp3000(meter: &mut Meter) {
+    let line = Reading { millionths: -12_345_678, valid: true }.emit();
+    let mut lines = Dsp3000Ascii::new();
+    meter.run("sensor/dsp3000_line", || {
+        for byte in black_box(line.as_bytes()) {
+            if let Some(Ok(reading)) = lines.push(*byte) {
+                black_box(reading.sample(Mode::Rate, Micros(5), 10_000));
+            }
+        }
+    });
+    hprintln!("sensor/dsp3000_line bytes={}", line.len());
+    let word = Word { valid: true, sync: 0, mode: Mode::Incremental, value: 166_667 }.emit();
+    let mut words = Dsp3000Binary::new(Mode::Incremental, 0);
+    let mut feed = || {
+        for byte in black_box(&word) {
+            if let Some(word) = words.push(*byte) {
+                black_box(word.sample(Micros(5), 1_000));
+            }
+        }
+    };
+    (0..LOCK).for_each(|_| feed());
+    meter.run("sensor/dsp3000_word", feed);
+    hprintln!("sensor/dsp3000_word bytes={}", word.len());
+}
+
+/// What an SPI transfer has brought, from bytes to sample.
+fn bursts(meter: &mut Meter) {
+    let packet = Packet {
+        resolution: Resolution::Bits20,
+        acceleration: [12, -4, 32_768].map(Some),
+        rate: [6, -2, 2_620].map(Some),
+        temperature: Some(662),
+        time: 1_000,
+    };
+    let bytes = packet.emit();
+    meter.run("sensor/icm42688_packet", || {
+        let packet = Packet::parse(Resolution::Bits20, black_box(&bytes));
+        black_box(packet.ok().and_then(|packet| packet.sample(Micros(1_000))));
+    });
+    hprintln!("sensor/icm42688_packet bytes={}", bytes.len());
+    let burst = Burst {
+        diagnosis: DiagStat(0),
+        rate: [0, -3, 400],
+        acceleration: [12, -40, 4_000],
+        temperature: 253,
+        counter: 0x1234,
+    };
+    let bytes = burst.emit();
+    meter.run("sensor/adis16465_burst", || {
+        let burst = Burst::parse(black_box(&bytes));
+        black_box(burst.and_then(|burst| burst.sample(Model::Adis16465_2, Micros(5)))).ok();
+    });
+    hprintln!("sensor/adis16465_burst bytes={}", bytes.len());
+}

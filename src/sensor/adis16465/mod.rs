@@ -1,0 +1,84 @@
+//! Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
+//!
+//! One burst gives everything: the command 68 00, then the twenty bytes of [`burst`], at 1 MHz
+//! at most. This file fetches it; what it says is [`burst`]'s business, sans I/O.
+
+pub mod burst;
+
+pub use burst::{BURST, Burst, BurstError, DiagStat, Model};
+
+use crate::sample::ImuSample;
+use crate::units::Micros;
+use embedded_hal::spi::{Operation, SpiDevice};
+
+/// Asks for a burst.
+const BURST_COMMAND: [u8; 2] = [0x68, 0x00];
+
+/// What can go wrong with a read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum AdisError<E> {
+    /// The bus failed.
+    Bus(E),
+    /// What came over it gives no sample.
+    Burst(BurstError),
+}
+
+impl<E: core::fmt::Debug> core::fmt::Display for AdisError<E> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Bus(error) => write!(f, "ADIS164xx: the bus failed: {error:?}"),
+            Self::Burst(error) => error.fmt(f),
+        }
+    }
+}
+
+impl<E: core::fmt::Debug> core::error::Error for AdisError<E> {}
+
+/// The part on its bus.
+#[derive(Debug)]
+pub struct Adis16465<SPI> {
+    spi: SPI,
+    model: Model,
+    last_counter: Option<u16>,
+    /// Readings that were not fetched, by the data counter.
+    lost: u32,
+}
+
+impl<SPI: SpiDevice> Adis16465<SPI> {
+    /// The part as it comes; it needs no setting. Give it 300 ms after power-up.
+    #[must_use]
+    pub const fn new(spi: SPI, model: Model) -> Self {
+        Self { spi, model, last_counter: None, lost: 0 }
+    }
+
+    /// The bus back.
+    pub fn destroy(self) -> SPI {
+        self.spi
+    }
+
+    /// Fetches the newest readings. The part carries no time: `now` is the data-ready signal's.
+    ///
+    /// # Errors
+    /// [`AdisError`].
+    pub fn read(&mut self, now: Micros) -> Result<ImuSample, AdisError<SPI::Error>> {
+        let mut bytes = [0; BURST];
+        let mut burst = [Operation::Write(&BURST_COMMAND), Operation::Read(&mut bytes)];
+        self.spi.transaction(&mut burst).map_err(AdisError::Bus)?;
+        let burst = Burst::parse(&bytes).map_err(AdisError::Burst)?;
+        let steps = self.last_counter.map_or(1, |last| burst.counter.wrapping_sub(last));
+        if steps == 0 {
+            return Err(AdisError::Burst(BurstError::Repeated { counter: burst.counter }));
+        }
+        self.last_counter = Some(burst.counter);
+        self.lost = self.lost.saturating_add(u32::from(steps) - 1);
+        burst.sample(self.model, now).map_err(AdisError::Burst)
+    }
+
+    /// Readings that were not fetched. At 2000 a second and 100 reads this grows by 19 a read.
+    #[must_use]
+    pub fn lost(&self) -> u32 {
+        self.lost
+    }
+}

@@ -1,0 +1,46 @@
+//! The time of a message: by its number, or by its stamp.
+
+use super::config::OutputRate;
+
+/// Time by the number of messages since the start, microseconds. 750 a second have no whole
+/// period, so what is left over is kept: the clock never drifts.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct MessageClock {
+    time: u64,
+    /// Of a division by the rate.
+    remainder: u32,
+}
+
+impl MessageClock {
+    pub(super) const START: Self = Self { time: 0, remainder: 0 };
+
+    /// The time `messages` (127 at most) later.
+    pub(super) fn advance(&mut self, rate: OutputRate, messages: u32) -> u64 {
+        let hertz = u32::from(rate.hertz());
+        let elapsed = messages * 1_000_000 + self.remainder;
+        self.time += u64::from(elapsed / hertz);
+        self.remainder = elapsed % hertz;
+        self.time
+    }
+}
+
+/// Microseconds of 32 bits (71 minutes) to ones that never wrap. A stamp that goes back by
+/// less than half the range is a step back, not a wrap.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct StampClock {
+    /// Last stamp and the time it stands for.
+    last: Option<(u32, u64)>,
+}
+
+impl StampClock {
+    pub(super) const START: Self = Self { last: None };
+
+    pub(super) fn unwrap(&mut self, stamp: u32) -> u64 {
+        let time = match self.last {
+            None => u64::from(stamp),
+            Some((last, base)) => base.saturating_add_signed(i64::from(stamp.wrapping_sub(last) as i32)),
+        };
+        self.last = Some((stamp, time));
+        time
+    }
+}

@@ -1,0 +1,123 @@
+//! How a DSP-1760 is brought to a configuration.
+//!
+//! The part acknowledges no setting, so what it was told is asked for afterwards: the lines of
+//! [`setup`], then the query for the rate, and only then out of configuration mode. The rules:
+//! - Lines follow each other [`PAUSE`] apart.
+//! - Without an answer for [`TIMEOUT`], or with another rate, all of it is sent again,
+//!   [`ATTEMPTS`] times in all.
+//! - Whatever stands before an answer in its line (messages that still come in) is passed over.
+//!
+//! No port, no clock: bytes and the time come in, lines to send come out. Afterwards tell the
+//! parser: [`super::Dsp1760::set_rate`].
+
+use super::command::{Command, MAX_LINE, Reply, setup};
+use super::config::{Dsp1760Config, OutputRate};
+use crate::sensor::serial::{self, Action};
+use crate::units::Micros;
+use heapless::Vec;
+
+/// From a line to the next.
+pub const PAUSE: Micros = Micros(20_000);
+/// How long the answer may take.
+pub const TIMEOUT: Micros = Micros(500_000);
+/// How often everything is sent before the part is given up.
+pub const ATTEMPTS: u8 = 3;
+
+/// Why the dialogue has ended without a part that is set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum DialogueError {
+    /// No answer to any query.
+    Silent,
+    /// The last answer was another rate than the one that was set.
+    Rate {
+        /// Messages per second.
+        got: OutputRate,
+    },
+}
+
+impl core::fmt::Display for DialogueError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Silent => write!(f, "DSP-1760: no answer after {ATTEMPTS} attempts"),
+            Self::Rate { got } => write!(f, "DSP-1760: the rate stays at {} Hz", got.hertz()),
+        }
+    }
+}
+
+impl core::error::Error for DialogueError {}
+
+/// The dialogue with one part.
+#[derive(Debug, Clone)]
+pub struct Dialogue {
+    config: Dsp1760Config,
+    /// The newest bytes of the line that comes in.
+    line: Vec<u8, MAX_LINE>,
+    /// The line that is sent next, and when at the earliest.
+    next: usize,
+    due: Micros,
+    attempts: u8,
+    /// The part's last answer.
+    answer: Option<OutputRate>,
+}
+
+impl Dialogue {
+    /// Nothing sent yet.
+    #[must_use]
+    pub const fn new(config: Dsp1760Config) -> Self {
+        Self { config, line: Vec::new(), next: 0, due: Micros(0), attempts: 1, answer: None }
+    }
+
+    /// All lines in order. The last one is sent when the query has been answered.
+    fn lines(&self) -> [Command; 6] {
+        let [enter, rate, rotation, temperature, leave] = setup(&self.config);
+        [enter, rate, rotation, temperature, Command::QueryRate, leave]
+    }
+}
+
+impl serial::Dialogue for Dialogue {
+    type Error = DialogueError;
+
+    fn push(&mut self, byte: u8) {
+        if byte != b'\n' {
+            if self.line.is_full() {
+                self.line.remove(0);
+            }
+            // There is room now.
+            let _ = self.line.push(byte);
+            return;
+        }
+        let begin = self.line.windows(3).rposition(|word| word.eq_ignore_ascii_case(b"dr,"));
+        let reply = begin.and_then(|begin| self.line.get(begin..)).and_then(Reply::parse);
+        if let Some(Reply::Rate(rate)) = reply {
+            self.answer = Some(rate);
+        }
+        self.line.clear();
+    }
+
+    fn poll(&mut self, now: Micros) -> Result<Action, DialogueError> {
+        let lines = self.lines();
+        let leave = lines.len() - 1;
+        let set = self.answer == Some(self.config.rate);
+        if now < self.due && !(self.next == leave && set) {
+            return Ok(Action::Wait);
+        }
+        if self.next == leave && !set {
+            // The query's time is up.
+            if self.attempts == ATTEMPTS {
+                return Err(self.answer.map_or(DialogueError::Silent, |got| DialogueError::Rate { got }));
+            }
+            self.attempts += 1;
+            self.next = 0;
+        }
+        let Some(command) = lines.get(self.next) else { return Ok(Action::Done) };
+        if self.next == 0 {
+            self.answer = None;
+        }
+        self.next += 1;
+        let pause = if self.next == leave { TIMEOUT } else { PAUSE };
+        self.due = Micros(now.0.saturating_add(pause.0));
+        Ok(Action::Send(command.emit().into_bytes().into_iter().collect()))
+    }
+}

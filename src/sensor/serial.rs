@@ -1,0 +1,151 @@
+//! Parts on a serial line, over the traits of `embedded-io`: the line itself, and the dialogue
+//! that brings a part to send what the pipeline wants. Nothing here knows a part.
+//!
+//! No read blocks: a port must say whether bytes wait ([`ReadReady`]), so a silent part costs a
+//! bounded time and no more.
+//!
+//! There are no async shims. All parsers and dialogues take bytes and a time and do no input or
+//! output, so an async caller awaits its own read, pushes the bytes and polls; what is here
+//! would only be there twice.
+
+use super::{ByteSource, Source};
+use crate::units::Micros;
+use embedded_hal::delay::DelayNs;
+use embedded_io::{Read, ReadReady, Write};
+use heapless::Vec;
+
+/// Bytes of the longest message that a dialogue sends.
+pub const MAX_SENT: usize = 32;
+/// Time between two looks at the line.
+const POLL_MS: u32 = 1;
+/// Bytes that are read at each look: more than 921,600 baud bring in that time.
+const CHUNK: usize = 128;
+/// Bytes that one call of [`Serial::next_sample`] reads at most.
+const MAX_READ: usize = 1024;
+
+/// What a dialogue wants done.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Action {
+    /// Send these bytes.
+    Send(Vec<u8, MAX_SENT>),
+    /// Nothing; poll again when bytes have come or time has passed.
+    Wait,
+    /// The part sends what it should.
+    Done,
+}
+
+/// A dialogue with a part: bytes and the time in, messages to send out. It ends after a bounded
+/// time, whatever the part does.
+pub trait Dialogue {
+    /// Why it has ended without a part that does as it should.
+    type Error: core::error::Error;
+
+    /// Takes one byte from the part.
+    fn push(&mut self, byte: u8);
+
+    /// What is to be done at `now`.
+    ///
+    /// # Errors
+    /// Why the dialogue is over; again at each call.
+    fn poll(&mut self, now: Micros) -> Result<Action, Self::Error>;
+}
+
+/// What can go wrong on a line: the port or the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SerialError<P, E> {
+    /// The port failed: an overrun, a framing error.
+    Port(P),
+    /// What came over it, or did not, is wrong.
+    Part(E),
+}
+
+impl<P: core::fmt::Debug, E: core::fmt::Display> core::fmt::Display for SerialError<P, E> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Port(error) => write!(f, "the serial port failed: {error:?}"),
+            Self::Part(error) => error.fmt(f),
+        }
+    }
+}
+
+impl<P: core::fmt::Debug, E: core::error::Error> core::error::Error for SerialError<P, E> {}
+
+/// Leads a dialogue to its end. Time is counted by `delay`.
+///
+/// # Errors
+/// [`SerialError::Port`] at once, [`SerialError::Part`] when the dialogue gives up.
+pub fn configure<PORT: Read + Write + ReadReady, D: Dialogue>(
+    port: &mut PORT,
+    dialogue: &mut D,
+    delay: &mut impl DelayNs,
+) -> Result<(), SerialError<PORT::Error, D::Error>> {
+    let mut now = Micros(0);
+    loop {
+        match dialogue.poll(now).map_err(SerialError::Part)? {
+            Action::Done => return Ok(()),
+            Action::Send(bytes) => {
+                port.write_all(&bytes).and_then(|()| port.flush()).map_err(SerialError::Port)?;
+            }
+            Action::Wait => {
+                let mut chunk = [0; CHUNK];
+                for byte in receive(port, &mut chunk).map_err(SerialError::Port)? {
+                    dialogue.push(*byte);
+                }
+                delay.delay_ms(POLL_MS);
+                now.0 += u64::from(POLL_MS) * 1_000;
+            }
+        }
+    }
+}
+
+/// A part at the end of a port: a [`Source`] like any other.
+#[derive(Debug)]
+pub struct Serial<PORT, PART> {
+    port: PORT,
+    part: PART,
+}
+
+impl<PORT, PART> Serial<PORT, PART> {
+    /// A part that sends what it should, and its port.
+    #[must_use]
+    pub const fn new(port: PORT, part: PART) -> Self {
+        Self { port, part }
+    }
+
+    /// The part, for its counters.
+    pub const fn part(&self) -> &PART {
+        &self.part
+    }
+
+    /// Port and part back.
+    pub fn destroy(self) -> (PORT, PART) {
+        (self.port, self.part)
+    }
+}
+
+impl<PORT: Read + ReadReady, PART: ByteSource> Source for Serial<PORT, PART> {
+    type Sample = PART::Sample;
+    type Error = SerialError<PORT::Error, PART::Error>;
+
+    /// Reads what waits at the port, a bounded number of bytes, up to the next sample.
+    fn next_sample(&mut self) -> Option<Result<PART::Sample, Self::Error>> {
+        for _ in 0..MAX_READ {
+            if let Some(sample) = self.part.next_sample() {
+                return Some(sample.map_err(SerialError::Part));
+            }
+            match receive(&mut self.port, &mut [0]) {
+                Ok(&[byte]) => self.part.push(byte),
+                Ok(_) => return None,
+                Err(error) => return Some(Err(SerialError::Port(error))),
+            }
+        }
+        self.part.next_sample().map(|sample| sample.map_err(SerialError::Part))
+    }
+}
+
+/// What waits at the port, as much of it as there is room for.
+fn receive<'a, PORT: Read + ReadReady>(port: &mut PORT, to: &'a mut [u8]) -> Result<&'a [u8], PORT::Error> {
+    let count = if port.read_ready()? { port.read(to)? } else { 0 };
+    Ok(to.get(..count).unwrap_or_default())
+}

@@ -1,0 +1,82 @@
+//! The messages that bring an MTi to send what the pipeline wants.
+
+use super::mtdata2::id;
+use super::xbus;
+use crate::sensor::serial::MAX_SENT;
+use heapless::Vec;
+
+/// Message identifiers; an acknowledgement is one more.
+pub mod mid {
+    /// Asks for the device identifier.
+    pub const REQ_DID: u8 = 0x00;
+    /// Starts measuring.
+    pub const GO_TO_MEASUREMENT: u8 = 0x10;
+    /// Stops measuring.
+    pub const GO_TO_CONFIG: u8 = 0x30;
+    /// The part has started.
+    pub const WAKE_UP: u8 = 0x3E;
+    /// The answer to it.
+    pub const WAKE_UP_ACK: u8 = 0x3F;
+    /// The part refuses a message; one byte says why.
+    pub const ERROR: u8 = 0x42;
+    /// Which data at which rate.
+    pub const SET_OUTPUT_CONFIGURATION: u8 = 0xC0;
+}
+
+/// "With every message": the rate of counters and time stamps.
+const EVERY_MESSAGE: u16 = 0xFFFF;
+
+/// One output of the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Output {
+    /// Data identifier.
+    pub id: u16,
+    /// Hz.
+    pub rate: u16,
+}
+
+/// What the pipeline wants, 100 Hz, all in single precision.
+pub const OUTPUTS: [Output; 6] = [
+    Output { id: id::PACKET_COUNTER, rate: EVERY_MESSAGE },
+    Output { id: id::SAMPLE_TIME_FINE, rate: EVERY_MESSAGE },
+    Output { id: id::ACCELERATION, rate: 100 },
+    Output { id: id::RATE_OF_TURN, rate: 100 },
+    Output { id: id::TEMPERATURE, rate: 1 },
+    Output { id: id::STATUS_WORD, rate: EVERY_MESSAGE },
+];
+
+/// A message of the dialogue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Step {
+    /// Stop measuring.
+    GoToConfig,
+    /// Send [`OUTPUTS`].
+    SetOutputConfiguration,
+    /// Start measuring.
+    GoToMeasurement,
+}
+
+impl Step {
+    pub(super) const fn mid(self) -> u8 {
+        match self {
+            Self::GoToConfig => mid::GO_TO_CONFIG,
+            Self::SetOutputConfiguration => mid::SET_OUTPUT_CONFIGURATION,
+            Self::GoToMeasurement => mid::GO_TO_MEASUREMENT,
+        }
+    }
+
+    /// The step's frame.
+    #[must_use]
+    pub fn emit(self) -> Vec<u8, MAX_SENT> {
+        let mut data = Vec::<u8, 24>::new();
+        if self == Self::SetOutputConfiguration {
+            for output in OUTPUTS {
+                let _ = data.extend_from_slice(&output.id.to_be_bytes());
+                let _ = data.extend_from_slice(&output.rate.to_be_bytes());
+            }
+        }
+        xbus::emit(self.mid(), &data).unwrap_or_default()
+    }
+}

@@ -1,0 +1,168 @@
+//! `gyronet monitor`: what a receiver of our messages sees.
+
+use super::{Common, WriteError};
+use console::Term;
+use gyronet::can::config::Config;
+use gyronet_tools::monitor::Monitor;
+use gyronet_tools::monitor::source::{Lines, Source};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Between two pictures on a terminal, and two lines elsewhere.
+const REDRAW: Duration = Duration::from_millis(100);
+const LINE: Duration = Duration::from_secs(1);
+/// --once gives up after so long.
+const ONCE: Duration = Duration::from_secs(10);
+
+/// Read our messages, check them as an ECU would, and show what they say: yaw rate, yaw, source,
+/// quality, faults, and what was lost, repeated or damaged on the way.
+///
+/// On a terminal a live picture; elsewhere a line a second. A log is read to its end, then
+/// summed up.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Args {
+    /// Serial port with SLCAN (/dev/ttyUSB0, COM3), TCP socket with SLCAN (host:port), or a
+    /// candump log.
+    #[arg(value_name = "PORT|HOST:PORT|FILE")]
+    source: String,
+    /// Bit/s of a serial port.
+    #[arg(long, default_value_t = 921_600)]
+    baud: u32,
+    /// Write each set of messages as a line of a table.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Show the first whole set of messages and end; an error if none comes within 10 s.
+    #[arg(long)]
+    once: bool,
+    /// End after so many seconds.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds, conflicts_with = "once")]
+    duration: Option<Duration>,
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+}
+
+/// Nothing to show.
+#[derive(Debug, thiserror::Error)]
+enum MonitorError {
+    #[error("{0}: no whole set of messages (rate, angle, detail)")]
+    Nothing(String),
+    #[error("{0}: no CAN frame in it; a candump log has lines as (1.000000) can0 174#0080004B008000D1")]
+    NoLog(String),
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args, _: Common) -> super::Result {
+    let config = Config::DEFAULT;
+    let mut source = Source::open(&args.source, args.baud, config.settings().bits_per_second)?;
+    let mut table = args.csv.as_deref().map(Table::create).transpose()?;
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
+
+    let mut monitor = Monitor::new(&config);
+    let mut view = View::new(source.is_log());
+    let start = Instant::now();
+    let limit = if args.once { Some(ONCE) } else { args.duration };
+    let mut sets = 0_u64;
+    while !interrupted.load(Ordering::Relaxed) && limit.is_none_or(|limit| start.elapsed() < limit) {
+        let Lines::Some(lines) = source.read()? else { break };
+        let elapsed = start.elapsed().as_secs_f64();
+        for line in &lines {
+            if let Some(time) = monitor.take_line(line, elapsed) {
+                sets += 1;
+                table.as_mut().map_or(Ok(()), |table| table.row(&monitor, time))?;
+                if args.once {
+                    break;
+                }
+            }
+        }
+        if args.once && sets > 0 {
+            break;
+        }
+        view.show(&monitor, elapsed)?;
+    }
+    let counts = monitor.counts;
+    if source.is_log() && counts.frames + counts.foreign == 0 {
+        return Err(MonitorError::NoLog(args.source.clone()).into());
+    }
+    if args.once && sets == 0 {
+        return Err(MonitorError::Nothing(args.source.clone()).into());
+    }
+    table.map_or(Ok(()), Table::finish)?;
+    view.finish(&monitor)?;
+    Ok(())
+}
+
+/// The file of --csv.
+struct Table {
+    path: PathBuf,
+    out: BufWriter<File>,
+}
+
+impl Table {
+    fn create(path: &Path) -> Result<Self, WriteError> {
+        let error = WriteError::to(path);
+        let mut out = BufWriter::new(File::create(path).map_err(&error)?);
+        writeln!(out, "{}", Monitor::HEADING).map_err(&error)?;
+        Ok(Self { path: path.into(), out })
+    }
+
+    fn row(&mut self, monitor: &Monitor, time: f64) -> Result<(), WriteError> {
+        writeln!(self.out, "{}", monitor.row(time)).map_err(WriteError::to(&self.path))
+    }
+
+    fn finish(mut self) -> Result<(), WriteError> {
+        self.out.flush().map_err(WriteError::to(&self.path))
+    }
+}
+
+/// What is shown while frames come, and at the end.
+struct View {
+    term: Option<Term>,
+    silent: bool,
+    drawn: usize,
+    last: Instant,
+}
+
+impl View {
+    /// A log is over before anybody could watch it: it has its summary only.
+    fn new(silent: bool) -> Self {
+        let term = Term::stdout();
+        Self { term: term.is_term().then_some(term), silent, drawn: 0, last: Instant::now() }
+    }
+
+    fn show(&mut self, monitor: &Monitor, elapsed: f64) -> io::Result<()> {
+        let period = if self.term.is_some() { REDRAW } else { LINE };
+        if self.silent || self.last.elapsed() < period {
+            return Ok(());
+        }
+        self.last = Instant::now();
+        match &self.term {
+            Some(term) => {
+                // One write, so that nothing flickers. A narrow window would wrap lines and
+                // spoil the count of them.
+                let width = usize::from(term.size().1);
+                let picture = monitor.to_string();
+                let lines: Vec<String> = picture.lines().map(|l| l.chars().take(width).collect()).collect();
+                term.clear_last_lines(self.drawn)?;
+                self.drawn = lines.len();
+                term.write_line(&lines.join("\n"))
+            }
+            None => writeln!(io::stdout().lock(), "{}", monitor.line(elapsed)),
+        }
+    }
+
+    fn finish(self, monitor: &Monitor) -> io::Result<()> {
+        if let Some(term) = &self.term {
+            term.clear_last_lines(self.drawn)?;
+        }
+        write!(io::stdout().lock(), "{monitor}")
+    }
+}

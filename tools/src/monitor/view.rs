@@ -1,0 +1,104 @@
+//! The newest values for people and for tables.
+
+use super::{Counts, Monitor, State};
+use gyronet::can::yaw::Faults;
+use std::fmt;
+
+/// Fault bits by name.
+const FAULTS: [(Faults, &str); 8] = [
+    (Faults::GAP, "gap"),
+    (Faults::CLIPPED, "clipped"),
+    (Faults::STUCK, "stuck"),
+    (Faults::IMPLAUSIBLE, "implausible"),
+    (Faults::LATE, "late"),
+    (Faults::WEIGHTS, "weights"),
+    (Faults::WHEELS, "wheels"),
+    (Faults::BUS, "bus"),
+];
+
+/// What is wrong, by name; `none` where nothing is.
+fn names(faults: Faults) -> String {
+    let present = FAULTS.iter().filter(|(fault, _)| faults.0 & fault.0 != 0).map(|(_, name)| *name);
+    let names: Vec<&str> = present.collect();
+    if names.is_empty() { "none".into() } else { names.join("+") }
+}
+
+/// A number of a fixed width, or a dash.
+fn number(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "-".into(), |value| format!("{value:.decimals$}"))
+}
+
+impl Monitor {
+    /// Heading of the table that [`Monitor::row`] gives a line of.
+    pub const HEADING: &str = "time,rate,yaw,source,quality,faults,correction,sigma,latency,drop_in,lost,repeated,\
+                               out_of_sequence,damaged,unreadable";
+
+    /// The newest values as one line of a CSV file; empty where not known. Rates in deg/s, yaw in
+    /// deg, latency in ms, time in s.
+    #[must_use]
+    pub fn row(&self, time: f64) -> String {
+        let known = |value: Option<f64>, decimals: usize| {
+            value.map(|value| format!("{value:.decimals$}")).unwrap_or_default()
+        };
+        let (source, quality) = self.judgement();
+        let State { rate, yaw, faults, correction, sigma, latency, drop_in, .. } = self.state;
+        let Counts { lost, repeated, out_of_sequence, damaged, unreadable, .. } = self.counts;
+        format!(
+            "{time:.6},{},{},{source},{quality},{},{},{},{},{},{lost},{repeated},{out_of_sequence},{damaged},{unreadable}",
+            known(rate, 6),
+            known(yaw, 8),
+            names(faults),
+            known(correction, 4),
+            known(sigma, 5),
+            known(latency, 1),
+            known(drop_in, 3),
+        )
+    }
+
+    /// The newest values as one line for people.
+    #[must_use]
+    pub fn line(&self, time: f64) -> String {
+        let (source, quality) = self.judgement();
+        let Counts { lost, repeated, out_of_sequence, damaged, unreadable, .. } = self.counts;
+        format!(
+            "{time:.1} s: rate {} deg/s, yaw {} deg, {source}, {quality}, faults {}, {} frames/s, lost {lost}, \
+             repeated {repeated}, out of sequence {out_of_sequence}, damaged {damaged}, unreadable {unreadable}",
+            number(self.state.rate, 6),
+            number(self.state.yaw, 6),
+            names(self.state.faults),
+            number(self.frames_per_second, 1),
+        )
+    }
+
+    fn judgement(&self) -> (String, String) {
+        let Some((source, quality)) = self.state.judgement else { return ("-".into(), "-".into()) };
+        (format!("{source:?}"), format!("{quality:?}").to_lowercase())
+    }
+}
+
+/// A few lines for a terminal.
+impl fmt::Display for Monitor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (source, quality) = self.judgement();
+        let State { rate, yaw, faults, correction, sigma, latency, drop_in, vdc2, .. } = self.state;
+        let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
+        let mut value = |name: &str, value: Option<f64>, decimals, unit: &str| {
+            writeln!(f, "{name:<16}{:>14} {unit}", number(value, decimals))
+        };
+        value("yaw rate", rate, 6, "deg/s")?;
+        value("expected error", sigma, 5, "deg/s")?;
+        value("yaw", yaw, 6, "deg")?;
+        value("correction", correction, 4, "deg/s")?;
+        value("drop-in rate", drop_in, 3, "deg/s")?;
+        if vdc2.is_some() {
+            value("VDC2 rate", vdc2, 4, "deg/s")?;
+        }
+        value("latency", latency, 1, "ms")?;
+        writeln!(f, "{:<16}{source:>14}, {quality}", "source")?;
+        writeln!(f, "{:<16}{:>14}", "faults", names(faults))?;
+        let pace = number(self.frames_per_second, 1);
+        writeln!(f, "{:<16}{frames:>14}, {foreign} of others, {pace} a second", "messages")?;
+        writeln!(f, "{:<16}{lost:>14}, repeated {repeated}, out of sequence {out_of_sequence}", "lost")?;
+        writeln!(f, "{:<16}{damaged:>14}, unreadable lines {unreadable}", "damaged")
+    }
+}

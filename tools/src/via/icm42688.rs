@@ -1,0 +1,136 @@
+//! FIFO packets of 20 bits, through the driver and a simulated SPI bus: reset, identity,
+//! settings, packets and the register that is checked with each of them.
+
+use super::{Part, Sent, ViaError};
+use crate::recording::Recording;
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use gyronet::sample::ImuSample;
+use gyronet::sensor::icm42688::packet::{Packet, Resolution};
+use gyronet::sensor::icm42688::registers as reg;
+use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
+use gyronet::units::{Micros, STANDARD_GRAVITY};
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::rc::Rc;
+
+/// 1/131 deg/s: of its 20 bits the part uses 19 for a rate.
+pub const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
+/// 1/8192 g: 18 bits for an acceleration.
+pub const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
+/// Counts of a 20-bit reading in one step.
+const RATE_COUNTS: f64 = 2.0;
+const FORCE_COUNTS: f64 = 4.0;
+/// The largest reading; the most negative one would be "no reading".
+const LARGEST: f64 = 524_287.0;
+/// The part's 16-bit clock wraps.
+const WRAP_US: u64 = 1 << 16;
+
+pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+    let bus = Bus::default();
+    let no_start = |why: String| ViaError::NoStart { part: Part::Icm42688, why };
+    let mut part = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay)
+        .map_err(|error| no_start(error.to_string()))?;
+    let mut samples = Vec::with_capacity(recording.rows.len());
+    for row in &recording.rows {
+        let error = |why: String| Part::Icm42688.no_sample(recording, row, why);
+        bus.0.borrow_mut().fifo.extend(packet(&row.sample).emit());
+        let sample = part.next_sample().map_err(|e| error(e.to_string()))?;
+        let sample = sample.ok_or_else(|| error("its FIFO seems empty".to_owned()))?;
+        // The part's clock begins anywhere, and a silence longer than its 65 ms is told by the
+        // arrival alone; less than that it says itself.
+        let behind = row.sample.time.0 - row.sample.time.0.min(sample.time.0);
+        let time = Micros(sample.time.0 + behind / WRAP_US * WRAP_US);
+        samples.push(ImuSample { time, ..sample });
+    }
+    let bytes = bus.0.borrow().bytes;
+    Ok((samples, bytes))
+}
+
+/// The packet of a sample, its readings rounded to the part's steps and clipped at its ends.
+fn packet(sample: &ImuSample) -> Packet {
+    let reading = |value: f64, step: f64, counts: f64| {
+        Some((libm::round(value / step) * counts).clamp(-LARGEST, LARGEST) as i32)
+    };
+    Packet {
+        resolution: Resolution::Bits20,
+        acceleration: sample
+            .specific_force
+            .map(|force| reading(force.metre_per_sec2(), FORCE_STEP, FORCE_COUNTS)),
+        rate: sample.angular_rate.map(|rate| reading(rate.rad_per_sec(), RATE_STEP, RATE_COUNTS)),
+        temperature: sample.temperature.map(|code| (f32::from(code.0) * 1.3248 - 3312.0).round() as i16),
+        time: (sample.time.0 % WRAP_US) as u16,
+    }
+}
+
+/// The part on its bus: registers that hold what is written, and a FIFO.
+#[derive(Debug, Default)]
+struct Simulated {
+    registers: std::collections::HashMap<(u8, u8), u8>,
+    bank: u8,
+    fifo: VecDeque<u8>,
+    bytes: u64,
+}
+
+impl Simulated {
+    fn write(&mut self, address: u8, value: u8) {
+        if address == reg::BANK_SEL {
+            self.bank = value;
+        } else if (self.bank, address) != (0, reg::DEVICE_CONFIG.address) {
+            self.registers.insert((self.bank, address), value);
+        }
+    }
+
+    fn read(&mut self, address: u8, to: &mut [u8]) {
+        let waiting = (self.fifo.len() as u16).to_be_bytes();
+        for (offset, byte) in to.iter_mut().enumerate() {
+            *byte = match address {
+                a if a == reg::FIFO_DATA.address => self.fifo.pop_front().unwrap_or(0x80),
+                a if a == reg::FIFO_COUNTH.address => waiting[offset % 2],
+                a if a == reg::WHO_AM_I.address => reg::IDENTITY,
+                a => self.registers.get(&(self.bank, a)).copied().unwrap_or(0),
+            };
+        }
+    }
+}
+
+/// The simulated part, shared by the driver and whoever fills its FIFO.
+#[derive(Debug, Clone, Default)]
+struct Bus(Rc<RefCell<Simulated>>);
+
+impl ErrorType for Bus {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Bus {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let mut part = self.0.borrow_mut();
+        let mut selected = 0;
+        for operation in operations {
+            match operation {
+                Operation::Write(bytes) => {
+                    part.bytes += bytes.len() as u64;
+                    match **bytes {
+                        [address] => selected = address & !reg::READ,
+                        [address, value] => part.write(address, value),
+                        _ => {}
+                    }
+                }
+                Operation::Read(to) => {
+                    part.bytes += to.len() as u64;
+                    part.read(selected, to);
+                }
+                // The driver does none of these.
+                Operation::Transfer(..) | Operation::TransferInPlace(_) | Operation::DelayNs(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+struct NoDelay;
+
+impl DelayNs for NoDelay {
+    fn delay_ns(&mut self, _ns: u32) {}
+}

@@ -1,0 +1,134 @@
+//! The command `gyronet monitor`: logs, sockets, tables, ends.
+
+use gyronet::can::DataFrame;
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
+use gyronet::can::slcan;
+use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
+use gyronet::vehicle::{VehicleSample, YawSample};
+use gyronet_tools::candump::Log;
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+use std::time::Instant;
+
+/// Frames of so many samples at 1 deg/s.
+fn frames(samples: u32) -> Vec<DataFrame> {
+    let mut feeds = Feeds::new(Config::DEFAULT);
+    let rate = AngularRate::from_rad_per_sec(1_f32.to_radians()).unwrap();
+    let sample = |tick: u32| VehicleSample {
+        yaw: YawSample {
+            rate,
+            yaw: Yaw(i64::from(rate.0) * i64::from(tick)),
+            quality: gyronet::health::Quality::Good,
+            ..YawSample::default()
+        },
+        roll_rate: AngularRate::ZERO,
+        pitch_rate: AngularRate::ZERO,
+        specific_force: [SpecificForce(0); 3],
+        temperature: None,
+        tick,
+    };
+    (0..samples).flat_map(|tick| feeds.process::<DataFrame>(&sample(tick))).collect()
+}
+
+fn file(name: &str, content: &[u8]) -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::write(&path, content).unwrap();
+    path
+}
+
+fn log(name: &str, frames: &[DataFrame]) -> PathBuf {
+    let mut log = Vec::new();
+    let mut out = Log::new(&mut log);
+    for (k, frame) in frames.iter().enumerate() {
+        out.frame(Micros(k as u64 / 6 * 10_000), frame).unwrap();
+    }
+    out.finish().unwrap();
+    file(name, &log)
+}
+
+fn monitor(arguments: &[&str]) -> (Output, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_gyronet")).arg("monitor").args(arguments).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    (output, out, err)
+}
+
+#[test]
+fn a_log_is_summed_up_and_tabled() {
+    let mut frames = frames(500);
+    frames.remove(6 * 100 + 3);
+    let log = log("drive.log", &frames);
+    let table = log.with_extension("csv");
+    let (output, out, err) = monitor(&[log.to_str().unwrap(), "--csv", table.to_str().unwrap()]);
+    assert!(output.status.success(), "{err}");
+    print!("{out}");
+    for part in ["1.000000 deg/s", "4.98999", "Raw, good", "2999, 0 of others, 600", " 1, repeated 0"] {
+        assert!(out.contains(part), "{part:?} in {out}");
+    }
+    let table = std::fs::read_to_string(table).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    assert_eq!(rows.len(), 501);
+    let columns = rows[0].split(',').count();
+    assert!(rows.iter().all(|row| row.split(',').count() == columns));
+    let last = rows[500];
+    assert!(last.starts_with("4.990000,1.000000,4.98999"), "{last}");
+    assert!(last.ends_with(",Raw,good,none,0.0000,,,1.000,1,0,0,0,0"), "{last}");
+}
+
+#[test]
+fn a_socket_is_asked_to_open_and_read_to_its_end() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let board = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut hello = [0; 8];
+        stream.read_exact(&mut hello).unwrap();
+        // The end of a line that was under way, then frames.
+        stream.write_all(b"4B0080\r").unwrap();
+        for frame in frames(200) {
+            stream.write_all(&slcan::emit(&frame).unwrap()).unwrap();
+        }
+        hello
+    });
+    let (output, out, err) = monitor(&[&address]);
+    assert!(output.status.success(), "{err}");
+    assert_eq!(&board.join().unwrap(), b"\rC\rS6\rO\r");
+    assert!(out.contains("1200, 0 of others") && out.contains("unreadable lines 0"), "{out}");
+}
+
+#[test]
+fn it_ends_when_it_should() {
+    // A line that says nothing.
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let start = Instant::now();
+    let (output, out, err) = monitor(&[&address, "--for", "1.5"]);
+    let elapsed = start.elapsed().as_secs_f64();
+    assert!(output.status.success() && (1.4..10.0).contains(&elapsed), "{elapsed} s: {err}");
+    assert!(out.contains("rate - deg/s, yaw - deg"), "a line a second, even of silence: {out}");
+    let (output, out, err) = monitor(&[log("once.log", &frames(10)).to_str().unwrap(), "--once"]);
+    assert!(output.status.success(), "{err}");
+    assert!(out.contains(" 6, 0 of others"), "the first set only: {out}");
+}
+
+#[test]
+fn what_cannot_be_read_is_named() {
+    let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let text = file("no.log", b"t_s,acc_x\n0.01,3\n");
+    let foreign = file("foreign.log", b"(1.000000) can0 123#00\n");
+    let (text, foreign) = (text.to_str().unwrap(), foreign.to_str().unwrap());
+    for (arguments, part) in [
+        (&["/no/such/port"][..], "/no/such/port: not a file, not host:port"),
+        (&[&closed], "cannot be connected"),
+        (&[text], "no.log: no CAN frame in it"),
+        (&[foreign, "--once"], "foreign.log: no whole set of messages"),
+        (&[foreign, "--csv", "/no/such/folder/a.csv"], "/no/such/folder/a.csv: "),
+        (&[foreign, "--for=-1"], "invalid value '-1'"),
+    ] {
+        let (output, _, err) = monitor(arguments);
+        assert!(!output.status.success() && err.contains(part), "{arguments:?}: {err}");
+    }
+}
