@@ -30,9 +30,10 @@ fn open(flash: &Flash) -> Store<Region<RECORD_SECTOR>> {
 #[test]
 fn layout_is_the_linker_s() {
     let text = std::fs::read_to_string(workspace().join("memory.x")).expect("it is in the repository");
-    assert!(text.contains(&format!("FLASH : ORIGIN = {:#010x}, LENGTH = 768K", layout::FLASH_BASE)));
+    assert!(text.contains(&format!("FLASH : ORIGIN = {:#010x}, LENGTH = 1024K", layout::FLASH_BASE)));
     assert!(text.contains(&format!("_stext = ORIGIN(FLASH) + {:#06X};", layout::CODE).replace("0X", "0x")));
-    assert_eq!(layout::CODE_END, 768 << 10);
+    let limit = std::fs::read_to_string(workspace().join("src/bin/coprocessor/slots.x")).expect("it is too");
+    assert!(limit.contains(&format!("ORIGIN(FLASH) + {}K,", layout::CODE_END >> 10)));
     assert_eq!(SECTORS.iter().sum::<u32>(), 1 << 20);
     assert_eq!((layout::STORE.end, layout::SLOTS.start), (layout::CODE, layout::CODE_END));
     let sizes = |range: std::ops::Range<u32>, size: usize| {
