@@ -1,7 +1,7 @@
 //! The weight file: whatever is wrong with one, it is refused with the right reason.
 
-use gyronet::model::blob::{BlobError, CRC, HEADER_LEN, HIDDEN, file_len};
-use gyronet::model::{Blob, weights};
+use gyronet::model::blob::{BlobError, CRC, HEADER_LEN, HIDDEN, TOPOLOGY, file_len};
+use gyronet::model::{Blob, fognet_blob, weights};
 use gyronet::nn::Aligned;
 use gyronet::nn::lstm::Direction;
 use gyronet::window::{FEATURES, WINDOW};
@@ -68,7 +68,7 @@ fn the_default_is_good_and_says_where_it_comes_from() {
 #[test]
 fn header_fields() {
     let len = weights::DEFAULT.0.len();
-    let topology = |found| BlobError::Topology { found };
+    let topology = |found| BlobError::Topology { found, expected: TOPOLOGY };
     let length = |expected, found| BlobError::Length { expected, found };
     let (window, features, hidden) = (WINDOW as u16, FEATURES as u16, HIDDEN as u16);
     let p = provenance_len();
@@ -197,7 +197,7 @@ fn refusals_say_why() {
             "layer 1, direction 0, unit 59 could overflow its accumulator",
         ),
         (
-            BlobError::Topology { found: [2, 60, 9, 90, 2] },
+            BlobError::Topology { found: fognet_blob::TOPOLOGY, expected: TOPOLOGY },
             "network 2 with window 60, 9 inputs, 90 units, 2 layers is not GyroNet (1: 10, 6, 60, 2)",
         ),
     ] {

@@ -2,7 +2,10 @@
 //! project has set itself; and that they are right there. Instructions are exact where a C
 //! compiler is found (QEMU plugin), else good to six; modelled cycles need the compiler.
 
-use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
+use gyronet::seconds::{Minute, Padding, STEPS, Second};
+use gyronet::units::Angle;
 use gyronet::window::{Features, WINDOW};
 use gyronet_host_tests::{image, qemu};
 use gyronet_tools::image_size::ImageSize;
@@ -30,18 +33,24 @@ struct Bar {
 }
 
 /// CMSIS-NN s8 takes 3,484,464 instructions and 4,382,365 modelled cycles for a whole window.
-const BARS: [Bar; 3] = [
+const BARS: [Bar; 4] = [
     Bar { name: "gyronet/window", instructions: 1_200_000, cycles: 1_500_000 },
     Bar { name: "gyronet/newest", instructions: 850_000, cycles: 1_100_000 },
     Bar { name: "fognet/window", instructions: 23_500_000, cycles: 30_000_000 },
+    // What keeps a task of the same priority waiting.
+    Bar { name: "fognet/piece", instructions: 190_000, cycles: 230_000 },
 ];
 
 #[test]
 fn counts_and_sizes() {
     let test = "counts_and_sizes";
     let Some(()) = qemu::available(test) else { return };
-    let Some(bench) = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "bench") else { return };
-    let counts = target_bench::measure(&target_bench::workspace(), &bench).expect("the bench image runs");
+    let mut counts = Counts::default();
+    for name in target_bench::IMAGES {
+        let Some(bench) = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), name) else { return };
+        let counted = target_bench::measure(&target_bench::workspace(), &bench);
+        counts.extend(counted.unwrap_or_else(|error| panic!("{name}: {error}")));
+    }
     for Bar { name, instructions, cycles } in BARS {
         let count = counts.get(name).expect(name);
         println!("{name} instructions={} cycles={:?}", count.instructions, count.cycles);
@@ -97,22 +106,17 @@ fn selftest() {
     let (printed, _) = target_bench::emulate(&elf, &[]).unwrap_or_else(|error| panic!("{error}"));
     println!("{printed}");
     assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
+    assert!(printed.contains(&format!("fognet hash={:08x}\n", fognet_hash())), "{printed}");
 }
 
 /// What the self-test computes: CRC-32 over the corrections and scales of sixteen random windows.
 fn hash() -> u32 {
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
     let mut digest = gyronet::model::blob::CRC.digest();
-    let mut state = 7u32;
+    let mut numbers = Xorshift(7);
     for _ in 0..16 {
         let window: [Features; WINDOW] = std::array::from_fn(|_| {
-            std::array::from_fn(|k| {
-                state ^= state << 13;
-                state ^= state >> 17;
-                state ^= state << 5;
-                let limit = if k < 3 { 10 << 20 } else { 1 << 25 };
-                (state >> 1) as i32 % (2 * limit + 1) - limit
-            })
+            std::array::from_fn(|k| numbers.within(if k < 3 { 10 << 20 } else { 1 << 25 }))
         });
         let estimate = network.estimate(&window);
         for rate in estimate.corrections.iter().chain([&estimate.scale]) {
@@ -120,4 +124,41 @@ fn hash() -> u32 {
         }
     }
     digest.finalize()
+}
+
+/// The same for FoGNet: CRC-32 over the estimates of three random windows.
+fn fognet_hash() -> u32 {
+    let mut state = FogNetState::ZERO;
+    let blob = FogBlob::new_checked(&weights::FOGNET.0).expect("the weights are good");
+    let mut network = FogNet::new(blob, &mut state);
+    let mut minute = Minute::EMPTY;
+    let mut digest = gyronet::model::blob::CRC.digest();
+    let mut numbers = Xorshift(8);
+    for _ in 0..3 {
+        for _ in 0..STEPS {
+            let features = std::array::from_fn(|k| {
+                numbers.within(if !(3..=5).contains(&k) { 10 << 20 } else { 1 << 25 })
+            });
+            let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
+            minute.push(Second { features, turn });
+        }
+        let window = minute.window(Padding::None).expect("it is full");
+        let estimate = network.estimate(&window);
+        for angle in [estimate.correction, estimate.linear] {
+            digest.update(&angle.0.to_le_bytes());
+        }
+    }
+    digest.finalize()
+}
+
+/// The images' random numbers (`src/bin/support`).
+struct Xorshift(u32);
+
+impl Xorshift {
+    fn within(&mut self, limit: i32) -> i32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        (self.0 >> 1) as i32 % (2 * limit + 1) - limit
+    }
 }

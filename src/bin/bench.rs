@@ -31,45 +31,22 @@ mod firmware {
     use crate::meter::Meter;
     use crate::random_records;
     use crate::support::Numbers;
-    use core::cell::RefCell;
     use core::hint::black_box;
-    use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
     use gyronet::model::gyronet::GyroNetState;
-    use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
-    use gyronet::nn::bilstm::{Layer, Run};
+    use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};
     use gyronet::nn::dense::Dense;
-    use gyronet::nn::lstm::{self, Direction, Scratch};
+    use gyronet::nn::lstm::{self, Scratch};
+    use gyronet::pipeline::{Pipeline, PipelineConfig};
+    use gyronet::sample::{ImuSample, PERIOD_US, Standstill, WHEELS, WheelSample};
+    use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
     use gyronet::window::{FEATURES, Features, WINDOW};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
     use stm32f4::stm32f405 as _;
 
-    random_records!(FOG_1_1, 90, 10, 80, 4);
-    random_records!(FOG_1_2, 90, 180, 27, 5);
-    random_records!(FOG_2_1, 60, 2, 127, 6);
     random_records!(FOG_2_2, 60, 120, 40, 3);
     random_records!(GYRO_1, 60, 6, 127, 2);
-
-    /// Steps of a FoGNet window.
-    const FOG_STEPS: usize = 60;
-
-    /// Working memory of a FoGNet window: its two networks run one after the other.
-    struct FogState {
-        input: [u32; FOG_STEPS * 5],
-        f1: [i32; FOG_STEPS],
-        between: [u32; FOG_STEPS * 90],
-        first: Scratch<90, 46>,
-        second: Scratch<60, 30>,
-    }
-
-    static FOG_STATE: Mutex<RefCell<FogState>> = Mutex::new(RefCell::new(FogState {
-        input: [0; _],
-        f1: [0; _],
-        between: [0; _],
-        first: Scratch::ZERO,
-        second: Scratch::ZERO,
-    }));
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -85,11 +62,10 @@ mod firmware {
     fn run(meter: &mut Meter) {
         meter.run("empty", || {});
         gyronet(meter);
+        pipeline(meter);
         kernels(meter);
         crate::parsers::run(meter);
-        cortex_m::interrupt::free(|cs| fognet(meter, &mut FOG_STATE.borrow(cs).borrow_mut()));
         hprintln!("gyronet/state bytes={}", size_of::<GyroNetState>());
-        hprintln!("fognet/state bytes={}", size_of::<FogState>());
         hprintln!("gyronet/weights bytes={}", weights::DEFAULT.0.len());
     }
 
@@ -135,6 +111,44 @@ mod firmware {
         }
     }
 
+    /// What the pipeline adds to the network: five samples with wheels that stand, one of which
+    /// takes an estimate back and hands out the next window.
+    fn pipeline(meter: &mut Meter) {
+        let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+        let mut numbers = Numbers::new(3);
+        let mut five_samples = |from: u32| {
+            for tick in from..from + 5 {
+                let time = Micros(u64::from(tick) * PERIOD_US);
+                let speeds = [Some(WheelSpeed(0)); WHEELS];
+                pipeline.wheels(WheelSample { time, speeds, standstill: Standstill::Still });
+                let sample = ImuSample {
+                    time,
+                    specific_force: [
+                        SpecificForce(numbers.within(1 << 14)),
+                        SpecificForce(0),
+                        SpecificForce(10_286_530),
+                    ],
+                    angular_rate: [AngularRate(0), AngularRate(0), AngularRate(numbers.within(1 << 18))],
+                    temperature: None,
+                    clipped: false,
+                };
+                if let Ok(output) = black_box(pipeline.process(black_box(sample)))
+                    && let Some(due) = output.window
+                {
+                    let estimate = Estimate {
+                        corrections: [AngularRate(1_000); WINDOW],
+                        scale: SCALE_MIN,
+                        clamped_inputs: 0,
+                    };
+                    pipeline.deliver(due.end, estimate);
+                }
+            }
+        };
+        // Past static initialisation and the first windows.
+        (0..80).for_each(|n| five_samples(5 * n));
+        meter.run("pipeline/five_samples", || five_samples(400));
+    }
+
     fn kernels(meter: &mut Meter) {
         let mut scratch = Scratch::<60, 30>::ZERO;
         let x = [0x0123_4567; 120];
@@ -146,49 +160,6 @@ mod firmware {
         meter.run("kernel/step_60", || lstm::step(&wide, projection, Some(a), cell_state, b));
         meter.run("kernel/dense_60", || {
             black_box(Dense::partial(black_box(&[3; 60]), b));
-        });
-    }
-
-    /// Both directions from one set of weights.
-    fn layer(direction: Direction<'_>) -> Layer<'_> {
-        Layer { forward: direction, backward: direction }
-    }
-
-    /// The recurrent part of FoGNet at its sizes, weights random: LSTM1 with FC1, then LSTM2.
-    fn fognet(meter: &mut Meter, state: &mut FogState) {
-        let FogState { input, f1, between, first, second } = state;
-        let mut numbers = Numbers::new(11);
-        input.iter_mut().for_each(|word| *word = gyronet::nn::pack(numbers.within(1024) as i16, 512));
-        let lstm1 = [layer(FOG_1_1.direction(90, 10)), layer(FOG_1_2.direction(90, 180))];
-        let lstm2 = [layer(FOG_2_1.direction(60, 2)), layer(FOG_2_2.direction(60, 120))];
-        meter.run("fognet/window", || {
-            let mut run = Run::new();
-            while run.advance(&lstm1, input, between, first, |_, step, hidden| {
-                f1[step] = f1[step].wrapping_add(Dense::partial(&[5; 90], hidden));
-            }) {}
-            for (word, sum) in input.iter_mut().zip(f1.iter()) {
-                *word = gyronet::nn::pack((*sum >> 16) as i16, 256);
-            }
-            let mut run = Run::new();
-            let mut f2 = 0i32;
-            while run.advance(
-                &lstm2,
-                &input[..FOG_STEPS],
-                &mut between[..FOG_STEPS * 60],
-                second,
-                |_, _, hidden| {
-                    f2 = f2.wrapping_add(Dense::partial(&[5; 60], hidden));
-                },
-            ) {}
-            black_box(f2);
-        });
-        let mut run = Run::new();
-        // Past both directions of layer 1, and the first piece of layer 2: the longest ones.
-        for _ in 0..=FOG_STEPS {
-            run.advance(&lstm1, input, between, first, |_, _, _| {});
-        }
-        meter.run("fognet/piece", || {
-            run.advance(&lstm1, input, between, first, |_, _, _| {});
         });
     }
 }

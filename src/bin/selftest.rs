@@ -1,5 +1,5 @@
 //! Self-test on the target's own instruction set: the kernels against their portable
-//! definition, bit for bit, and a hash of GyroNet's outputs that a host can recompute.
+//! definition, bit for bit, and hashes of both networks' outputs that a host can recompute.
 //!
 //! Runs in QEMU or on a board with semihosting; the exit status says whether all held.
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -16,9 +16,14 @@ mod support;
 mod firmware {
     use crate::random_records;
     use crate::support::Numbers;
+    use core::cell::RefCell;
+    use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
-    use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+    use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+    use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
     use gyronet::nn::lstm::{self, Direction, Scratch};
+    use gyronet::seconds::{Minute, Padding, STEPS, Second};
+    use gyronet::units::Angle;
     use gyronet::window::{FEATURES, Features, WINDOW};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
@@ -33,6 +38,9 @@ mod firmware {
 
     const ROUNDS: u32 = 40;
 
+    static FOG: Mutex<RefCell<(FogNetState, Minute)>> =
+        Mutex::new(RefCell::new((FogNetState::ZERO, Minute::EMPTY)));
+
     #[cortex_m_rt::entry]
     fn main() -> ! {
         let mut failed = 0;
@@ -46,6 +54,13 @@ mod firmware {
             Some(hash) => hprintln!("gyronet hash={:08x}", hash),
             None => {
                 hprintln!("FAILED: the weight file is refused");
+                failed += 1;
+            }
+        }
+        match cortex_m::interrupt::free(|cs| fognet_hash(&mut FOG.borrow(cs).borrow_mut())) {
+            Some(hash) => hprintln!("fognet hash={:08x}", hash),
+            None => {
+                hprintln!("FAILED: FoGNet's weight file is refused");
                 failed += 1;
             }
         }
@@ -122,6 +137,28 @@ mod firmware {
             let estimate = network.estimate(&window);
             for rate in estimate.corrections.iter().chain([&estimate.scale]) {
                 digest.update(&rate.0.to_le_bytes());
+            }
+        }
+        Some(digest.finalize())
+    }
+
+    /// CRC-32 over the estimates of three random windows.
+    fn fognet_hash((state, minute): &mut (FogNetState, Minute)) -> Option<u32> {
+        let mut network = FogNet::new(FogBlob::new_checked(&weights::FOGNET.0).ok()?, state);
+        let mut numbers = Numbers::new(8);
+        let mut digest = gyronet::model::blob::CRC.digest();
+        for _ in 0..3 {
+            for _ in 0..STEPS {
+                // +-10 m/s^2, +-0.25 rad/s, +-160 m/s; +-0.5 rad.
+                let features = core::array::from_fn(|k| {
+                    numbers.within(if (3..=5).contains(&k) { 1 << 25 } else { 10 << 20 })
+                });
+                let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
+                minute.push(Second { features, turn });
+            }
+            let estimate = network.estimate(&minute.window(Padding::None)?);
+            for angle in [estimate.correction, estimate.linear] {
+                digest.update(&angle.0.to_le_bytes());
             }
         }
         Some(digest.finalize())

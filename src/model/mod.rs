@@ -1,11 +1,17 @@
 //! The networks of the paper, with their topology, on top of [`crate::nn`].
 
 pub mod blob;
+mod file;
+pub mod fognet;
+pub mod fognet_blob;
+pub mod fognet_f32;
 pub mod gyronet;
 pub mod gyronet_f32;
 pub mod weights;
 
 pub use blob::{Blob, BlobError};
+pub use fognet::FogNet;
+pub use fognet_blob::FogBlob;
 pub use gyronet::GyroNet;
 
 use crate::units::AngularRate;

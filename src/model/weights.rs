@@ -1,4 +1,5 @@
-//! The weights that come with the library: GyroNet trained on drives of one car.
+//! The weights that come with the library: GyroNet trained on drives of one car, FoGNet trained
+//! on simulated ones.
 //!
 //! Where they come from stands in their provenance ([`super::Blob::provenance`]). An image
 //! that does not use them does not contain them.
@@ -10,3 +11,9 @@ const BYTES: &[u8; include_bytes!("../../tools/weights/gyronet.blob").len()] =
 
 /// A weight file, on the boundary that [`super::Blob::new_checked`] wants.
 pub static DEFAULT: Aligned<[u8; BYTES.len()]> = Aligned(*BYTES);
+
+const FOGNET_BYTES: &[u8; include_bytes!("../../tools/weights/fognet.blob").len()] =
+    include_bytes!("../../tools/weights/fognet.blob");
+
+/// A weight file of FoGNet's, on the boundary that [`super::FogBlob::new_checked`] wants.
+pub static FOGNET: Aligned<[u8; FOGNET_BYTES.len()]> = Aligned(*FOGNET_BYTES);

@@ -1,6 +1,7 @@
 //! Calibration at rest: the gyro's bias, and how the sensor is tilted on level ground.
 
 use crate::bias::{StaticConfig, StaticError, StaticInit};
+use crate::mounting::{LevelError, Rotation};
 use crate::sample::ImuSample;
 use crate::store::calibration::MAX_TILT_DEG;
 use crate::store::{Calibration, Level, Mounting};
@@ -29,6 +30,8 @@ pub enum CalibrationFault {
     Clipped,
     /// More than 45 deg from level: the configured rotation is wrong, deg.
     Tilted(f32),
+    /// The mean specific force is not gravity, m/s^2.
+    NotGravity(f32),
 }
 
 /// How a calibration goes.
@@ -51,15 +54,13 @@ pub enum State {
 pub struct Calibrator {
     task: Task,
     still: StaticInit,
-    /// Sums of specific force codes.
-    force: [i64; 3],
 }
 
 impl Calibrator {
     /// Starts collecting.
     #[must_use]
     pub fn new(task: Task, limits: StaticConfig) -> Self {
-        Self { task, still: StaticInit::new(limits), force: [0; 3] }
+        Self { task, still: StaticInit::new(limits) }
     }
 
     /// What it looks for.
@@ -78,33 +79,34 @@ impl Calibrator {
         if sample.clipped {
             return Some(Err(CalibrationFault::Clipped));
         }
-        for (sum, force) in self.force.iter_mut().zip(sample.specific_force) {
-            *sum += i64::from(force.0);
-        }
         let judged = self.still.process(sample)?;
-        Some(judged.map_err(moving).and_then(|gyro_bias| {
+        Some(judged.map_err(fault).and_then(|rest| {
             match self.task {
-                Task::Static => calibration.add_bias(gyro_bias, sample.temperature),
-                Task::Mounting => calibration.level = Some(level(self.force, mounting)?),
+                Task::Static => calibration.add_bias(rest.angular_rate, sample.temperature),
+                Task::Mounting => calibration.level = Some(level(rest.specific_force, mounting)?),
             }
             Ok(())
         }))
     }
 }
 
-fn moving(error: StaticError) -> CalibrationFault {
+fn fault(error: StaticError) -> CalibrationFault {
     CalibrationFault::Moving(match error {
         StaticError::GyroNoise { axis, .. }
         | StaticError::GyroDrift { axis, .. }
         | StaticError::GyroBias { axis, .. } => axis,
         StaticError::AccelNoise { axis, .. } | StaticError::AccelDrift { axis, .. } => 3 + axis,
         StaticError::Wheels => 6,
+        StaticError::Level(LevelError::UpsideDown(tilt)) => return CalibrationFault::Tilted(tilt),
+        StaticError::Level(LevelError::NotGravity(force)) => return CalibrationFault::NotGravity(force),
     })
 }
 
 /// Roll and pitch that gravity shows, after the configured rotation.
-fn level(force: [i64; 3], mounting: &Mounting) -> Result<Level, CalibrationFault> {
-    let [x, y, z] = mounting.rotate(force.map(|sum| sum as f32 / SpecificForce::PER_METRE_PER_SEC2));
+fn level(force: [SpecificForce; 3], mounting: &Mounting) -> Result<Level, CalibrationFault> {
+    // The angles have been checked to be finite.
+    let rotation = mounting.rotation().unwrap_or(Rotation::IDENTITY);
+    let [x, y, z] = rotation.force(force).map(|axis| axis.0 as f32);
     let roll_deg = libm::atan2f(y, z).to_degrees();
     let pitch_deg = libm::atan2f(-x, libm::hypotf(y, z)).to_degrees();
     let worst = libm::fabsf(roll_deg).max(libm::fabsf(pitch_deg));

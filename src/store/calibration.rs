@@ -2,6 +2,7 @@
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
+use crate::mounting::Rotation;
 use crate::units::{AngularRate, CentiCelsius};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -35,6 +36,14 @@ pub struct Level {
     pub roll_deg: f32,
     /// About y, deg.
     pub pitch_deg: f32,
+}
+
+impl Level {
+    /// From the configured frame into the vehicle's; `None` when an angle is not finite.
+    #[must_use]
+    pub fn rotation(&self) -> Option<Rotation> {
+        Rotation::from_mounting(self.roll_deg, self.pitch_deg, 0.0)
+    }
 }
 
 /// Bias, its temperature table, and the mounting as found on level ground.

@@ -2,9 +2,12 @@
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
-use crate::bias::StaticConfig;
+use super::{Calibration, Level};
+use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
 use crate::compensate::CompensateConfig;
+use crate::mounting::{Levelling, Rotation};
+use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
 use serde::{Deserialize, Serialize};
 
@@ -45,17 +48,10 @@ pub struct Mounting {
 }
 
 impl Mounting {
-    /// A vector of the sensor in the vehicle's axes.
+    /// From the sensor's axes into the vehicle's; `None` when an angle is not finite.
     #[must_use]
-    pub fn rotate(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        let turn = |degrees: f32, [a, b]: [f32; 2]| {
-            let (sin, cos) = libm::sincosf(degrees.to_radians());
-            [cos * a - sin * b, sin * a + cos * b]
-        };
-        let [y, z] = turn(self.roll_deg, [y, z]);
-        let [z, x] = turn(self.pitch_deg, [z, x]);
-        let [x, y] = turn(self.yaw_deg, [x, y]);
-        [x, y, z]
+    pub fn rotation(&self) -> Option<Rotation> {
+        Rotation::from_mounting(self.roll_deg, self.pitch_deg, self.yaw_deg)
     }
 }
 
@@ -91,6 +87,28 @@ impl Configuration {
     };
 }
 
+impl Configuration {
+    /// What it and a calibration mean for the pipeline. A level that was found on level ground is
+    /// the mounting: the street is not asked any more.
+    #[must_use]
+    pub fn pipeline(&self, calibration: &Calibration) -> PipelineConfig {
+        // All angles have been checked to be finite.
+        let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
+        let level = calibration.level.as_ref().and_then(Level::rotation);
+        PipelineConfig {
+            mounting: level.map_or(mounting, |level| mounting.then(&level)),
+            levelling: if level.is_some() { Levelling::Off } else { Levelling::DEFAULT },
+            static_init: self.static_init,
+            earth_rate: self
+                .latitude_deg
+                .and_then(Latitude::from_degrees)
+                .map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
+            compensate: self.compensate,
+            ..PipelineConfig::DEFAULT
+        }
+    }
+}
+
 impl Record for Configuration {
     const KEY: u8 = 1;
     const VERSION: u8 = 1;
@@ -99,7 +117,8 @@ impl Record for Configuration {
         Config::new(self.can).map_err(FieldError::Can)?;
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
-        let CompensateConfig { max_mean, max_carry } = self.compensate;
+        // What modes and lags there are, their types say.
+        let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_carry } = self.compensate;
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         for (field, value, low, high) in [
             (Field::LatitudeDeg, self.latitude_deg.unwrap_or(0.0), -90.0, 90.0),
@@ -112,6 +131,7 @@ impl Record for Configuration {
             (Field::StaticAccelDrift, accel_drift, 1e-4, 2.0),
             (Field::StaticGyroBias, gyro_bias, 1e-5, 1.0),
             (Field::CompensateMaxMean, rate(max_mean), 0.0, 0.5),
+            (Field::CompensateMaxSingle, rate(max_single), 0.0, 5.0),
             (Field::CompensateMaxCarry, rate(max_carry), 0.0, 0.5),
         ] {
             within(field, value, low, high)?;

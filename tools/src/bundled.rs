@@ -2,13 +2,20 @@
 //! f32 checkpoint of the default weights.
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::fog_checkpoint::FogCheckpoint;
 use crate::recording::{Recording, RecordingError};
+use crate::weight_file::WeightFileError;
+use gyronet::model::FogBlob;
+use gyronet::model::weights::FOGNET;
 
 /// What `gyronet simulate --seconds 90 --seed 1` writes.
 pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
 
 /// The checkpoint that [`gyronet::model::weights::DEFAULT`] was made from.
 const CHECKPOINT: &[u8] = include_bytes!("../weights/gyronet.safetensors");
+
+/// The checkpoint that [`gyronet::model::weights::FOGNET`] was made from.
+const FOG_CHECKPOINT: &[u8] = include_bytes!("../weights/fognet.safetensors");
 
 /// The simulated drive.
 ///
@@ -24,6 +31,23 @@ pub fn simulated_drive() -> Result<Recording, RecordingError> {
 /// Never, unless the repository is broken.
 pub fn checkpoint() -> Result<Checkpoint, CheckpointError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
+}
+
+/// FoGNet's f32 checkpoint.
+///
+/// # Errors
+/// Never, unless the repository is broken.
+pub fn fog_checkpoint() -> Result<FogCheckpoint, CheckpointError> {
+    FogCheckpoint::parse("fognet.safetensors", FOG_CHECKPOINT)
+}
+
+/// FoGNet's weights.
+///
+/// # Errors
+/// Never, unless the repository is broken.
+pub fn fog_blob() -> Result<FogBlob<'static>, WeightFileError> {
+    FogBlob::new_checked(&FOGNET.0)
+        .map_err(|source| WeightFileError::Blob { path: String::from("built-in FoGNet weights"), source })
 }
 
 #[cfg(test)]
@@ -51,5 +75,7 @@ mod tests {
     fn weights_are_what_quantize_makes() {
         let (bytes, _) = crate::quantize::quantize(&checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::DEFAULT.0, "run: gyronet quantize");
+        let (bytes, _) = crate::quantize::fognet::quantize(&fog_checkpoint().unwrap()).unwrap();
+        assert!(bytes == gyronet::model::weights::FOGNET.0, "run: gyronet quantize");
     }
 }

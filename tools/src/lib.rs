@@ -1,12 +1,16 @@
 //! gyronet on a host: read recordings, simulate, quantise, replay, evaluate, draw.
 
+pub mod ablation;
 pub mod bundled;
 pub mod candump;
 pub mod checkpoint;
 pub mod device;
 pub mod drive;
 pub mod evaluate;
+pub mod figures;
 pub mod fir;
+pub mod fog_checkpoint;
+pub mod fog_drive;
 pub mod image_size;
 pub mod image_stack;
 pub mod methods;
@@ -17,7 +21,12 @@ pub mod plot;
 pub mod quantization_error;
 pub mod quantize;
 pub mod recording;
+pub mod sequence;
 pub mod simulate;
+pub mod tables;
 pub mod target_bench;
+pub mod tensors;
+pub mod trajectory_error;
 pub mod via;
 pub mod weight_file;
+pub mod wheel_rates;

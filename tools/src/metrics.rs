@@ -52,7 +52,7 @@ impl YawError {
 }
 
 /// The same angle within -pi to pi.
-fn wrap(angle: f64) -> f64 {
+pub(crate) fn wrap(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 

@@ -1,6 +1,8 @@
 //! What quantisation adds: integer network against f32 network, window by window.
 
+use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::{Estimate, WindowNetwork};
+use gyronet::seconds::SecondsWindow;
 use gyronet::window::{Features, WINDOW};
 
 /// Runs two networks on every window, passes on the first one's estimate and sums up how far
@@ -42,7 +44,7 @@ impl QuantizationError {
     }
 }
 
-impl<'n, I: WindowNetwork, F: WindowNetwork> Both<'n, I, F> {
+impl<'n, I, F> Both<'n, I, F> {
     /// Nothing compared yet.
     pub fn new(integer: &'n mut I, reference: &'n mut F) -> Self {
         Self { integer, reference, error: QuantizationError::default() }
@@ -68,6 +70,19 @@ impl<I: WindowNetwork, F: WindowNetwork> WindowNetwork for Both<'_, I, F> {
             self.error.squared_difference += (ours - theirs) * (ours - theirs);
             self.error.squared_reference += theirs * theirs;
         }
+        integer
+    }
+}
+
+impl<I: MinuteNetwork, F: MinuteNetwork> MinuteNetwork for Both<'_, I, F> {
+    fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+        let integer = self.integer.estimate(window);
+        let reference = self.reference.estimate(window);
+        self.error.windows += 1;
+        self.error.clamped_inputs += u64::from(integer.clamped_inputs);
+        let (ours, theirs) = (integer.correction.rad(), reference.correction.rad());
+        self.error.squared_difference += (ours - theirs) * (ours - theirs);
+        self.error.squared_reference += theirs * theirs;
         integer
     }
 }

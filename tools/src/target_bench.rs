@@ -12,6 +12,8 @@ use std::process::Command;
 const TICKS_PER_1000: u64 = 168;
 /// The marker regions end here, and so does a hung image.
 const TIMEOUT_S: &str = "600";
+/// The images that count, one after the other.
+pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
 /// The emulated board.
 pub const MACHINE: &str = "netduinoplus2";
 /// The image's target.
@@ -64,6 +66,12 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// Puts what another image has counted behind.
+    pub fn extend(&mut self, other: Self) {
+        self.regions.extend(other.regions);
+        self.sizes.extend(other.sizes);
+    }
+
     /// The first region of a name.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Count> {
@@ -76,13 +84,15 @@ impl Counts {
         self.regions.iter().all(|count| count.cycles.is_some())
     }
 
-    /// All GyroNet windows, which must cost the same whatever they hold.
+    /// All windows of a network, which must cost the same whatever they hold.
     #[must_use]
     pub fn constant(&self) -> bool {
         let tolerance = if self.exact() { 0 } else { 12 };
-        let mut windows = self.starting_with("gyronet/window").map(|count| count.instructions);
-        let first = windows.next();
-        windows.all(|other| first.is_some_and(|first| first.abs_diff(other) <= tolerance))
+        ["gyronet/window", "fognet/window"].into_iter().all(|network| {
+            let mut windows = self.starting_with(network).map(|count| count.instructions);
+            let first = windows.next();
+            windows.all(|other| first.is_some_and(|first| first.abs_diff(other) <= tolerance))
+        })
     }
 
     /// All regions whose name begins so.

@@ -1,6 +1,6 @@
 //! A weight file (`.blob`) from disk, on the boundary that the library wants.
 
-use gyronet::model::{Blob, BlobError};
+use gyronet::model::{Blob, BlobError, FogBlob};
 use std::path::Path;
 
 /// Why a weight file cannot be used.
@@ -35,38 +35,75 @@ pub struct WeightFile {
 }
 
 impl WeightFile {
-    /// Reads and checks a file.
+    /// Reads and checks a file of GyroNet's.
     ///
     /// # Errors
     /// [`WeightFileError`], which names the file.
     pub fn read(path: &Path) -> Result<Self, WeightFileError> {
-        let name = path.display().to_string();
-        let bytes =
-            std::fs::read(path).map_err(|source| WeightFileError::Io { path: name.clone(), source })?;
-        Self::parse(&name, &bytes)
+        Self::parse(&path.display().to_string(), &bytes(path)?)
     }
 
-    /// Checks bytes; `path` is for messages.
+    /// Reads and checks a file of FoGNet's.
+    ///
+    /// # Errors
+    /// [`WeightFileError`], which names the file.
+    pub fn read_fognet(path: &Path) -> Result<Self, WeightFileError> {
+        Self::parse_fognet(&path.display().to_string(), &bytes(path)?)
+    }
+
+    /// Checks bytes of GyroNet's; `path` is for messages.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`] with that path.
     pub fn parse(path: &str, bytes: &[u8]) -> Result<Self, WeightFileError> {
-        let mut words = vec![0u32; bytes.len().div_ceil(4)];
-        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
-        let file = Self { path: path.to_owned(), words, len: bytes.len() };
+        let file = Self::copy(path, bytes);
         file.blob()?;
         Ok(file)
     }
 
-    /// The weights.
+    /// Checks bytes of FoGNet's; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`WeightFileError::Blob`] with that path.
+    pub fn parse_fognet(path: &str, bytes: &[u8]) -> Result<Self, WeightFileError> {
+        let file = Self::copy(path, bytes);
+        file.fog_blob()?;
+        Ok(file)
+    }
+
+    /// GyroNet's weights.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`]; never, once [`WeightFile::parse`] has succeeded.
     pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
-        let bytes: &[u8] = bytemuck::cast_slice(&self.words);
-        Blob::new_checked(&bytes[..self.len])
-            .map_err(|source| WeightFileError::Blob { path: self.path.clone(), source })
+        Blob::new_checked(self.bytes()).map_err(|source| self.refused(source))
     }
+
+    /// FoGNet's weights.
+    ///
+    /// # Errors
+    /// [`WeightFileError::Blob`]; never, once [`WeightFile::parse_fognet`] has succeeded.
+    pub fn fog_blob(&self) -> Result<FogBlob<'_>, WeightFileError> {
+        FogBlob::new_checked(self.bytes()).map_err(|source| self.refused(source))
+    }
+
+    fn copy(path: &str, bytes: &[u8]) -> Self {
+        let mut words = vec![0u32; bytes.len().div_ceil(4)];
+        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+        Self { path: path.to_owned(), words, len: bytes.len() }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..self.len]
+    }
+
+    fn refused(&self, source: BlobError) -> WeightFileError {
+        WeightFileError::Blob { path: self.path.clone(), source }
+    }
+}
+
+fn bytes(path: &Path) -> Result<Vec<u8>, WeightFileError> {
+    std::fs::read(path).map_err(|source| WeightFileError::Io { path: path.display().to_string(), source })
 }
 
 #[cfg(test)]

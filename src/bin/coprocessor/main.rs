@@ -35,8 +35,8 @@ mod firmware {
     use gyronet::can::slcan::port::Port;
     use gyronet::can::wheel::{WheelReceiver, WheelSettings};
     use gyronet::health::{Faults, count};
-    use gyronet::model::{GyroNet, WindowNetwork, weights};
-    use gyronet::pipeline::{Pipeline, PipelineConfig};
+    use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+    use gyronet::pipeline::Pipeline;
     use gyronet::sample::ImuSample;
     use gyronet::sensor::xsens::Mti;
     use gyronet::service::Device;
@@ -79,7 +79,7 @@ mod firmware {
             }
             // What has no place in time is counted and gives no frame.
             let Ok(output) = self.pipeline.process(sample) else { return };
-            self.device.observe(&sample, output.yaw_rate.tick, output.yaw_rate.status);
+            self.device.observe(&sample, output.prompt.tick, output.prompt.status);
             let mut vehicle = output.vehicle;
             vehicle.yaw.faults = vehicle.yaw.faults.with(self.faults());
             for frame in &self.feeds.process(&vehicle) {
@@ -160,7 +160,8 @@ mod firmware {
         }
     }
 
-    /// What is stored, and the network on the weights that are good.
+    /// What is stored, and the weights that are good. Without any the pipeline still runs: every
+    /// window is late, the status says degraded, and the rate is the gyro's less its static bias.
     #[inline(never)]
     fn device(identity: Identity, flash: Option<Flash>) -> Option<Loaded> {
         let flash = match flash {
@@ -169,25 +170,23 @@ mod firmware {
         };
         let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(PARTS) })?;
         device.begin(flash.map(Records), flash.map(Slots), identity);
-        // Without good weights the pipeline still runs: every window is late, the status says
-        // degraded, and the rate is the gyro's less its static bias.
-        let network = cortex_m::singleton!(: Option<GyroNet<'static>> = None)?;
-        if let Some(blob) = device.weights(flash.map(Flash::slots_at_start), &weights::DEFAULT.0) {
-            place(network, || GyroNet::new(blob));
-        }
-        Some((device, network))
+        let blob = device.weights(flash.map(Flash::slots_at_start), &weights::DEFAULT.0);
+        Some((device, blob))
     }
 
-    type Loaded = (&'static mut Device<Records, Slots>, &'static mut Option<GyroNet<'static>>);
+    type Loaded = (&'static mut Device<Records, Slots>, Option<Blob<'static>>);
 
     /// Everything that the image keeps, outside the stack; `None` when it has been made before.
     #[inline(never)]
     fn coprocessor(identity: Identity, flash: Option<Flash>) -> Option<&'static mut Coprocessor> {
-        let (device, network) = device(identity, flash)?;
-        let configuration = device.configuration();
-        let (static_init, compensate) = (configuration.static_init, configuration.compensate);
+        let (device, blob) = device(identity, flash)?;
+        let network = cortex_m::singleton!(: Option<GyroNet<'static>> = None)?;
+        if let Some(blob) = blob {
+            place(network, || GyroNet::new(blob));
+        }
+        let config = device.configuration().pipeline(device.calibration());
         let pipeline = cortex_m::singleton!(: Option<Pipeline> = None)?;
-        let pipeline = place(pipeline, || Pipeline::new(PipelineConfig { static_init, compensate }));
+        let pipeline = place(pipeline, || Pipeline::new(config));
         let coprocessor = cortex_m::singleton!(: Option<Coprocessor> = None)?;
         Some(place(coprocessor, || Coprocessor::new(device, network, pipeline)))
     }

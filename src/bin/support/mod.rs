@@ -1,28 +1,10 @@
 //! What the self-test and the bench share: reproducible numbers and weights of any size.
 
+mod numbers;
+
+pub use numbers::Numbers;
+
 use gyronet::nn::lstm::Direction;
-
-/// A generator for numbers that need to be varied, not good (xorshift32).
-#[derive(Clone, Copy)]
-pub struct Numbers(u32);
-
-impl Numbers {
-    pub const fn new(seed: u32) -> Self {
-        Self(seed)
-    }
-
-    pub const fn next(&mut self) -> u32 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 17;
-        self.0 ^= self.0 << 5;
-        self.0
-    }
-
-    /// Uniform in -`limit`..=`limit`.
-    pub const fn within(&mut self, limit: i32) -> i32 {
-        (self.next() >> 1) as i32 % (2 * limit + 1) - limit
-    }
-}
 
 /// Random input and recurrent records of one direction, made by the compiler and kept in flash.
 ///

@@ -30,8 +30,11 @@ const CMSIS_NN_S8: [(&str, u64, u64); 3] = [
 pub fn run(args: &Args, _common: Common) -> super::Result {
     let workspace = target_bench::workspace();
     let folder = workspace.join("target/images");
-    let image = target_bench::build(&workspace, "bench", &folder)?;
-    let counts = target_bench::measure(&workspace, &image)?;
+    let mut counts = Counts::default();
+    for image in target_bench::IMAGES {
+        let image = target_bench::build(&workspace, image, &folder)?;
+        counts.extend(target_bench::measure(&workspace, &image)?);
+    }
     let coprocessor = ImageSize::read(&target_bench::build(&workspace, "coprocessor", &folder)?)?;
     if args.json {
         println!("{}", json(&counts, &coprocessor));
@@ -42,7 +45,7 @@ pub fn run(args: &Args, _common: Common) -> super::Result {
         }
     }
     if !counts.constant() {
-        return Err("the count of a GyroNet window depends on its input".into());
+        return Err("the count of a window depends on its input".into());
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ pub mod bus;
 pub mod demo;
 pub mod device;
 pub mod evaluate;
+pub mod import;
 pub mod monitor;
 mod networks;
 mod progress;
@@ -12,6 +13,7 @@ pub mod quantize;
 pub mod replay;
 pub mod simulate;
 pub mod size;
+pub mod tables;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.

@@ -8,13 +8,13 @@ from pathlib import Path
 import torch
 from safetensors.torch import save_file
 
+from .fognet_model import FoGNet
 from .model import GyroNet
-from .recordings import WINDOW
 
 GOLDEN_WINDOWS = 8
 
 
-def export(model: GyroNet, provenance: dict, folder: Path, stem: str) -> list[Path]:
+def export(model: GyroNet | FoGNet, provenance: dict, folder: Path, stem: str) -> list[Path]:
     """Write STEM.safetensors and STEM.golden.safetensors; returns the paths."""
     checkpoint = folder / f"{stem}.safetensors"
     tensors = {name: t.detach().contiguous() for name, t in model.state_dict().items()}
@@ -26,11 +26,11 @@ def export(model: GyroNet, provenance: dict, folder: Path, stem: str) -> list[Pa
 
 
 @torch.no_grad()
-def golden_tensors(model: GyroNet) -> dict[str, torch.Tensor]:
+def golden_tensors(model: GyroNet | FoGNet) -> dict[str, torch.Tensor]:
     """Known answers: synthetic windows (noise about the means, two of them far out, one of
     zeros) and what every layer makes of them. No recording is in them."""
     generator = torch.Generator().manual_seed(20)
-    noise = torch.randn(GOLDEN_WINDOWS, WINDOW, 6, generator=generator)
+    noise = torch.randn(GOLDEN_WINDOWS, model.steps, len(model.input_mean), generator=generator)
     gain = torch.tensor([1.0, 1.0, 1.0, 1.0, 1.0, 4.0, 8.0, 0.0]).view(-1, 1, 1)
     x = model.input_mean + gain * model.input_std * noise
     x[-1] = 0.0

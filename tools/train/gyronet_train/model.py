@@ -9,6 +9,8 @@ from __future__ import annotations
 import torch
 from torch import nn
 
+from .recordings import WINDOW
+
 INPUTS = 6
 HIDDEN = 60
 
@@ -22,6 +24,8 @@ class GyroNet(nn.Module):
     corrected rates has. All ends are scaled inside, by constants that travel with
     the checkpoint.
     """
+
+    steps = WINDOW
 
     def __init__(self, input_mean: torch.Tensor, input_std: torch.Tensor, output_scale: float):
         super().__init__()

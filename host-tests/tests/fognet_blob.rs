@@ -1,0 +1,103 @@
+//! FoGNet's weight file: whatever is wrong with one, it is refused with the right reason.
+
+use gyronet::model::fognet_blob::{
+    BlobError, COLUMNS, FogBlob, HEADER_LEN, HIDDEN1, HIDDEN2, INPUTS, TOPOLOGY, file_len,
+};
+use gyronet::model::{Blob, blob, weights};
+use gyronet::nn::Aligned;
+use gyronet::nn::lstm::Direction;
+use gyronet_host_tests::noise::Noise;
+
+const LEN: usize = weights::FOGNET.0.len();
+type File = Box<Aligned<[u8; LEN]>>;
+
+fn file() -> File {
+    Box::new(weights::FOGNET)
+}
+
+/// With these bytes at an offset, and a checksum that fits.
+fn with(at: usize, bytes: &[u8]) -> BlobError {
+    let mut file = file();
+    file.0[at..at + bytes.len()].copy_from_slice(bytes);
+    let (content, stored) = file.0.split_last_chunk_mut().expect("longer than its checksum");
+    *stored = blob::CRC.checksum(content).to_le_bytes();
+    FogBlob::new_checked(&file.0).expect_err("something is wrong with it")
+}
+
+fn direction_len(units: usize, inputs: usize) -> usize {
+    4 * (Direction::input_words(units, inputs) + Direction::recurrent_words(units))
+}
+
+#[test]
+fn the_default_is_good_and_says_where_it_comes_from() {
+    let blob = FogBlob::new_checked(&weights::FOGNET.0).expect("it comes with the library");
+    assert!(blob.provenance.contains("checkpoint_sha256"));
+    assert!(blob.provenance.contains("\"simulated\":true"), "{}", blob.provenance);
+    assert_eq!(blob.gains.len(), 60);
+    assert_eq!(blob.lstm1[0].forward.inputs(), COLUMNS);
+    assert_eq!(blob.lstm2[1].backward.inputs(), 2 * HIDDEN2);
+    assert_eq!(blob.crc.to_le_bytes(), weights::FOGNET.0[LEN - 4..]);
+    println!("{LEN} bytes");
+    const { assert!(LEN <= 400 * 1024, "both networks and the image must fit 640 KB") };
+}
+
+#[test]
+fn each_network_refuses_the_others_file() {
+    let error = Blob::new_checked(&weights::FOGNET.0).expect_err("it is FoGNet's");
+    assert_eq!(error, BlobError::Topology { found: TOPOLOGY, expected: blob::TOPOLOGY });
+    let error = FogBlob::new_checked(&weights::DEFAULT.0).expect_err("it is GyroNet's");
+    assert_eq!(error, BlobError::Topology { found: blob::TOPOLOGY, expected: TOPOLOGY });
+    assert_eq!(
+        error.to_string(),
+        "weight file: network 1 with window 10, 6 inputs, 60 units, 2 layers is not FoGNet (2: 60, 9, 90, 2)"
+    );
+}
+
+#[test]
+fn every_other_length_and_place() {
+    let file = file();
+    let mut noise = Noise::new(2);
+    let lengths = (0..2_000).chain((0..200).map(|_| noise.int(2_000, LEN as i64 - 1) as usize));
+    for len in lengths {
+        let error = FogBlob::new_checked(&file.0[..len]).expect_err("it is cut off");
+        assert!(matches!(error, BlobError::Length { expected, found } if found == len && expected > len));
+    }
+    let mut shifted = vec![0u8; LEN + 8];
+    let start = shifted.as_ptr().align_offset(4) + 1;
+    shifted[start..start + LEN].copy_from_slice(&file.0);
+    assert_eq!(FogBlob::new_checked(&shifted[start..start + LEN]).err(), Some(BlobError::Misaligned));
+}
+
+#[test]
+fn rows_that_could_overflow() {
+    let provenance = LEN - file_len(0);
+    let first = HEADER_LEN + provenance;
+    let fc1 = first + 2 * (direction_len(HIDDEN1, COLUMNS) + direction_len(HIDDEN1, 2 * HIDDEN1));
+    let second = fc1 + 4 * HIDDEN1 + 8;
+    let fc2 = second + 2 * (direction_len(HIDDEN2, 2) + direction_len(HIDDEN2, 2 * HIDDEN2));
+    assert_eq!(fc2 + 4 * HIDDEN2 + 8 + 4, LEN);
+    for (layer, at) in [(0, first), (2, second)] {
+        let error = BlobError::RowBound { layer, direction: 0, unit: 0 };
+        assert_eq!(with(at, &i32::MAX.to_le_bytes()), error);
+        assert_eq!(with(at + 4, &[0, 0, 0, 0x80]), error);
+    }
+    for (row, columns) in [(fc1, 2 * HIDDEN1), (fc2, 2 * HIDDEN2)] {
+        assert_eq!(with(row, &[0xFF, 0x7F].repeat(columns)), BlobError::Scale);
+        assert_eq!(with(row + 2 * columns, &i32::MAX.to_le_bytes()), BlobError::Scale);
+    }
+    assert_eq!(with(24, &0i32.to_le_bytes()), BlobError::Scale);
+    assert_eq!(HEADER_LEN, 28 + 8 * INPUTS + 4 * 60 + 8);
+}
+
+#[test]
+fn flipped_bits_are_noticed() {
+    let mut file = file();
+    let mut noise = Noise::new(5);
+    for _ in 0..1_000 {
+        let bit = noise.int(0, 8 * LEN as i64 - 1) as usize;
+        file.0[bit / 8] ^= 1 << (bit % 8);
+        assert!(FogBlob::new_checked(&file.0).is_err(), "bit {bit}");
+        file.0[bit / 8] ^= 1 << (bit % 8);
+    }
+    assert!(FogBlob::new_checked(&file.0).is_ok());
+}

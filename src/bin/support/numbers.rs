@@ -1,0 +1,23 @@
+//! Reproducible numbers, shared by the images.
+
+/// A generator for numbers that need to be varied, not good (xorshift32).
+#[derive(Clone, Copy)]
+pub struct Numbers(u32);
+
+impl Numbers {
+    pub const fn new(seed: u32) -> Self {
+        Self(seed)
+    }
+
+    pub const fn next(&mut self) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        self.0
+    }
+
+    /// Uniform in -`limit`..=`limit`.
+    pub const fn within(&mut self, limit: i32) -> i32 {
+        (self.next() >> 1) as i32 % (2 * limit + 1) - limit
+    }
+}

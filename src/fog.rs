@@ -1,0 +1,185 @@
+//! From FoGNet's estimates to the turn that goes out, frame by frame.
+//!
+//! A window covers a minute, and there is a new one every second, so 60 windows cover each
+//! second. The estimate of the newest window is used in the second after next: whoever has time
+//! runs it meanwhile ([`FogOutput::due`], [`FogCorrector::deliver`]), and fast and slow machines
+//! emit the same.
+//!
+//! Which part of a window's correction belongs to which of its seconds the network says for what
+//! is linear in the gyro's increments, and for nothing else. So, with d a frame's increment, g the
+//! mean factor of the linear part, C the correction and L its linear part:
+//!
+//! `corrected = d - g d - (C - L) / 6000`
+//!
+//! The linear part (the error of the gyro's scale) is taken off the very frame that it belongs to.
+//! The rest is spread evenly over a window's length: 60 windows with a sixtieth of it each. Both
+//! divisions carry their remainders, so that the sum of what goes out is exact.
+//!
+//! Spreading all of C evenly would come to the same sum, but after a turn half a minute late.
+//! Taking differences of overlapping windows instead (what the newest window has and the one
+//! before it had not) makes 60 interleaved sums of single estimates, each with its own error.
+
+mod rate;
+
+pub use rate::{IncrementRate, PseudoFog};
+
+use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
+use crate::seconds::{FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow};
+use crate::units::Angle;
+
+/// Frames that a window's correction is spread over.
+const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;
+
+/// How FoGNet is used.
+#[derive(Debug, Clone, Copy)]
+pub struct FogConfig {
+    /// What stands in a window before a minute is over.
+    pub padding: Padding,
+    /// A larger correction of a window is not believed.
+    pub max_correction: Angle,
+}
+
+impl FogConfig {
+    /// A fibre-optic gyro on a car: 0.02 rad a minute is four times what Earth's rate can add to
+    /// it, and leaves room for 0.1 % of scale error over two full turns.
+    pub const DEFAULT: Self = Self { padding: Padding::Repeat, max_correction: Angle(351_843_720_888) };
+}
+
+/// A window's estimate was not believed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ImplausibleTurn {
+    /// The correction of the window.
+    pub correction: Angle,
+}
+
+/// What one frame led to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FogOutput {
+    /// The frame's turn less the correction; `None` where the gyro has a gap.
+    pub turn: Option<Angle>,
+    /// What was taken off.
+    pub correction: Angle,
+    /// Whether an estimate was in use for this frame.
+    pub corrected: bool,
+    /// A window is due: run [`FogCorrector::window`] through the network and
+    /// [`FogCorrector::deliver`] the estimate under this number within a second.
+    pub due: Option<u32>,
+    /// The window ended here; a new one has begun.
+    pub broken: Option<Incomplete>,
+    /// The estimate due with this frame was not believed.
+    pub implausible: Option<ImplausibleTurn>,
+    /// The estimate due with this frame has not come.
+    pub late: bool,
+}
+
+/// The gyro's corrections, and where the window stands.
+#[derive(Debug, Clone)]
+pub struct FogCorrector {
+    config: FogConfig,
+    sums: SecondSums,
+    minute: Minute,
+    /// Number of the next window.
+    next: u32,
+    /// The window that is out, and its estimate when delivered.
+    out: Option<(u32, Option<FogEstimate>)>,
+    estimate: Option<FogEstimate>,
+    /// What the divisions have left: of the linear part, of the spread part.
+    linear_rest: i128,
+    spread_rest: i64,
+}
+
+impl FogCorrector {
+    /// Before the first frame.
+    #[must_use]
+    pub const fn new(config: FogConfig) -> Self {
+        Self {
+            config,
+            sums: SecondSums::ZERO,
+            minute: Minute::EMPTY,
+            next: 0,
+            out: None,
+            estimate: None,
+            linear_rest: 0,
+            spread_rest: 0,
+        }
+    }
+
+    /// Takes one frame.
+    pub fn process(&mut self, frame: &FogFrame) -> FogOutput {
+        let correction = frame.turn.map_or(Angle::ZERO, |turn| self.correction(turn));
+        let mut output = FogOutput {
+            turn: frame.turn.map(|turn| Angle(turn.0.saturating_sub(correction.0))),
+            correction,
+            corrected: frame.turn.is_some() && self.estimate.is_some(),
+            due: None,
+            broken: None,
+            implausible: None,
+            late: false,
+        };
+        match self.sums.push(frame) {
+            Ok(None) => {}
+            Ok(Some(second)) => {
+                self.minute.push(second);
+                (output.implausible, output.late) = self.use_estimate();
+                if self.window().is_some() {
+                    output.due = Some(self.next);
+                    self.out = Some((self.next, None));
+                    self.next = self.next.wrapping_add(1);
+                }
+            }
+            Err(incomplete) => {
+                output.broken = Some(incomplete);
+                self.break_window();
+            }
+        }
+        output
+    }
+
+    /// The window that is due, until the next second is over.
+    #[must_use]
+    pub fn window(&self) -> Option<SecondsWindow<'_>> {
+        self.minute.window(self.config.padding)
+    }
+
+    /// Takes the estimate of a window that [`FogOutput::due`] announced. It is used when the next
+    /// second is over; one that comes later than that is not used.
+    pub fn deliver(&mut self, number: u32, estimate: FogEstimate) {
+        if let Some((due, slot @ None)) = &mut self.out
+            && *due == number
+        {
+            *slot = Some(estimate);
+        }
+    }
+
+    /// A window must not reach across a gap, and an estimate is not used across one.
+    pub fn break_window(&mut self) {
+        self.sums = SecondSums::ZERO;
+        self.minute.clear();
+        self.out = None;
+        self.estimate = None;
+    }
+
+    /// What to take off one frame's increment.
+    fn correction(&mut self, turn: Angle) -> Angle {
+        let Some(FogEstimate { correction, linear, gain, .. }) = self.estimate else { return Angle::ZERO };
+        let linear_part = self.linear_rest + i128::from(turn.0) * i128::from(gain);
+        self.linear_rest = linear_part & ((1 << GAIN_FRACTION_BITS) - 1);
+        // Below the increment itself, for the gain is below 1.
+        let linear_part = (linear_part >> GAIN_FRACTION_BITS) as i64;
+        let spread = self.spread_rest + correction.0.saturating_sub(linear.0);
+        self.spread_rest = spread.rem_euclid(WINDOW_FRAMES);
+        Angle(linear_part + spread.div_euclid(WINDOW_FRAMES))
+    }
+
+    fn use_estimate(&mut self) -> (Option<ImplausibleTurn>, bool) {
+        let Some((_, estimate)) = self.out.take() else { return (None, false) };
+        let max = self.config.max_correction.0;
+        let implausible = estimate
+            .filter(|estimate| !(-max..=max).contains(&estimate.correction.0))
+            .map(|estimate| ImplausibleTurn { correction: estimate.correction });
+        self.estimate = estimate.filter(|_| implausible.is_none());
+        (implausible, estimate.is_none())
+    }
+}

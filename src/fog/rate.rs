@@ -1,0 +1,41 @@
+//! Increments to rates and back, without losing anything in the sum.
+
+use crate::sample::RATE_HZ;
+use crate::units::{Angle, AngularRate};
+
+/// Codes of [`Angle`] in the turn that one code of [`AngularRate`] makes in a second.
+const CODES: i64 = 1 << (Angle::FRACTION_BITS - AngularRate::FRACTION_BITS);
+const FRAMES: i64 = RATE_HZ as i64;
+
+/// The mean rate of each frame. What rounding takes from one frame the next ones get: the sum of
+/// the rates times 10 ms is within one code of the sum of the turns.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct IncrementRate {
+    rest: i64,
+}
+
+impl IncrementRate {
+    /// Rate of a frame that turned by this much; saturates at the limits of [`AngularRate`].
+    pub fn rate(&mut self, turn: Angle) -> AngularRate {
+        let codes = turn.0.saturating_mul(FRAMES).saturating_add(self.rest);
+        let rate = codes.div_euclid(CODES).clamp(i32::MIN.into(), i32::MAX.into());
+        self.rest = codes.rem_euclid(CODES);
+        AngularRate(rate as i32)
+    }
+}
+
+/// A rate in the place of a fibre-optic gyro, the paper's future work: GyroNet's corrected rate
+/// becomes increments for FoGNet.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PseudoFog {
+    rest: i64,
+}
+
+impl PseudoFog {
+    /// Turn of one frame at this rate; the sum of the turns is exact.
+    pub fn turn(&mut self, rate: AngularRate) -> Angle {
+        let codes = i64::from(rate.0) * CODES + self.rest;
+        self.rest = codes.rem_euclid(FRAMES);
+        Angle(codes.div_euclid(FRAMES))
+    }
+}

@@ -1,0 +1,294 @@
+//! What the weight files of all networks have in common: header, checks, typed access in place.
+//!
+//! Little-endian; every field on a 4-byte boundary.
+//!
+//! | offset | type | field |
+//! |---|---|---|
+//! | 0 | 4 bytes | magic `GYRN` |
+//! | 4 | u16 | format version, 2 |
+//! | 6 | u16 | network, 1 = GyroNet, 2 = FoGNet |
+//! | 8 | u32 | length of the whole file, checksum included |
+//! | 12 | u16 x 4 | window, inputs, hidden units a direction, layers |
+//! | 20 | u32 | length P of the provenance text, a multiple of 4 (padded with spaces) |
+//! | 24 | i32 | input clamp L, in normalised Q10 |
+//! | 28 | (i32, i32) x inputs | offset and multiplier of each input, see [`Normalisation`] |
+//! | | | what the network adds: [`super::blob`], [`super::fognet_blob`] |
+//! | end - 4 | u32 | CRC-32 (ISO-HDLC, as in zip and Ethernet) of everything before it |
+//!
+//! A direction is its input records, then its recurrent records, as [`crate::nn::lstm`] lays
+//! them out; a row of an output layer is its int16 weights, then bias and multiplier.
+
+use crate::nn::lstm::{Direction, ROW_LIMIT, row_bound};
+use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
+use serde::{Deserialize, Serialize};
+
+/// First bytes of a weight file.
+pub const MAGIC: [u8; 4] = *b"GYRN";
+/// The format version that this code reads.
+pub const VERSION: u16 = 2;
+/// Network number of GyroNet.
+pub const GYRONET: u16 = 1;
+/// Network number of FoGNet.
+pub const FOGNET: u16 = 2;
+/// CRC-32 as in zip and Ethernet.
+pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+#[cfg(target_endian = "big")]
+compile_error!("weights are read in place as little-endian words");
+
+/// What a file says that it is: network number, window, inputs, hidden units, layers.
+pub type Topology = [u16; 5];
+
+/// Why a weight file is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum BlobError {
+    /// Does not begin with [`MAGIC`].
+    Magic([u8; 4]),
+    /// A format version that this code does not read.
+    Version(u16),
+    /// Not the network that was asked for, or not its shape.
+    Topology {
+        /// As found.
+        found: Topology,
+        /// As asked for.
+        expected: Topology,
+    },
+    /// Shorter or longer than its header and shape say.
+    Length {
+        /// Bytes there should be.
+        expected: usize,
+        /// Bytes there are.
+        found: usize,
+    },
+    /// The bytes do not begin on a 4-byte boundary.
+    Misaligned,
+    /// The checksum does not fit the content.
+    Crc {
+        /// Computed over the content.
+        computed: u32,
+        /// Stored at the end.
+        stored: u32,
+    },
+    /// The provenance is not UTF-8.
+    Provenance,
+    /// The input clamp is not within 1 to 32767, or an output could overflow.
+    Scale,
+    /// A gate row could overflow its accumulator.
+    RowBound {
+        /// Layer, 0 or 1; those of FoGNet's LSTM2 are 2 and 3.
+        layer: u8,
+        /// Direction, 0 forward, 1 backward.
+        direction: u8,
+        /// Unit.
+        unit: u16,
+    },
+}
+
+impl core::fmt::Display for BlobError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Magic(found) => write!(f, "weight file: magic is {found:02x?}, not {MAGIC:02x?}"),
+            Self::Version(found) => write!(f, "weight file: format version {found}, this reads {VERSION}"),
+            Self::Topology { found, expected } => {
+                let [network, window, inputs, hidden, layers] = found;
+                let [n, w, i, h, l] = expected;
+                let name = if n == FOGNET { "FoGNet" } else { "GyroNet" };
+                write!(
+                    f,
+                    "weight file: network {network} with window {window}, {inputs} inputs, {hidden} units, \
+                     {layers} layers is not {name} ({n}: {w}, {i}, {h}, {l})"
+                )
+            }
+            Self::Length { expected, found } => {
+                write!(f, "weight file: {found} bytes, should be {expected}")
+            }
+            Self::Misaligned => f.write_str("weight file: not on a 4-byte boundary"),
+            Self::Crc { computed, stored } => {
+                write!(f, "weight file: checksum is {computed:08x}, the file says {stored:08x}")
+            }
+            Self::Provenance => f.write_str("weight file: provenance is not UTF-8"),
+            Self::Scale => f.write_str("weight file: input clamp or output scale out of range"),
+            Self::RowBound { layer, direction, unit } => write!(
+                f,
+                "weight file: layer {layer}, direction {direction}, unit {unit} could overflow its accumulator"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for BlobError {}
+
+/// How a feature becomes a network input: `(code - offset) * multiplier / 2^31`, rounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Normalisation {
+    /// In the feature's code.
+    pub offset: i32,
+    /// Normalised Q10 per code, times 2^31.
+    pub multiplier: i32,
+}
+
+/// Bytes before what a network of so many inputs adds.
+pub(super) const fn header_len(inputs: usize) -> usize {
+    28 + 8 * inputs
+}
+
+/// Bytes of one direction.
+pub(super) const fn direction_len(units: usize, inputs: usize) -> usize {
+    4 * (Direction::input_words(units, inputs) + Direction::recurrent_words(units))
+}
+
+/// Bytes of two bidirectional layers.
+pub(super) const fn layers_len(units: usize, inputs: usize) -> usize {
+    2 * (direction_len(units, inputs) + direction_len(units, 2 * units))
+}
+
+/// Bytes of a row of an output layer.
+pub(super) const fn dense_len(columns: usize) -> usize {
+    2 * columns + 8
+}
+
+/// The header's fields, once they are known to fit the file.
+pub(super) struct Header<const INPUTS: usize> {
+    pub input_clamp: i16,
+    pub normalisation: [Normalisation; INPUTS],
+    pub provenance_len: usize,
+    pub crc: u32,
+}
+
+impl<const INPUTS: usize> Header<INPUTS> {
+    /// Checks header and checksum of a file that should be of this topology, and so long for
+    /// that length of provenance.
+    pub fn read(
+        reader: &mut Reader<'_>,
+        topology: Topology,
+        file_len: fn(usize) -> usize,
+    ) -> Result<Self, BlobError> {
+        let bytes = reader.bytes;
+        let magic: [u8; 4] = *reader.array()?;
+        if magic != MAGIC {
+            return Err(BlobError::Magic(magic));
+        }
+        let version = reader.u16()?;
+        if version != VERSION {
+            return Err(BlobError::Version(version));
+        }
+        let network = reader.u16()?;
+        let length = reader.i32()? as u32 as usize;
+        if length != bytes.len() {
+            return Err(BlobError::Length { expected: length, found: bytes.len() });
+        }
+        let found = [network, reader.u16()?, reader.u16()?, reader.u16()?, reader.u16()?];
+        if found != topology {
+            return Err(BlobError::Topology { found, expected: topology });
+        }
+        let provenance_len = reader.i32()? as u32 as usize;
+        let fits = provenance_len.is_multiple_of(4) && provenance_len < length;
+        if !fits || file_len(provenance_len) != length {
+            let expected = if fits { file_len(provenance_len) } else { file_len(0) };
+            return Err(BlobError::Length { expected, found: length });
+        }
+        let (content, stored) = bytes.split_at(length - 4);
+        let stored = stored.iter().rev().fold(0, |crc, byte| crc << 8 | u32::from(*byte));
+        let computed = CRC.checksum(content);
+        if computed != stored {
+            return Err(BlobError::Crc { computed, stored });
+        }
+        let input_clamp =
+            i16::try_from(reader.i32()?).ok().filter(|clamp| *clamp > 0).ok_or(BlobError::Scale)?;
+        let mut normalisation = [Normalisation { offset: 0, multiplier: 0 }; INPUTS];
+        for n in &mut normalisation {
+            *n = Normalisation { offset: reader.i32()?, multiplier: reader.i32()? };
+        }
+        Ok(Self { input_clamp, normalisation, provenance_len, crc: stored })
+    }
+}
+
+/// Proves that no input up to `input_max` can overflow a gate's accumulator.
+pub(super) fn check_rows(layers: &[Layer<'_>; 2], input_max: i32, first: u8) -> Result<(), BlobError> {
+    for ((l, layer), input_max) in (first..).zip(layers).zip([input_max, HIDDEN_MAX]) {
+        for (d, direction) in (0..).zip([&layer.forward, &layer.backward]) {
+            for unit in 0..direction.units() {
+                let bound = row_bound(direction, unit, input_max);
+                if bound.iter().zip(ROW_LIMIT).any(|(bound, limit)| *bound >= limit) {
+                    return Err(BlobError::RowBound { layer: l, direction: d, unit: unit as u16 });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Proves that no hidden state can overflow the sum of an output's row.
+pub(super) fn check_dense(row: &Dense<'_>) -> Result<(), BlobError> {
+    let sum: i64 = row.weights.iter().map(|w| i64::from(*w).abs() * i64::from(HIDDEN_MAX)).sum();
+    if sum + i64::from(row.bias).abs() >= 1 << 31 { Err(BlobError::Scale) } else { Ok(()) }
+}
+
+/// Takes typed slices off the front of the file.
+pub(super) struct Reader<'w> {
+    bytes: &'w [u8],
+    len: usize,
+    /// The shortest that a file of the network can be.
+    shortest: usize,
+}
+
+impl<'w> Reader<'w> {
+    pub fn new(bytes: &'w [u8], shortest: usize) -> Self {
+        Self { bytes, len: bytes.len(), shortest }
+    }
+
+    fn take(&mut self, len: usize) -> Result<&'w [u8], BlobError> {
+        let consumed = self.len - self.bytes.len();
+        let short = BlobError::Length { expected: (consumed + len).max(self.shortest), found: self.len };
+        let (head, tail) = self.bytes.split_at_checked(len).ok_or(short)?;
+        self.bytes = tail;
+        Ok(head)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<&'w [u8; N], BlobError> {
+        self.take(N)?.try_into().map_err(|_| BlobError::Misaligned)
+    }
+
+    fn u16(&mut self) -> Result<u16, BlobError> {
+        self.array().map(|bytes| u16::from_le_bytes(*bytes))
+    }
+
+    pub fn i32(&mut self) -> Result<i32, BlobError> {
+        self.array().map(|bytes| i32::from_le_bytes(*bytes))
+    }
+
+    /// `len` elements of T, in place.
+    pub fn slice<T: bytemuck::AnyBitPattern>(&mut self, len: usize) -> Result<&'w [T], BlobError> {
+        let bytes = self.take(len * size_of::<T>())?;
+        if !bytes.as_ptr().addr().is_multiple_of(4) {
+            return Err(BlobError::Misaligned);
+        }
+        bytemuck::try_cast_slice(bytes).map_err(|_| BlobError::Misaligned)
+    }
+
+    pub fn provenance(&mut self, len: usize) -> Result<&'w str, BlobError> {
+        let text = core::str::from_utf8(self.take(len)?).map_err(|_| BlobError::Provenance)?;
+        Ok(text.trim_end_matches(' '))
+    }
+
+    /// Two bidirectional layers.
+    pub fn layers(&mut self, units: usize, inputs: usize) -> Result<[Layer<'w>; 2], BlobError> {
+        let mut layer = |inputs| {
+            Ok(Layer { forward: self.direction(units, inputs)?, backward: self.direction(units, inputs)? })
+        };
+        Ok([layer(inputs)?, layer(2 * units)?])
+    }
+
+    fn direction(&mut self, units: usize, inputs: usize) -> Result<Direction<'w>, BlobError> {
+        let input = self.slice(Direction::input_words(units, inputs))?;
+        let recurrent = self.slice(Direction::recurrent_words(units))?;
+        Direction::new(units, inputs, input, recurrent).ok_or(BlobError::Misaligned)
+    }
+
+    /// A row of an output layer.
+    pub fn dense(&mut self, columns: usize) -> Result<Dense<'w>, BlobError> {
+        Ok(Dense { weights: self.slice(columns)?, bias: self.i32()?, multiplier: self.i32()? })
+    }
+}

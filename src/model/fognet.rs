@@ -1,0 +1,217 @@
+//! FoGNet in integers: a minute in, what the gyro erred by in that minute out.
+//!
+//! ```text
+//! 60 x 9 -> LSTM1, 2 x 90 both ways -> FC1 -> f1 (60)
+//! f1, gyro (60 x 2) -> LSTM2, 2 x 60 both ways -> FC2 of the last step -> f2
+//! gyro (60) -> FC3 -> f3
+//! f2, f3 -> FC4 -> correction = gyro - truth
+//! ```
+//!
+//! Section III-C of the paper. It does not say at which rate the window is sampled: with 1 s
+//! steps LSTM2's "N units" give 387,006 parameters, with any faster sampling millions.
+//!
+//! The gyro's increments reach the result on two ways. Through the LSTMs they go as int16; but
+//! what FC3 and FC4 make of them is linear, and a correction of 1e-4 rad of a turn of 10 rad is
+//! below the LSB of that. So [`FogBlob::gains`] holds FC3, FC4 and the scales multiplied out, and
+//! the linear part is computed from the increments themselves, in [`Angle`]: it is exact.
+
+use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
+use super::gyronet::normalise;
+use crate::nn::bilstm::{self, Run, Way};
+use crate::nn::lstm::Scratch;
+use crate::nn::{dense::Dense, pack, unpack};
+use crate::seconds::{STEPS, SecondsWindow};
+use crate::units::{Angle, AngularRate};
+
+/// Column of the gyro's increment.
+const GYRO: usize = INPUTS - 1;
+/// Bits between an [`Angle`] and the same angle turned in a second as [`AngularRate`].
+const ANGLE_TO_RATE: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
+/// Fraction bits of [`FogBlob::gains`].
+pub const GAIN_FRACTION_BITS: u32 = 31;
+
+/// What FoGNet made of a window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FogEstimate {
+    /// What the gyro turned too much in the window.
+    pub correction: Angle,
+    /// The part of it that is linear in the gyro's increments.
+    pub linear: Angle,
+    /// Mean over the steps of the linear part's factor: the error of the gyro's scale, Q31.
+    pub gain: i32,
+    /// Input values that had to be clamped to the network's range.
+    pub clamped_inputs: u16,
+}
+
+/// Whatever turns a minute into a correction: the integer network, the f32 reference.
+pub trait MinuteNetwork {
+    /// Runs the network over one window.
+    fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
+}
+
+/// Which of the two LSTMs is under way. `Idle` is zero, so that a state at rest needs no place in
+/// flash.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    Idle,
+    First(Run),
+    Second(Run),
+}
+
+/// Working memory of one window. Both LSTMs share it: they run one after the other.
+#[derive(Debug, Clone)]
+pub struct FogNetState {
+    input: [u32; STEPS * COLUMNS / 2],
+    between: [u32; STEPS * HIDDEN1],
+    first: Scratch<HIDDEN1, { HIDDEN1 / 2 + 1 }>,
+    second: Scratch<HIDDEN2, { HIDDEN2 / 2 }>,
+    f1: [i32; STEPS],
+    f2: i32,
+    linear: Angle,
+    clamped_inputs: u16,
+    stage: Stage,
+}
+
+impl FogNetState {
+    /// Nothing in it yet; a window leaves nothing for the next one either.
+    pub const ZERO: Self = Self {
+        input: [0; _],
+        between: [0; _],
+        first: Scratch::ZERO,
+        second: Scratch::ZERO,
+        f1: [0; _],
+        f2: 0,
+        linear: Angle::ZERO,
+        clamped_inputs: 0,
+        stage: Stage::Idle,
+    };
+}
+
+/// The integer network: weights in place, state the caller's, for it is too large to be moved
+/// about on a small stack.
+#[derive(Debug)]
+pub struct FogNet<'w, 's> {
+    blob: FogBlob<'w>,
+    state: &'s mut FogNetState,
+}
+
+impl<'w, 's> FogNet<'w, 's> {
+    /// A network over checked weights. A window that the state was at work on is dropped.
+    #[must_use]
+    pub fn new(blob: FogBlob<'w>, state: &'s mut FogNetState) -> Self {
+        state.stage = Stage::Idle;
+        Self { blob, state }
+    }
+
+    /// The weights that it runs on.
+    #[must_use]
+    pub fn blob(&self) -> &FogBlob<'w> {
+        &self.blob
+    }
+
+    /// Loads a window; [`FogNet::advance`] then runs it piece by piece. One that was under way is
+    /// dropped.
+    pub fn start(&mut self, window: &SecondsWindow<'_>) {
+        let Self { blob, state } = self;
+        let clamp = i32::from(blob.input_clamp);
+        state.clamped_inputs = 0;
+        let mut linear = 0i128;
+        for ((step, second), gain) in window.iter().enumerate().zip(blob.gains) {
+            linear += i128::from(second.turn.0) * i128::from(*gain);
+            let turn = (second.turn.0 >> ANGLE_TO_RATE).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+            let codes = second.features.into_iter().chain([turn]);
+            let mut values = [0; COLUMNS];
+            for ((to, code), n) in values.iter_mut().zip(codes).zip(&blob.normalisation) {
+                let value = normalise(code, *n);
+                let inside = value.clamp(-clamp, clamp);
+                state.clamped_inputs += u16::from(inside != value);
+                *to = inside as i16;
+            }
+            for (k, [first, second]) in values.as_chunks::<2>().0.iter().enumerate() {
+                state.input[bilstm::word_index(step, 2 * k, COLUMNS)] = pack(*first, *second);
+            }
+        }
+        let linear = (linear + (1 << (GAIN_FRACTION_BITS - 1))) >> GAIN_FRACTION_BITS;
+        state.linear = Angle(linear.clamp(i64::MIN.into(), i64::MAX.into()) as i64);
+        state.f1 = [blob.fc1.bias; STEPS];
+        state.f2 = blob.fc2.bias;
+        state.stage = Stage::First(Run::new());
+    }
+
+    /// Does a bounded piece of the window (two steps of one direction of one layer); returns the
+    /// estimate with the last one, `None` before that and when none is under way.
+    pub fn advance(&mut self) -> Option<FogEstimate> {
+        let Self { blob, state } = self;
+        let FogNetState { input, between, first, second, f1, f2, stage, .. } = state;
+        match stage {
+            Stage::Idle => None,
+            Stage::First(run) => {
+                let more = run.advance(&blob.lstm1, input, between, first, |way, step, hidden| {
+                    f1[step] = f1[step].wrapping_add(half(blob.fc1.weights, way, hidden));
+                });
+                if !more {
+                    state.load_second(blob);
+                }
+                None
+            }
+            Stage::Second(run) => {
+                let mut last = false;
+                let (input, between) = (&input[..STEPS], &mut between[..STEPS * HIDDEN2]);
+                run.advance(&blob.lstm2, input, between, second, |way, step, hidden| {
+                    if step == STEPS - 1 {
+                        *f2 = f2.wrapping_add(half(blob.fc2.weights, way, hidden));
+                        // FC2 takes the last step, and the way back begins with it.
+                        last = way == Way::Backward;
+                    }
+                });
+                last.then(|| {
+                    state.stage = Stage::Idle;
+                    state.estimate(blob)
+                })
+            }
+        }
+    }
+}
+
+/// What one direction's hidden state adds to a row over both.
+fn half(weights: &[i16], way: Way, hidden: &[u32]) -> i32 {
+    let (forward, backward) = weights.split_at(weights.len() / 2);
+    Dense::partial(if way == Way::Forward { forward } else { backward }, hidden)
+}
+
+impl FogNetState {
+    /// LSTM2's input, in the place of LSTM1's: f1 and the gyro.
+    fn load_second(&mut self, blob: &FogBlob<'_>) {
+        let clamp = i32::from(blob.input_clamp);
+        for step in 0..STEPS {
+            // Ahead of what is written: five words a step are read, one is written.
+            let (gyro, _) = unpack(self.input[bilstm::word_index(step, GYRO, COLUMNS)]);
+            let f1 = blob.fc1.scale(self.f1[step]).clamp(-clamp, clamp);
+            self.input[bilstm::word_index(step, 0, 2)] = pack(f1 as i16, gyro as i16);
+        }
+        self.stage = Stage::Second(Run::new());
+    }
+
+    fn estimate(&self, blob: &FogBlob<'_>) -> FogEstimate {
+        let correction = Angle(self.linear.0.saturating_add(blob.spread(self.f2).0));
+        FogEstimate {
+            correction,
+            linear: self.linear,
+            gain: blob.mean_gain(),
+            clamped_inputs: self.clamped_inputs,
+        }
+    }
+}
+
+impl MinuteNetwork for FogNet<'_, '_> {
+    fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+        self.start(window);
+        loop {
+            // A run takes a fixed number of pieces, whatever the window holds.
+            if let Some(estimate) = self.advance() {
+                return estimate;
+            }
+        }
+    }
+}

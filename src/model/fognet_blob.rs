@@ -1,0 +1,110 @@
+//! FoGNet's weight file, ready for the kernels, checked before use.
+//!
+//! The header of [`super::file`], then:
+//!
+//! | offset | type | field |
+//! |---|---|---|
+//! | 100 | i32 x 60 | [`FogBlob::gains`] |
+//! | 340 | i32, i32 | lower and upper half of [`FogBlob::offset`] |
+//! | 348 | P bytes | provenance, UTF-8 JSON |
+//! | 348 + P | | LSTM1's four directions, of 10 inputs: the tenth is not used |
+//! | ... | i16 x 180, i32, i32 | FC1: weights, bias, multiplier to a normalised Q10 |
+//! | ... | | LSTM2's four directions, of 2 inputs |
+//! | ... | i16 x 120, i32, i32 | FC2 times FC4: weights, bias, multiplier |
+
+pub use super::file::{BlobError, FOGNET, Normalisation, Topology};
+
+use super::file::{Header, Reader, check_dense, check_rows, dense_len, header_len, layers_len};
+use crate::nn::{bilstm::Layer, dense::Dense};
+use crate::seconds::{self, STEPS};
+use crate::units::Angle;
+
+/// Units of LSTM1 a direction (section III-C of the paper).
+pub const HIDDEN1: usize = 90;
+/// Units of LSTM2 a direction: "N units".
+pub const HIDDEN2: usize = STEPS;
+/// Features of a step: those of [`crate::seconds`], and the gyro's increment.
+pub const INPUTS: usize = seconds::FEATURES + 1;
+/// Columns of LSTM1's input: the features, and one that is zero to make them even.
+pub const COLUMNS: usize = INPUTS + 1;
+/// Fraction bits of the factor that makes an angle of FC2's sum.
+pub const CORRECTION_SHIFT: u32 = 16;
+/// Bytes before the provenance text.
+pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8;
+/// What the header must say.
+pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2];
+
+/// A weight file that has passed all checks.
+#[derive(Debug, Clone, Copy)]
+pub struct FogBlob<'w> {
+    /// Where the weights come from: JSON.
+    pub provenance: &'w str,
+    /// One for each feature.
+    pub normalisation: [Normalisation; INPUTS],
+    /// Network inputs are clamped to +- this, Q10.
+    pub input_clamp: i16,
+    /// What FC3, FC4 and all scales make of an increment: correction over increment, Q31.
+    pub gains: &'w [i32],
+    /// The correction that is there whatever the inputs: all biases of FC2, FC3 and FC4.
+    pub offset: Angle,
+    /// The two layers of LSTM1.
+    pub lstm1: [Layer<'w>; 2],
+    /// FC1.
+    pub fc1: Dense<'w>,
+    /// The two layers of LSTM2.
+    pub lstm2: [Layer<'w>; 2],
+    /// FC2, and what FC4 makes of it.
+    pub fc2: Dense<'w>,
+    /// The file's own checksum: the name of this set of weights.
+    pub crc: u32,
+}
+
+/// Bytes of a FoGNet file with `provenance` bytes of padded text.
+#[must_use]
+pub const fn file_len(provenance: usize) -> usize {
+    HEADER_LEN
+        + provenance
+        + layers_len(HIDDEN1, COLUMNS)
+        + dense_len(2 * HIDDEN1)
+        + layers_len(HIDDEN2, 2)
+        + dense_len(2 * HIDDEN2)
+        + 4
+}
+
+impl<'w> FogBlob<'w> {
+    /// Checks everything about a weight file, then gives access to it in place.
+    ///
+    /// # Errors
+    /// [`BlobError`], which names the first thing that is wrong.
+    pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
+        let mut reader = Reader::new(bytes, file_len(0));
+        let Header { input_clamp, normalisation, provenance_len, crc } =
+            Header::read(&mut reader, TOPOLOGY, file_len)?;
+        let gains = reader.slice(STEPS)?;
+        let (low, high) = (reader.i32()? as u32, reader.i32()?);
+        let offset = Angle(i64::from(high) << 32 | i64::from(low));
+        let provenance = reader.provenance(provenance_len)?;
+        let (lstm1, fc1) = (reader.layers(HIDDEN1, COLUMNS)?, reader.dense(2 * HIDDEN1)?);
+        let (lstm2, fc2) = (reader.layers(HIDDEN2, 2)?, reader.dense(2 * HIDDEN2)?);
+        check_rows(&lstm1, input_clamp.into(), 0)?;
+        check_rows(&lstm2, input_clamp.into(), 2)?;
+        check_dense(&fc1)?;
+        check_dense(&fc2)?;
+        Ok(Self { provenance, normalisation, input_clamp, gains, offset, lstm1, fc1, lstm2, fc2, crc })
+    }
+
+    /// The correction that a whole sum of [`FogBlob::fc2`] makes, without the linear part.
+    #[must_use]
+    pub fn spread(&self, sum: i32) -> Angle {
+        let product = i64::from(sum) * i64::from(self.fc2.multiplier) + (1 << (CORRECTION_SHIFT - 1));
+        Angle(self.offset.0.saturating_add(product >> CORRECTION_SHIFT))
+    }
+
+    /// Mean of [`FogBlob::gains`].
+    #[must_use]
+    pub fn mean_gain(&self) -> i32 {
+        let sum: i64 = self.gains.iter().map(|gain| i64::from(*gain)).sum();
+        // A mean of int32s fits an int32.
+        sum.div_euclid(STEPS as i64) as i32
+    }
+}

@@ -1,0 +1,117 @@
+//! FoGNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
+
+use super::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
+use super::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
+use crate::nn::reference::{LstmWeights, dense, lstm};
+use crate::seconds::{STEPS, SecondsWindow};
+use crate::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
+
+/// FoGNet's tensors, with the names and layouts of the checkpoint.
+#[derive(Debug, Clone, Copy)]
+pub struct FogNetF32<'w> {
+    /// Mean of each feature: m/s^2, rad/s, m, rad.
+    pub input_mean: [f32; INPUTS],
+    /// Standard deviation of each feature.
+    pub input_std: [f32; INPUTS],
+    /// rad per unit of the last layer.
+    pub correction_scale: f32,
+    /// Layer 1, then layer 2; forward, backward.
+    pub lstm1: [[LstmWeights<'w>; 2]; 2],
+    /// (180) and a scalar.
+    pub fc1: (&'w [f32], f32),
+    /// Layer 1, then layer 2; forward, backward.
+    pub lstm2: [[LstmWeights<'w>; 2]; 2],
+    /// (120) and a scalar.
+    pub fc2: (&'w [f32], f32),
+    /// (60) and a scalar.
+    pub fc3: (&'w [f32], f32),
+    /// (2) and a scalar.
+    pub fc4: (&'w [f32], f32),
+}
+
+/// The layers' outputs for one window.
+#[derive(Debug, Clone)]
+pub struct FogLayerOutputs {
+    /// Features less mean, over standard deviation.
+    pub normalised: [[f32; INPUTS]; STEPS],
+    /// FC1 of LSTM1, in units of the gyro's normalised increments.
+    pub f1: [f32; STEPS],
+    /// LSTM2's hidden state at the last step, forward then backward.
+    pub layer2_last: [f32; 2 * HIDDEN2],
+    /// FC2 of it.
+    pub f2: f32,
+    /// FC3 of the gyro's normalised increments.
+    pub f3: f32,
+    /// What the gyro turned too much, rad.
+    pub correction: f32,
+    /// What the vehicle turned, rad.
+    pub prediction: f32,
+}
+
+/// Two bidirectional layers over a sequence.
+fn two_layers<const I: usize, const H: usize, const W: usize>(
+    weights: &[[LstmWeights<'_>; 2]; 2],
+    x: &[[f32; I]; STEPS],
+) -> [[f32; W]; STEPS] {
+    let mut between = [[0.0; W]; STEPS];
+    let mut output = [[0.0; W]; STEPS];
+    let [first, second] = weights;
+    for (way, backward) in [false, true].into_iter().enumerate() {
+        lstm::<I, H, W>(&first[way], x, backward, &mut between, way * H);
+    }
+    for (way, backward) in [false, true].into_iter().enumerate() {
+        lstm::<W, H, W>(&second[way], &between, backward, &mut output, way * H);
+    }
+    output
+}
+
+impl FogNetF32<'_> {
+    /// Runs the network over features in m/s^2, rad/s, m and rad.
+    #[must_use]
+    pub fn layers(&self, window: &[[f32; INPUTS]; STEPS]) -> FogLayerOutputs {
+        let normalised = window
+            .map(|features| core::array::from_fn(|k| (features[k] - self.input_mean[k]) / self.input_std[k]));
+        let gyro = normalised.map(|features| features[INPUTS - 1]);
+        let f1 = two_layers::<INPUTS, HIDDEN1, { 2 * HIDDEN1 }>(&self.lstm1, &normalised)
+            .map(|hidden| dense(self.fc1.0, self.fc1.1, &hidden));
+        let second: [[f32; 2]; STEPS] = core::array::from_fn(|step| [f1[step], gyro[step]]);
+        let [.., layer2_last] = two_layers::<2, HIDDEN2, { 2 * HIDDEN2 }>(&self.lstm2, &second);
+        let f2 = dense(self.fc2.0, self.fc2.1, &layer2_last);
+        let f3 = dense(self.fc3.0, self.fc3.1, &gyro);
+        let correction = dense(self.fc4.0, self.fc4.1, &[f2, f3]) * self.correction_scale;
+        let turn: f32 = window.iter().map(|features| features[INPUTS - 1]).sum();
+        FogLayerOutputs { normalised, f1, layer2_last, f2, f3, correction, prediction: turn - correction }
+    }
+
+    /// What FC3, FC4 and the scales make of a step's increment: rad of correction per rad.
+    fn gain(&self, step: usize) -> f32 {
+        self.correction_scale * self.fc4.0[1] * self.fc3.0[step] / self.input_std[INPUTS - 1]
+    }
+}
+
+impl MinuteNetwork for FogNetF32<'_> {
+    fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+        let mut features = [[0.0; INPUTS]; STEPS];
+        let mut linear = 0.0;
+        for ((step, second), row) in window.iter().enumerate().zip(&mut features) {
+            let [fx, fy, fz, rx, ry, rz, left, right] = second.features.map(|code| code as f32);
+            let force = [fx, fy, fz].map(|code| code / SpecificForce::PER_METRE_PER_SEC2);
+            let rate = [rx, ry, rz].map(|code| code / AngularRate::PER_RAD_PER_SEC);
+            let way = [left, right].map(|code| code / (1u32 << WheelSpeed::FRACTION_BITS) as f32);
+            let turn = second.turn.rad() as f32;
+            let all = force.into_iter().chain(rate).chain(way).chain([turn]);
+            row.iter_mut().zip(all).for_each(|(to, value)| *to = value);
+            linear += self.gain(step) * turn;
+        }
+        let correction = self.layers(&features).correction;
+        let mean_gain = (0..STEPS).map(|step| self.gain(step)).sum::<f32>() / STEPS as f32;
+        // A number that does not fit is as implausible as the largest one that does.
+        let angle = |rad| Angle::from_rad(rad).unwrap_or(Angle(i64::MAX));
+        FogEstimate {
+            correction: angle(correction),
+            linear: angle(linear),
+            gain: libm::roundf(mean_gain * (1u32 << GAIN_FRACTION_BITS) as f32) as i32,
+            clamped_inputs: 0,
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! `gyronet tables`: the paper's evaluation on the sequences at hand.
+
+use super::networks::Weights;
+use super::{Common, WriteError, import, progress};
+use gyronet::model::fognet::FogNetState;
+use gyronet::model::{FogNet, GyroNet};
+use gyronet_tools::bundled;
+use gyronet_tools::sequence::{self, Sequence};
+use gyronet_tools::simulate::layout::Layout;
+use gyronet_tools::tables::results::{Results, SequenceErrors};
+use gyronet_tools::tables::{html, methods, pictures, table};
+use gyronet_tools::weight_file::WeightFile;
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Compute the paper's Tables I, II, III, V, VI and VII, as far as the sequences at hand have
+/// figures for them, beside what the paper prints; draw its Figs. 6, 7, 9, 10 and 11.
+///
+/// Sequences are folders in the layout of KAIST Complex Urban or NCLT, real ones or those of
+/// `gyronet simulate --layout`; figures of simulated ones are marked so. The vehicle stands still
+/// for the first 3 s, or what needs static initialisation is left out and the reason said.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Args {
+    /// Sequences, or folders that hold some.
+    #[arg(required = true, value_name = "DIR")]
+    folders: Vec<PathBuf>,
+    /// Print JSON instead of tables: every method's errors on each sequence, and their means.
+    #[arg(long)]
+    json: bool,
+    /// Write report.html (one page with all tables and pictures) and each picture as SVG here.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Weight file of GyroNet, instead of the one that comes with the library.
+    #[arg(long, value_name = "BLOB")]
+    weights: Option<PathBuf>,
+    /// Weight file of FoGNet, instead of the one that comes with the library.
+    #[arg(long, value_name = "BLOB")]
+    fog_weights: Option<PathBuf>,
+}
+
+/// Name of a sequence's pictures: folders of different data sets may have the same name.
+fn title(sequence: &Sequence, number: usize) -> String {
+    let layout = match sequence.layout {
+        Layout::Kaist => "kaist",
+        Layout::Nclt => "nclt",
+    };
+    format!("{:02}-{layout}-{}", number + 1, sequence.name)
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let weights = Weights::open(args.weights.as_deref())?;
+    let mut network = GyroNet::new(weights.blob()?);
+    let fog_weights = args.fog_weights.as_deref().map(WeightFile::read_fognet).transpose()?;
+    let fog_blob = match &fog_weights {
+        Some(file) => file.fog_blob()?,
+        None => bundled::fog_blob()?,
+    };
+    let mut fog_state = FogNetState::ZERO;
+    let mut fognet = FogNet::new(fog_blob, &mut fog_state);
+    let mut folders = Vec::new();
+    for folder in &args.folders {
+        folders.extend(sequence::find(folder)?);
+    }
+    let (mut all, mut drawn) = (Vec::new(), Vec::new());
+    for folder in &folders {
+        let sequence = import::read(folder, common)?;
+        let bar = progress::bar(common, 3 * sequence.steps.len(), &sequence.name);
+        let mut estimates = methods::run(&sequence, &mut network, || bar.inc(1));
+        estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
+        bar.finish_and_clear();
+        let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
+        if args.out.is_some() {
+            drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)?));
+        }
+        all.push(errors);
+    }
+    let results = Results::new(all);
+    let tables = table::tables(&results);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        serde_json::to_writer_pretty(&mut out, &results).map_err(std::io::Error::from)?;
+        writeln!(out)?;
+    } else {
+        tables.iter().try_for_each(|table| writeln!(out, "{table}"))?;
+    }
+    let Some(folder) = &args.out else { return Ok(()) };
+    fs::create_dir_all(folder).map_err(WriteError::to(folder))?;
+    let write = |name: String, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).map_err(WriteError::to(&path))
+    };
+    write(String::from("report.html"), &html::page(&tables, &drawn))?;
+    for (sequence, pictures) in &drawn {
+        for picture in pictures {
+            write(format!("{sequence}-{}.svg", picture.kind), &picture.svg)?;
+        }
+    }
+    writeln!(std::io::stderr(), "{}", folder.join("report.html").display())?;
+    Ok(())
+}

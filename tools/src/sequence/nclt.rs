@@ -1,0 +1,89 @@
+//! NCLT: `ms25.csv`, `kvh.csv`, `wheels.csv`, `groundtruth_DATE.csv`. No headers, microseconds
+//! since 1970; x forward, y right, z down, heading clockwise from north. What comes out is x
+//! forward, y left, z up, heading counter-clockwise from east, as KAIST has it.
+//!
+//! The gyro gives its integral, so that a message that is lost takes nothing with it. Source:
+//! the readers bierschi/nclt2ros and ethz-asl/nclt_tools.
+
+use super::rows::{Format, Progress, Row, Rows};
+use super::track::{Track, Unwrap};
+use super::{Files, SequenceError};
+use std::f64::consts::FRAC_PI_2;
+use std::path::{Path, PathBuf};
+
+const MICROS: f64 = 1e6;
+/// Specific force and angular rate, after the magnetic field.
+const IMU: Format<6> =
+    Format { columns: 10, used: [4, 5, 6, 7, 8, 9], stamps_per_second: MICROS, nominal_hz: 47.0 };
+const FOG: Format<1> = Format { columns: 2, used: [1], stamps_per_second: MICROS, nominal_hz: 100.0 };
+const WHEELS: Format<2> = Format { columns: 3, used: [1, 2], stamps_per_second: MICROS, nominal_hz: 41.0 };
+/// North, east and heading.
+const POSE: Format<3> = Format { columns: 7, used: [1, 2, 6], stamps_per_second: MICROS, nominal_hz: 100.0 };
+
+/// The file of the truth has the date in its name.
+pub(super) fn truth(folder: &Path) -> Result<PathBuf, SequenceError> {
+    let path = folder.display().to_string();
+    let entries =
+        std::fs::read_dir(folder).map_err(|source| SequenceError::Io { path: path.clone(), source })?;
+    let mut names: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|e| e.path())).collect();
+    names.sort();
+    let is_truth = |path: &PathBuf| {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        name.starts_with("groundtruth") && name.ends_with(".csv")
+    };
+    let missing = || SequenceError::Missing { path: folder.join("groundtruth_*.csv").display().to_string() };
+    names.into_iter().find(is_truth).ok_or_else(missing)
+}
+
+/// What is there to be read, beside the truth.
+pub(super) const PATHS: [&str; 3] = ["ms25.csv", "kvh.csv", "wheels.csv"];
+
+pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, SequenceError> {
+    let [imu, fog, wheels] = PATHS.map(|path| folder.join(path));
+    let imu = Track::new(
+        Rows::open(&imu, IMU, progress.clone())?,
+        None,
+        Box::new(|row: &Row<6>, _, _| {
+            let [fx, fy, fz, wx, wy, wz] = row.fields;
+            [fx, -fy, -fz, wx, -wy, -wz, 0.0]
+        }),
+    )?;
+    let epoch = Some(imu.epoch());
+    let mut heading = Unwrap::default();
+    let fog = Track::new(
+        Rows::open(&fog, FOG, progress.clone())?,
+        epoch,
+        Box::new(move |row: &Row<1>, _, _| [-heading.angle(row.fields[0])]),
+    )?;
+    let (mut last, mut metres) = (None, [0.0; 2]);
+    let wheels = Track::new(
+        Rows::open(&wheels, WHEELS, progress.clone())?,
+        epoch,
+        Box::new(move |row: &Row<2>, time, _| {
+            // A speed is that of the time since the row before.
+            let seconds = time - last.replace(time).unwrap_or(time);
+            for (metres, speed) in metres.iter_mut().zip(row.fields) {
+                *metres += speed * seconds;
+            }
+            metres
+        }),
+    )?;
+    let mut yaw = Unwrap::default();
+    let truth = Track::new(
+        Rows::open(&truth(folder)?, POSE, progress.clone())?,
+        epoch,
+        Box::new(move |row: &Row<3>, _, _| {
+            let [north, east, heading] = row.fields;
+            [east, north, yaw.angle(FRAC_PI_2 - heading)]
+        }),
+    )?;
+    Ok(Files {
+        imu: Box::new(imu),
+        fog: Box::new(fog),
+        wheels: Box::new(wheels),
+        truth: Box::new(truth),
+        has_gyro: true,
+        has_vendor: false,
+        wheel_base: None,
+    })
+}

@@ -1,0 +1,126 @@
+//! What was found in the files of a sequence: nothing is passed over without a number here.
+
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+
+/// A gap is so many times the nominal period.
+const GAP_PERIODS: f64 = 2.5;
+
+/// How often something was seen, and where first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Seen {
+    /// Times.
+    pub count: u64,
+    /// Line of the first one.
+    pub first_line: Option<u64>,
+}
+
+impl Seen {
+    pub(super) fn count(&mut self, line: u64) {
+        self.count += 1;
+        self.first_line.get_or_insert(line);
+    }
+}
+
+/// Smallest and largest time between two stamps in a second, ms.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Smallest.
+    pub least_ms: f64,
+    /// Largest.
+    pub most_ms: f64,
+}
+
+/// One file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StreamSummary {
+    /// Its name.
+    pub file: String,
+    /// Rows that were used.
+    pub rows: u64,
+    /// Mean rate, Hz.
+    pub rate_hz: f64,
+    /// Times that two stamps are more than 2.5 nominal periods apart.
+    pub gaps: u64,
+    /// The longest time between two stamps, s.
+    pub longest_gap_s: f64,
+    /// Rows passed over because their stamp is that of the row before.
+    pub duplicates: Seen,
+    /// Rows passed over because a field is NaN or infinite.
+    pub not_finite: Seen,
+    /// Times that the counts jumped; the wheels were taken to turn on as before.
+    pub resets: Seen,
+    /// Times between stamps, for each second of the file.
+    #[serde(skip)]
+    pub spreads: Vec<Spread>,
+    #[serde(skip)]
+    clock: Clock,
+}
+
+/// What the stamps say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Clock {
+    per_second: f64,
+    nominal_hz: f64,
+    first: Option<i64>,
+    last: i64,
+}
+
+impl StreamSummary {
+    pub(crate) fn new(path: &Path, per_second: f64, nominal_hz: f64) -> Self {
+        Self {
+            file: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+            rows: 0,
+            rate_hz: 0.0,
+            gaps: 0,
+            longest_gap_s: 0.0,
+            duplicates: Seen::default(),
+            not_finite: Seen::default(),
+            resets: Seen::default(),
+            spreads: Vec::new(),
+            clock: Clock { per_second, nominal_hz, first: None, last: 0 },
+        }
+    }
+
+    pub(super) fn row(&mut self, stamp: i64) {
+        self.rows += 1;
+        let clock = &mut self.clock;
+        let Some(first) = clock.first else {
+            (clock.first, clock.last) = (Some(stamp), stamp);
+            return;
+        };
+        let seconds = (stamp - clock.last) as f64 / clock.per_second;
+        clock.last = stamp;
+        let since = (stamp - first) as f64 / clock.per_second;
+        self.rate_hz = (self.rows - 1) as f64 / since;
+        self.gaps += u64::from(seconds * clock.nominal_hz > GAP_PERIODS);
+        self.longest_gap_s = self.longest_gap_s.max(seconds);
+        let ms = seconds * 1e3;
+        // A stamp far ahead makes no more seconds than there are rows.
+        let second = (since as usize).min(self.rows as usize);
+        if self.spreads.len() <= second {
+            self.spreads.resize(second + 1, Spread { least_ms: ms, most_ms: ms });
+        }
+        let spread = &mut self.spreads[second];
+        spread.least_ms = spread.least_ms.min(ms);
+        spread.most_ms = spread.most_ms.max(ms);
+    }
+}
+
+impl fmt::Display for StreamSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<24}{:>9} rows {:>8.2} Hz", self.file, self.rows, self.rate_hz)?;
+        write!(f, "  {} gaps, longest {:.1} ms", self.gaps, self.longest_gap_s * 1e3)?;
+        for (seen, what) in [
+            (self.duplicates, "duplicate stamps passed over"),
+            (self.not_finite, "rows with NaN passed over"),
+            (self.resets, "encoder resets bridged"),
+        ] {
+            if let Some(line) = seen.first_line {
+                write!(f, ", {} {what} (first: line {line})", seen.count)?;
+            }
+        }
+        Ok(())
+    }
+}

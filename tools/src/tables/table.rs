@@ -1,0 +1,224 @@
+//! The paper's tables with our figures: rows of words and numbers, for whoever prints them.
+
+use super::methods::{self, Gyro, Method};
+use super::paper::{self, Line};
+use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
+use crate::simulate::layout::Layout;
+
+/// A row: a name and figures; `None` where there is none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// What it is of.
+    pub name: String,
+    /// One for each column.
+    pub figures: Vec<Option<f64>>,
+}
+
+/// A table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Its number in the paper and what it shows.
+    pub title: String,
+    /// Whether it holds figures of simulated drives.
+    pub simulated: bool,
+    /// Names of the columns of figures.
+    pub columns: Vec<String>,
+    /// Decimals of the figures.
+    pub decimals: usize,
+    /// Ours.
+    pub rows: Vec<Row>,
+    /// The paper's, with columns of its own.
+    pub paper_columns: Vec<String>,
+    /// Ditto.
+    pub paper_rows: Vec<Row>,
+    /// What has to be said.
+    pub notes: Vec<String>,
+}
+
+/// All tables that the sequences have figures for.
+#[must_use]
+pub fn tables(results: &Results) -> Vec<Table> {
+    let kaist: Vec<&SequenceErrors> =
+        results.sequences.iter().filter(|sequence| sequence.layout == Layout::Kaist).collect();
+    let nclt: Vec<&SequenceErrors> =
+        results.sequences.iter().filter(|sequence| sequence.layout == Layout::Nclt).collect();
+    let (others, first): (Vec<&SequenceErrors>, Vec<&SequenceErrors>) =
+        kaist.iter().partition(|sequence| sequence.other_devices);
+    let mut tables = Vec::new();
+    for (set, name) in [(&kaist, "KAIST Urban"), (&nclt, "NCLT")] {
+        tables.extend(some(set, |set| orientation(set, name)));
+    }
+    tables.extend(some(&first, urban));
+    tables.extend(some(&kaist, padding).filter(|table| !table.rows.is_empty()));
+    tables.extend(some(&others, |set| {
+        average(set, "Table V: average ATE on sequences of other devices", &paper::NEW_SEQUENCES)
+    }));
+    tables.extend(some(&kaist, run_time));
+    tables.extend(some(&nclt, |set| average(set, "Table VII: average ATE on NCLT", &paper::NCLT)));
+    tables
+}
+
+fn some(set: &[&SequenceErrors], table: impl FnOnce(&[&SequenceErrors]) -> Table) -> Option<Table> {
+    (!set.is_empty()).then(|| table(set))
+}
+
+/// The methods that some sequence has, in their order.
+fn methods_of(set: &[&SequenceErrors], is_wanted: impl Fn(&Method) -> bool) -> Vec<Method> {
+    let mut methods: Vec<Method> = Vec::new();
+    for method in set.iter().flat_map(|sequence| &sequence.order) {
+        if is_wanted(method) && !methods.contains(method) {
+            methods.push(*method);
+        }
+    }
+    methods
+}
+
+fn lines(lines: &[Line]) -> Vec<Row> {
+    let row = |line: &Line| Row {
+        name: line.name.to_owned(),
+        figures: line.figures.iter().copied().map(Some).collect(),
+    };
+    lines.iter().map(row).collect()
+}
+
+fn names(names: &[&str]) -> Vec<String> {
+    names.iter().map(|name| (*name).to_owned()).collect()
+}
+
+fn figures(errors: Option<&Errors>, of: &[fn(&Errors) -> f64]) -> Vec<Option<f64>> {
+    of.iter().map(|of| errors.map(of)).collect()
+}
+
+/// Table I, for either data set: the paper has it for KAIST alone.
+fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
+    let means: ByMethod = mean(set.iter().copied());
+    let of: [fn(&Errors) -> f64; 3] = [|e| e.mean_1s_rad, |e| e.final_rad, |e| e.final_unwrapped_rad];
+    let rows = methods_of(set, |_| true)
+        .into_iter()
+        .map(|method| Row { name: method.label.to_owned(), figures: figures(means.get(method.key), &of) });
+    let mut notes = vec![String::from("The paper's figures are for KAIST Urban.")];
+    if let Some((network, still)) = means.get("gyronet").zip(means.get("static")) {
+        notes.push(format!(
+            "GyroNet's error in 1 s is {:.3} of that of static initialisation; in the paper {:.3}.",
+            network.mean_1s_rad / still.mean_1s_rad,
+            paper::GYRONET_TO_STATIC
+        ));
+    }
+    if set.iter().any(|sequence| !sequence.methods.contains_key(methods::VENDOR.key)) {
+        notes.push("VQF stands in for the vendor's filter, whose heading these data do not have.".into());
+    }
+    notes.extend(set.iter().filter_map(|s| Some(format!("{}: {}", s.name, s.refused.as_ref()?))));
+    Table {
+        title: format!("Table I: orientation error on {data_set}, mean of {} sequences, rad", set.len()),
+        simulated: set.iter().any(|sequence| sequence.simulated),
+        columns: names(&["in 1 s", "final", "final, not wrapped"]),
+        decimals: 6,
+        rows: rows.collect(),
+        paper_columns: names(&["in 1 s", "final"]),
+        paper_rows: lines(&paper::ORIENTATION),
+        notes,
+    }
+}
+
+const ATE: [fn(&Errors) -> f64; 2] = [|e| e.ate_m, |e| e.aligned_ate_m];
+
+/// Table II.
+fn urban(set: &[&SequenceErrors]) -> Table {
+    let is_wanted = |method: &Method| {
+        method.gyro == Gyro::Fog || [methods::STATIC.key, methods::GYRONET.key].contains(&method.key)
+    };
+    let methods = methods_of(set, is_wanted);
+    let row = |name: String, by: &ByMethod| Row {
+        name,
+        figures: methods.iter().flat_map(|method| figures(by.get(method.key), &ATE)).collect(),
+    };
+    let mut rows: Vec<Row> =
+        set.iter().map(|s| row(format!("{}, {:.1} km", s.name, s.metres / 1e3), &s.methods)).collect();
+    rows.push(row("average".into(), &mean(set.iter().copied())));
+    let mut paper_rows = lines(&paper::URBAN);
+    paper_rows.extend(lines(&[paper::URBAN_AVERAGE]));
+    for (name, lines) in [
+        ("average, recomputed", &paper::URBAN[..]),
+        ("its training sequences, 06 to 13", &paper::URBAN[..8]),
+        ("its test sequences, 14 to 17", &paper::URBAN[8..]),
+    ] {
+        let figures = paper::average(lines).into_iter().map(Some).collect();
+        paper_rows.push(Row { name: name.into(), figures });
+    }
+    Table {
+        title: String::from("Table II: ATE and aligned ATE of dead reckoning with each yaw rate, rmse, m"),
+        simulated: set.iter().any(|sequence| sequence.simulated),
+        columns: pairs(methods.iter().map(|method| method.label)),
+        decimals: 2,
+        rows,
+        paper_columns: pairs(["FoG", "lwoi", "FoGNet"].into_iter()),
+        paper_rows,
+        notes: vec![
+            "The paper says neither rmse nor mean; the JSON has both.".into(),
+            "Its printed averages include the sequences that it trained on.".into(),
+        ],
+    }
+}
+
+fn pairs<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
+    labels.flat_map(|label| [format!("{label}: ATE"), String::from("aligned")]).collect()
+}
+
+/// Table III; without rows where no method of the list pads.
+fn padding(set: &[&SequenceErrors]) -> Table {
+    let means = mean(set.iter().copied());
+    let rows =
+        [("no padding", "fognet_nopad"), ("padding", "fognet")].into_iter().filter_map(|(name, key)| {
+            Some(Row { name: name.into(), figures: figures(Some(means.get(key)?), &ATE) })
+        });
+    Table {
+        title: String::from("Table III: padding, average ATE, m"),
+        simulated: set.iter().any(|sequence| sequence.simulated),
+        columns: names(&["ATE", "aligned"]),
+        decimals: 2,
+        rows: rows.collect(),
+        paper_columns: names(&["ATE", "aligned"]),
+        paper_rows: lines(&paper::PADDING),
+        notes: Vec::new(),
+    }
+}
+
+/// Tables V and VII.
+fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
+    let means = mean(set.iter().copied());
+    let rows = methods_of(set, |_| true).into_iter().map(|method| Row {
+        name: format!("{} + odometry", method.label),
+        figures: figures(means.get(method.key), &ATE),
+    });
+    Table {
+        title: format!("{title}, {} sequences, m", set.len()),
+        simulated: set.iter().any(|sequence| sequence.simulated),
+        columns: names(&["ATE", "aligned"]),
+        decimals: 2,
+        rows: rows.collect(),
+        paper_columns: names(&["ATE", "aligned"]),
+        paper_rows: lines(paper),
+        notes: Vec::new(),
+    }
+}
+
+/// Table VI.
+fn run_time(set: &[&SequenceErrors]) -> Table {
+    let hours = set.iter().map(|sequence| sequence.seconds).sum::<f64>() / 3600.0;
+    let rows = methods_of(set, |_| true).into_iter().map(|method| Row {
+        name: method.label.to_owned(),
+        figures: vec![
+            set.iter().map(|s| s.methods.get(method.key).map(|e| e.run_time_s)).sum::<Option<f64>>(),
+        ],
+    });
+    Table {
+        title: format!("Table VI: total time for {hours:.2} h of driving, this machine, one core, s"),
+        simulated: set.iter().any(|sequence| sequence.simulated),
+        columns: names(&["s"]),
+        decimals: 2,
+        rows: rows.collect(),
+        paper_columns: names(&["s"]),
+        paper_rows: lines(&paper::RUN_TIME),
+        notes: vec!["The paper's times are for urban06 to 17.".into()],
+    }
+}

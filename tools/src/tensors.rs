@@ -1,0 +1,136 @@
+//! A checkpoint file (safetensors) with the tensors that a network needs: there, of the right
+//! shape, finite.
+
+use gyronet::nn::reference::LstmWeights;
+use safetensors::{Dtype, SafeTensors};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Why a checkpoint cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not a safetensors file.
+    #[error("{name}: not a safetensors file: {source}")]
+    Format {
+        /// The file.
+        name: String,
+        /// What the reader said.
+        source: safetensors::SafeTensorError,
+    },
+    /// A tensor that GyroNet needs is not there.
+    #[error("{name}: tensor {tensor} is missing")]
+    Missing {
+        /// The file.
+        name: String,
+        /// The tensor.
+        tensor: &'static str,
+    },
+    /// A tensor has another shape or element type than GyroNet's.
+    #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
+    Shape {
+        /// The file.
+        name: String,
+        /// The tensor.
+        tensor: &'static str,
+        /// Type and shape as found.
+        found: String,
+        /// Shape as needed.
+        expected: Vec<usize>,
+    },
+    /// A tensor holds NaN or an infinity.
+    #[error("{name}: tensor {tensor} holds a value that is not finite, at {at}")]
+    NotFinite {
+        /// The file.
+        name: String,
+        /// The tensor.
+        tensor: &'static str,
+        /// Element.
+        at: usize,
+    },
+}
+
+/// Names and shapes of a network's tensors, as PyTorch has them.
+pub(crate) type Shapes = [(&'static str, &'static [usize])];
+
+/// The tensors of a network in memory.
+#[derive(Debug, Clone)]
+pub struct Tensors {
+    tensors: BTreeMap<&'static str, Vec<f32>>,
+    /// What `tools/train` wrote about its making: JSON, or empty.
+    pub provenance: String,
+    /// SHA-256 of the file.
+    pub sha256: String,
+}
+
+impl Tensors {
+    /// Names of the tensors in a file, whatever they are.
+    pub(crate) fn names(path: &Path) -> Result<Vec<String>, CheckpointError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
+        let format = |source| CheckpointError::Format { name: path.display().to_string(), source };
+        let file = SafeTensors::deserialize(&bytes).map_err(format)?;
+        Ok(file.names().into_iter().map(ToString::to_string).collect())
+    }
+
+    pub(crate) fn read(path: &Path, shapes: &Shapes) -> Result<Self, CheckpointError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
+        Self::parse(&path.display().to_string(), &bytes, shapes)
+    }
+
+    pub(crate) fn parse(name: &str, bytes: &[u8], shapes: &Shapes) -> Result<Self, CheckpointError> {
+        let format = |source| CheckpointError::Format { name: name.to_owned(), source };
+        let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
+        let file = SafeTensors::deserialize(bytes).map_err(format)?;
+        let provenance =
+            header.metadata().as_ref().and_then(|map| map.get("provenance")).cloned().unwrap_or_default();
+        let mut tensors = BTreeMap::new();
+        for &(tensor, shape) in shapes {
+            let name = || name.to_owned();
+            let view = file.tensor(tensor).map_err(|_| CheckpointError::Missing { name: name(), tensor })?;
+            if view.dtype() != Dtype::F32 || view.shape() != shape {
+                let found = format!("{:?} {:?}", view.dtype(), view.shape());
+                return Err(CheckpointError::Shape { name: name(), tensor, found, expected: shape.to_vec() });
+            }
+            let values: Vec<f32> =
+                view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                return Err(CheckpointError::NotFinite { name: name(), tensor, at });
+            }
+            tensors.insert(tensor, values);
+        }
+        let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(Self { tensors, provenance, sha256 })
+    }
+
+    /// The values of a tensor, row-major.
+    ///
+    /// # Panics
+    /// For a name that the network does not have.
+    #[must_use]
+    pub fn tensor(&self, name: &str) -> &[f32] {
+        self.tensors.get(name).unwrap_or_else(|| panic!("the network has no tensor {name}"))
+    }
+
+    /// Weights of one layer of an LSTM, forward or backward.
+    pub(crate) fn direction(&self, lstm: &str, layer: usize, backward: bool) -> LstmWeights<'_> {
+        let tensor = |what: &str| {
+            self.tensor(&format!("{lstm}.{what}_l{layer}{}", if backward { "_reverse" } else { "" }))
+        };
+        LstmWeights {
+            weight_ih: tensor("weight_ih"),
+            weight_hh: tensor("weight_hh"),
+            bias_ih: tensor("bias_ih"),
+            bias_hh: tensor("bias_hh"),
+        }
+    }
+}

@@ -1,0 +1,186 @@
+"""python -m gyronet_train.fognet LAYOUT --train DIR ... --validate DIR --out FOLDER: train FoGNet.
+
+As in the paper: windows of 60 s every second, Adam with an initial rate of 0.0015, the two
+losses of Eq. 14-16 with alpha 0.5. The paper gives no units; here the first loss is taken in
+units of the corrections' RMS, the second as the mean over the window in units of the gyro
+increments' RMS: in radians and summed it would be a thousand times the first. Some windows are
+padded ones (Fig. 8), labelled with the truth of the rows that they repeat. The rate follows one
+cycle, weights are averaged over the last steps, and the epoch that does best on the validation
+drive is kept. Test drives are never read here.
+
+LAYOUT kaist: folders in the KAIST Urban layout, real or simulated. LAYOUT kingston: the Kingston
+2008 recording, of which only the first 60 % are read, the last sixth of these to validate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import datetime
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import load_file
+from tqdm import tqdm
+
+from .export import export
+from .fognet_model import FOG, STEPS, FoGNet
+from .seconds import Seconds, load_kaist, load_kingston, window_rows
+
+ADAPT_SHARE, VALIDATE_SHARE = 0.6, 1 / 6
+AVERAGE = 0.995  # of the weights, a step
+SETTINGS = ("epochs", "windows", "batch", "lr", "alpha", "padded", "weight_decay", "head_only", "seed")
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="gyronet_train.fognet", description=__doc__)
+    parser.add_argument("layout", choices=["kaist", "kingston"])
+    parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="DIR")
+    parser.add_argument("--validate", type=Path, metavar="DIR", help="kaist: the drive to validate with")
+    parser.add_argument("--simulated", action="store_true", help="say in the provenance that the drives are")
+    parser.add_argument("--init", type=Path, metavar="FILE", help="checkpoint to go on from")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
+    parser.add_argument("--stem", default="fognet", help="name of the files")
+    parser.add_argument("--epochs", type=int, default=20)
+    parser.add_argument("--windows", type=int, default=4800, help="windows an epoch")
+    parser.add_argument("--batch", type=int, default=64)
+    parser.add_argument("--lr", type=float, default=0.0015)
+    parser.add_argument("--alpha", type=float, default=0.5)
+    parser.add_argument("--padded", type=float, default=0.1, help="share of padded windows")
+    parser.add_argument("--weight-decay", type=float, default=0.0)
+    parser.add_argument("--head-only", action="store_true", help="train FC3 and FC4 only")
+    parser.add_argument("--seed", type=int, default=1)
+    return parser.parse_args()
+
+
+def load(args: argparse.Namespace) -> tuple[list[Seconds], Seconds]:
+    if args.layout == "kaist":
+        return [load_kaist(d) for d in tqdm(args.train, "reading")], load_kaist(args.validate)
+    drive = load_kingston(args.train[0])
+    adapt = int(ADAPT_SHARE * len(drive.turn))
+    split = int((1 - VALIDATE_SHARE) * adapt)
+    return [drive.part(0, split)], drive.part(split, adapt)
+
+
+class Windows:
+    """All windows of some drives: rows to look up, not copies of them."""
+
+    def __init__(self, drives: list[Seconds], padding: str):
+        self.features = torch.from_numpy(np.concatenate([d.features for d in drives])).float()
+        error = np.concatenate([d.features[:, FOG] - d.turn for d in drives])
+        self.error = torch.from_numpy(error).float()
+        offsets = np.cumsum([0, *(len(d.turn) for d in drives)])
+        full, padded = [], []
+        for drive, offset in zip(drives, offsets):
+            for end in range(1, len(drive.turn) + 1):
+                rows = window_rows(end, padding)
+                if rows is not None:
+                    (full if end >= STEPS else padded).append(offset + rows)
+        self.full = torch.from_numpy(np.array(full).reshape(-1, STEPS))
+        self.padded = torch.from_numpy(np.array(padded).reshape(-1, STEPS))
+
+    def take(self, rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Inputs (B, 60, 9) and correction labels (B)."""
+        return self.features[rows], self.error[rows].sum(dim=1)
+
+
+def normalisation(data: Windows) -> tuple[torch.Tensor, torch.Tensor, float]:
+    """Mean and spread of each feature, and the RMS of the corrections. The gyro increment keeps
+    its zero, so that what FC3 makes of it stays linear."""
+    mean, std = data.features.mean(dim=0), data.features.std(dim=0)
+    mean[FOG] = 0.0
+    std[FOG] = data.features[:, FOG].square().mean().sqrt()
+    _, labels = data.take(data.full)
+    return mean, std, labels.square().mean().sqrt().item()
+
+
+def epoch_rows(data: Windows, count: int, padded: float) -> torch.Tensor:
+    """Rows of the windows of one epoch, shuffled, some of them padded ones."""
+    extra = int(padded * count) if len(data.padded) else 0
+    rows = data.full[torch.randperm(len(data.full))[: count - extra]]
+    if extra:
+        rows = torch.cat([rows, data.padded[torch.randint(len(data.padded), (extra,))]])
+    return rows[torch.randperm(len(rows))]
+
+
+@torch.no_grad()
+def validation_error(model: FoGNet, data: Windows) -> float:
+    """Mean |predicted - true turn| over all full windows, rad: Eq. 14."""
+    x, label = data.take(data.full)
+    return (torch.cat([model(part)[0] for part in x.split(256)]) - label).abs().mean().item()
+
+
+def main() -> None:
+    args = arguments()
+    torch.manual_seed(args.seed)
+    train, validate = load(args)
+    data, held_out = Windows(train, "repeat"), Windows([validate], "none")
+    model = FoGNet(*normalisation(data))
+    if args.init:
+        model.load_state_dict(load_file(args.init))
+    for name, parameter in model.named_parameters():
+        parameter.requires_grad_(not args.head_only or name.startswith(("fc3", "fc4")))
+    parameters = [p for p in model.parameters() if p.requires_grad]
+    optimiser = torch.optim.AdamW(parameters, lr=args.lr, weight_decay=args.weight_decay)
+    batches = min(args.windows, len(data.full)) // args.batch
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, args.lr, total_steps=batches * args.epochs)
+    average = copy.deepcopy(model)
+    scale = model.correction_scale.item()
+    none = held_out.take(held_out.full)[1].abs().mean().item()
+    before = validation_error(model, held_out)
+    best = (before, 0, copy.deepcopy(model.state_dict()))
+    print(f"{len(data.full)} windows, correction RMS {scale:.6f} rad")
+    print(f"validation: uncorrected {none:.7f} rad, at the start {before:.7f} rad")
+    step = 0
+    for epoch in range(1, args.epochs + 1):
+        model.train()
+        losses = torch.zeros(2)
+        rows_of_epoch = epoch_rows(data, batches * args.batch, args.padded)
+        for rows in tqdm(rows_of_epoch.split(args.batch), f"epoch {epoch}/{args.epochs}"):
+            x, label = data.take(rows)
+            correction, f1, fog = model(x)
+            loss1 = (correction - label).abs().mean() / scale  # Eq. 14
+            loss2 = (f1 - fog).abs().mean()  # Eq. 15
+            optimiser.zero_grad()
+            (loss1 + args.alpha * loss2).backward()  # Eq. 16
+            torch.nn.utils.clip_grad_norm_(parameters, 1.0)
+            optimiser.step()
+            schedule.step()
+            step += 1
+            follow(average, model, min(AVERAGE, step / (step + 10)))
+            losses += torch.tensor([loss1.item(), loss2.item()]) / batches
+        error = validation_error(average, held_out)
+        print(f"epoch {epoch}: losses {losses[0]:.4f} {losses[1]:.4f}, validation {error:.7f}", flush=True)
+        if error < best[0]:
+            best = (error, epoch, copy.deepcopy(average.state_dict()))
+    model.load_state_dict(best[2])
+    model.eval()
+    provenance = {
+        "network": "fognet",
+        "train": [d.name for d in train],
+        "validate": validate.name,
+        "simulated": args.simulated,
+        "sha256": {d.name: d.sha256 for d in [*train, validate]},
+        "validation_mean_60s_rad": round(best[0], 8),
+        "validation_uncorrected_mean_60s_rad": round(none, 8),
+        "init": args.init.name if args.init else None,
+        "epoch": best[1],
+        **{name: getattr(args, name) for name in SETTINGS},
+        "torch": torch.__version__.split("+")[0],
+        "date": datetime.date.today().isoformat(),
+    }
+    args.out.mkdir(parents=True, exist_ok=True)
+    for path in export(model, provenance, args.out, args.stem):
+        print(path)
+
+
+@torch.no_grad()
+def follow(average: FoGNet, model: FoGNet, decay: float) -> None:
+    """Moves the average of the weights on by one step."""
+    for mean, weight in zip(average.parameters(), model.parameters()):
+        mean.lerp_(weight, 1 - decay)
+
+
+if __name__ == "__main__":
+    main()

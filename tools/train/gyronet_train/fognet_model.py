@@ -1,0 +1,73 @@
+"""FoGNet of Zhao et al., section III-C, with N = 60 one-second steps."""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+
+STEPS = 60
+INPUTS = 9
+FOG = 8  # column of the gyro increment
+HIDDEN1 = 90
+HIDDEN2 = STEPS
+PARAMETERS = 387_006
+
+
+class FoGNet(nn.Module):
+    """Estimates by how much a gyro errs over a window of a minute.
+
+    Input (B, 60, 9), one row a second: mean specific force xyz in m/s^2, mean angular rate xyz in
+    rad/s less its static mean, way of the left and the right wheel in m, gyro increment in rad.
+    Output (B): the correction in rad, gyro less truth over the window.
+
+    The paper predicts the turn itself and takes the gyro's own sum from it. Here the last layer
+    gives the difference at once, in units of `correction_scale`, so FC3 holds its departure from
+    the plain sum: the same functions with the same parameters, but a correction of 1e-4 rad is
+    not the difference of two numbers near 1. FC2 and FC3 begin at zero: the prediction starts as
+    the plain sum.
+    """
+
+    steps = STEPS
+
+    def __init__(self, input_mean: torch.Tensor, input_std: torch.Tensor, correction_scale: float):
+        super().__init__()
+        self.register_buffer("input_mean", input_mean.float())
+        self.register_buffer("input_std", input_std.float())
+        self.register_buffer("correction_scale", torch.tensor([correction_scale], dtype=torch.float32))
+        self.lstm1 = nn.LSTM(INPUTS, HIDDEN1, num_layers=2, batch_first=True, bidirectional=True)
+        self.fc1 = nn.Linear(2 * HIDDEN1, 1)
+        self.lstm2 = nn.LSTM(2, HIDDEN2, num_layers=2, batch_first=True, bidirectional=True)
+        self.fc2 = nn.Linear(2 * HIDDEN2, 1)
+        self.fc3 = nn.Linear(STEPS, 1)
+        self.fc4 = nn.Linear(2, 1)
+        for layer in (self.fc2, self.fc3):
+            nn.init.zeros_(layer.weight)
+            nn.init.zeros_(layer.bias)
+        nn.init.ones_(self.fc4.weight)
+        nn.init.zeros_(self.fc4.bias)
+        assert sum(p.numel() for p in self.parameters()) == PARAMETERS
+
+    def layers(self, x: torch.Tensor) -> dict[str, torch.Tensor]:
+        """Every layer's output, by the names the golden tensors carry."""
+        normalised = (x - self.input_mean) / self.input_std
+        layer1, _ = self.lstm1(normalised)
+        f1 = self.fc1(layer1)
+        fog = normalised[..., FOG : FOG + 1]
+        layer2, _ = self.lstm2(torch.cat([f1, fog], dim=-1))
+        f2 = self.fc2(layer2[:, -1])
+        f3 = self.fc3(fog.squeeze(-1))
+        correction = self.fc4(torch.cat([f2, f3], dim=-1)) * self.correction_scale
+        return {
+            "normalised": normalised,
+            "f1": f1.squeeze(-1),
+            "layer2_last": layer2[:, -1],
+            "f2": f2.squeeze(-1),
+            "f3": f3.squeeze(-1),
+            "correction": correction.squeeze(-1),
+            "prediction": x[..., FOG].sum(dim=-1) - correction.squeeze(-1),
+        }
+
+    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Correction (rad), and f1 with the gyro increments it should be near (both normalised)."""
+        outputs = self.layers(x)
+        return outputs["correction"], outputs["f1"], outputs["normalised"][..., FOG]

@@ -1,0 +1,149 @@
+"""Drives as FoGNet sees them: one row of nine features a second, and the truth beside it.
+
+Increments (gyro, wheels) are summed over a second, the inertial sensor is averaged; its gyro is
+taken less its mean over the first three seconds, which stand still.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .fognet_model import STEPS
+
+STATIC_S = 3.0
+
+
+@dataclass(frozen=True)
+class Seconds:
+    """One drive: features (T, 9) in float64, the true yaw change of each second (T,) in rad."""
+
+    name: str
+    sha256: str
+    features: np.ndarray
+    turn: np.ndarray
+
+    def part(self, begin: int, end: int) -> Seconds:
+        """The seconds from `begin` to `end`."""
+        name = f"{self.name}[{begin}:{end}]"
+        return Seconds(name, self.sha256, self.features[begin:end], self.turn[begin:end])
+
+
+def window_rows(end: int, padding: str) -> np.ndarray | None:
+    """Rows of the window that ends with row `end - 1`, oldest first.
+
+    Before there are 60 of them (Fig. 8 of the paper): `repeat` fills up with the existing rows,
+    over and over, in their order; `edge` with the first one; `none` gives no window.
+    """
+    rows = np.arange(end - STEPS, end)
+    if end >= STEPS:
+        return rows
+    if padding == "repeat":
+        return rows % end
+    if padding == "edge":
+        return rows.clip(min=0)
+    return None
+
+
+def load_kaist(folder: Path) -> Seconds:
+    """Read a sequence in the KAIST Urban layout. Raises ValueError that names what is wrong."""
+    digest = hashlib.sha256()
+    sensors = folder / "sensor_data"
+    imu = table(sensors / "xsens_imu.csv", 17, digest)
+    fog = table(sensors / "fog.csv", 4, digest)
+    encoder = table(sensors / "encoder.csv", 3, digest)
+    pose = table(folder / "global_pose.csv", 13, digest)
+    scale = encoder_scale(folder / "calibration" / "EncoderParameter.txt")
+    start = max(t[0, 0] for t in (imu, fog, encoder, pose))
+    count = int((min(t[-1, 0] for t in (imu, fog, encoder, pose)) - start) // 10**9)
+    edges = start + 10**9 * np.arange(count + 1)
+
+    def at_edges(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return np.interp((edges - start) / 1e9, (times - start) / 1e9, values)
+
+    force, gyro = imu[:, 11:14], imu[:, 8:11]
+    gyro = gyro - gyro[imu[:, 0] < start + STATIC_S * 1e9].mean(axis=0)
+    means = [second_means(imu[:, 0], column, edges) for column in (*force.T, *gyro.T)]
+    wheels = [np.diff(at_edges(encoder[:, 0], encoder[:, 1 + k] * scale[k])) for k in range(2)]
+    increments = np.diff(at_edges(fog[:, 0], np.cumsum(fog[:, 3])))
+    yaw = np.unwrap(np.arctan2(pose[:, 5].astype(float), pose[:, 1].astype(float)))
+    return Seconds(
+        name=folder.name,
+        sha256=digest.hexdigest(),
+        features=np.stack([*means, *wheels, increments], axis=1).astype(np.float64),
+        turn=np.diff(at_edges(pose[:, 0], yaw)),
+    )
+
+
+def load_kingston(folder: Path) -> Seconds:
+    """Read the Kingston 2008 recording: its gyro stands in for the fibre-optic one, and both
+    wheels go at the speed of the car. Its azimuth grows clockwise."""
+    digest = hashlib.sha256()
+    imu, speed, reference = (
+        table(folder / name, columns, digest, header=1)
+        for name, columns in (("imu_10hz.csv", 7), ("obd_speed_1hz.csv", 2), ("reference_1hz.csv", 10))
+    )
+    # The reference's own stamps: a heading between two of them would be a guess.
+    inside = (reference[:, 0] >= imu[0, 0]) & (reference[:, 0] <= imu[-1, 0])
+    edges = reference[inside, 0]
+    if (abs(np.diff(edges) - 1.0) > 0.01).any():
+        raise ValueError(f"{folder}: the reference is not at 1 Hz throughout")
+    # A sample's rate holds from the sample before it to its own time.
+    turned = np.cumsum(imu[:, 6] * np.diff(imu[:, 0], prepend=imu[0, 0]))
+    way = np.cumsum(speed[:, 1] * np.diff(speed[:, 0], prepend=speed[0, 0]))
+    gyro = imu[:, 4:7] - imu[imu[:, 0] < STATIC_S + imu[0, 0], 4:7].mean(axis=0)
+    means = [second_means(imu[:, 0], column, edges) for column in (*imu[:, 1:4].T, *gyro.T)]
+    wheel = np.diff(np.interp(edges, speed[:, 0], way))
+    azimuth = np.unwrap(np.deg2rad(reference[inside, 9]))
+    return Seconds(
+        name=folder.name,
+        sha256=digest.hexdigest(),
+        features=np.stack([*means, wheel, wheel, np.diff(np.interp(edges, imu[:, 0], turned))], axis=1),
+        turn=-np.diff(azimuth),
+    )
+
+
+def second_means(times: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Mean of the values in each second; raises ValueError where a second has none."""
+    first = np.searchsorted(times, edges)
+    count = np.diff(first)
+    if (count == 0).any():
+        raise ValueError(f"no sample in second {int(np.argmin(count))}")
+    total = np.concatenate([[0.0], np.cumsum(values.astype(float))])[first]
+    return np.diff(total) / count
+
+
+def table(path: Path, columns: int, digest, header: int = 0) -> np.ndarray:
+    """A CSV of that many columns. Stamps of 1.5e18 ns are rounded to 256 ns, which is finer than
+    anything that is done with them here."""
+    digest.update(path.read_bytes())
+    try:
+        values = np.loadtxt(path, delimiter=",", skiprows=header, dtype=np.float64, ndmin=2)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+    if values.shape[1] != columns:
+        raise ValueError(f"{path}: wants {columns} columns")
+    if not np.isfinite(values).all():
+        row = int(np.argwhere(~np.isfinite(values).all(axis=1))[0, 0])
+        raise ValueError(f"{path}: line {row + 1 + header}: a value is empty or not a number")
+    if (np.diff(values[:, 0]) <= 0).any():
+        row = int(np.argwhere(np.diff(values[:, 0]) <= 0)[0, 0])
+        raise ValueError(f"{path}: line {row + 2 + header}: time does not go forward")
+    return values
+
+
+def encoder_scale(path: Path) -> list[float]:
+    """Metres per count of the left and the right wheel."""
+    entries = {}
+    for line in path.read_text().splitlines():
+        words = line.split()
+        if len(words) > 2 and words[0] == "Encoder":
+            entries[words[1]] = words[-1]
+    try:
+        resolution = float(entries["resolution:"])
+        return [float(entries[side]) * np.pi / resolution for side in ("left", "right")]
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{path}: no encoder resolution or wheel diameter") from error
