@@ -123,6 +123,10 @@ pub struct Counters {
     pub implausible: u32,
     /// Windows whose estimate came too late or not at all.
     pub late: u32,
+    /// Seconds of standing still that the bias was updated with.
+    pub zero_rate_updates: u32,
+    /// Seconds in which the gyro contradicted that the vehicle stands.
+    pub contradicted: u32,
 }
 
 /// Adds to a counter without wrapping.

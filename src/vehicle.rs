@@ -25,11 +25,23 @@ pub struct YawSample {
     pub latency_us: Option<u32>,
 }
 
+/// The yaw rate for receivers that steer by it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PromptSample {
+    /// Corrected rate, of the newest sample.
+    pub rate: AngularRate,
+    /// What it is worth.
+    pub quality: Quality,
+}
+
 /// What goes out for one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VehicleSample {
-    /// Yaw and what it is worth.
+    /// At once: for the Bosch messages and VDC2.
+    pub prompt: PromptSample,
+    /// For navigation, some samples late: for our own messages.
     pub yaw: YawSample,
     /// About x, forward, less its bias.
     pub roll_rate: AngularRate,

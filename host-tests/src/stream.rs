@@ -48,12 +48,12 @@ pub fn run(
     outputs
 }
 
-/// Runs of equal status: which, and how many samples.
+/// Runs of equal status of what goes out at once: which, and how many samples.
 #[must_use]
 pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
     outputs
-        .chunk_by(|a, b| a.yaw_rate.status == b.yaw_rate.status)
-        .map(|run| (run[0].yaw_rate.status, run.len()))
+        .chunk_by(|a, b| a.prompt.status == b.prompt.status)
+        .map(|run| (run[0].prompt.status, run.len()))
         .collect()
 }
 

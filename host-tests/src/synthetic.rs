@@ -4,7 +4,7 @@ use crate::noise::Noise;
 use gyronet::health::{Quality, Source};
 use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
-use gyronet::vehicle::{VehicleSample, YawSample};
+use gyronet::vehicle::{PromptSample, VehicleSample, YawSample};
 
 /// rad/s to a code.
 ///
@@ -56,6 +56,7 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
 #[must_use]
 pub fn vehicle(tick: u32, rate: AngularRate, yaw: Yaw) -> VehicleSample {
     VehicleSample {
+        prompt: PromptSample { rate, quality: Quality::Good },
         yaw: YawSample { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawSample::default() },
         roll_rate: AngularRate::ZERO,
         pitch_rate: AngularRate::ZERO,

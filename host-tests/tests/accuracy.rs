@@ -3,7 +3,7 @@
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::recordings;
-use gyronet_tools::methods::Rates;
+use gyronet_tools::methods::{Method, Rates};
 use gyronet_tools::metrics::YawError;
 use gyronet_tools::quantization_error::Both;
 use gyronet_tools::recording::Recording;
@@ -36,13 +36,13 @@ fn integer_network_against_f32() {
         let reference = rates.reference.as_ref().expect("the trials have a reference");
         let errors =
             rates.rates.map(|rates| YawError::new(rates, reference).expect("whole seconds").mean_1s_rad);
-        let ratio = errors.gyronet_int / errors.gyronet_f32;
+        let ratio = errors[Method::GyronetInt] / errors[Method::GyronetF32];
         let difference = both.error();
         table += &format!(
             "{trial:02}      {:.6}  {:.6}  {:.6}  {ratio:.4}      {:.4}     {:.4}   {:6}  {:7}\n",
-            errors.static_init,
-            errors.gyronet_f32,
-            errors.gyronet_int,
+            errors[Method::Static],
+            errors[Method::GyronetF32],
+            errors[Method::GyronetInt],
             difference.relative_rms(),
             difference.scale_rms(),
             difference.windows,

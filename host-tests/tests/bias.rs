@@ -15,7 +15,7 @@ fn judge(init: &mut StaticInit, sample: impl FnMut(u64) -> ImuSample) -> Verdict
     let last = verdicts.by_ref().enumerate().find_map(|(k, verdict)| Some((k, verdict?)));
     let (at, verdict) = last.expect("a verdict");
     assert_eq!(at as u32 + 1, STATIC_SAMPLES);
-    verdict
+    verdict.map(|rest| rest.angular_rate)
 }
 
 fn judge_new(sample: impl FnMut(u64) -> ImuSample) -> Verdict {

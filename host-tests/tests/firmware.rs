@@ -7,6 +7,7 @@ use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
 use gyronet::can::feeds::Feeds;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{image, qemu, replay};
@@ -64,7 +65,8 @@ fn compare(test: &str, elf: &Path, arguments: &[&str], bytes: &[u8]) {
 fn wire_against_file(path: &Path) {
     let recording = Recording::read(path).expect("a recording");
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-    let drive = Drive::run(&recording, &mut GyroNet::new(blob), || {}).expect("it stands still first");
+    let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
+        .expect("it stands still first");
     let mut feeds = Feeds::new(replay::CONFIG);
     let file: Vec<DataFrame> =
         drive.steps.iter().flat_map(|step| feeds.process::<DataFrame>(&step.vehicle)).collect();

@@ -1,7 +1,7 @@
 //! The pipeline on made-up streams: status from initialisation to a corrected rate, and what a
 //! gap, clipping, motion or a jumping clock does to it.
 
-use gyronet::compensate::{DELAY, HOP};
+use gyronet::compensate::{CompensateConfig, DELAY};
 use gyronet::health::Status::{Clipped, Degraded, Init, Ready};
 use gyronet::health::{Faults, Quality, judge};
 use gyronet::sample::ImuSample;
@@ -24,19 +24,20 @@ fn init_then_degraded_then_ready() {
         [(Init, 300), (Degraded, (COVERED - KNOWN) as usize), (Ready, 400 - COVERED as usize)]
     );
     assert_eq!(pipeline.gyro_bias(), Some([AngularRate(0), AngularRate(0), rate(0.001)]));
-    let at = |tick: u64| outputs[tick as usize].yaw_rate;
+    let at = |tick: u64| outputs[tick as usize].prompt;
     assert_eq!((at(0).rate, at(299).yaw.0), (rate(0.001), 0), "raw, and nothing summed yet");
     let less_bias = AngularRate(rate(0.25).0 - rate(0.001).0);
     assert_eq!(at(COVERED - 1).rate, less_bias);
     assert_eq!(at(399).rate, AngularRate(less_bias.0 - rate(0.002).0));
     for output in &outputs {
-        let VehicleSample { yaw, tick, .. } = output.vehicle;
-        assert_eq!((yaw.source, yaw.quality), judge(output.yaw_rate.status));
-        assert_eq!((yaw.rate, yaw.faults, tick), (output.yaw_rate.rate, Faults::NONE, output.yaw_rate.tick));
+        let VehicleSample { prompt, yaw, tick, .. } = output.vehicle;
+        assert_eq!((prompt.rate, prompt.quality), (output.prompt.rate, judge(output.prompt.status).1));
+        assert_eq!((yaw.source, yaw.quality), judge(output.navigation.status));
+        assert_eq!((yaw.rate, yaw.faults, tick), (output.navigation.rate, Faults::NONE, output.prompt.tick));
     }
     // The first window ends with the tenth sample, the others follow every fifth.
     let ends: Vec<u32> = outputs.iter().filter_map(|output| Some(output.window?.end)).collect();
-    assert_eq!(ends, (309..400).step_by(HOP as usize).collect::<Vec<u32>>());
+    assert_eq!(ends, (309..400).step_by(CompensateConfig::DEFAULT.mode.hop() as usize).collect::<Vec<u32>>());
     assert_eq!(pipeline.counters().windows, 18, "the one that ended at 399 is still out");
 }
 
@@ -91,7 +92,7 @@ fn clipping_is_a_failure_until_it_is_over() {
         [(Init, 300), (Degraded, 11), (Ready, 89), (Clipped, 3), (Degraded, 11), (Ready, 86)]
     );
     for output in &outputs[400..403] {
-        assert_eq!(output.vehicle.yaw.quality, Quality::Unusable);
+        assert_eq!(output.vehicle.prompt.quality, Quality::Unusable);
     }
     assert_eq!(faults(&outputs), [(Faults::NONE, 400), (Faults::CLIPPED, 3), (Faults::NONE, 97)]);
     assert_eq!(pipeline.counters().clipped, 3);
@@ -148,5 +149,32 @@ fn a_clock_jump_is_counted_and_survived() {
     assert_eq!(statuses(&outputs), [(Degraded, 11), (Ready, 88)]);
     assert_eq!((pipeline.counters().clock_jumps, pipeline.counters().missing), (1, 0));
     assert_eq!(faults(&outputs), [(Faults::GAP, WINDOW), (Faults::NONE, 99 - WINDOW)]);
-    assert_eq!(outputs[0].yaw_rate.tick, 400);
+    assert_eq!(outputs[0].prompt.tick, 400);
+}
+
+#[test]
+fn the_navigation_rate_is_late_and_leaves_none_out() {
+    let lag = CompensateConfig::DEFAULT.lag.samples();
+    let mut pipeline = new();
+    let outputs = run(&mut pipeline, drive((0..400).chain(403..500)), constant(0.002));
+    let (init, sent) = outputs.split_at(KNOWN as usize + lag);
+    assert!(init.iter().all(|output| output.navigation.status == Init && output.navigation.yaw.0 == 0));
+    // A gap delays what came before it, it swallows none.
+    let expected: Vec<u32> = (KNOWN as u32..400).chain(403..500 - lag as u32).collect();
+    assert_eq!(sent.iter().map(|output| output.navigation.tick).collect::<Vec<_>>(), expected);
+    let late = |output: &gyronet::pipeline::Output| output.vehicle.yaw.latency_us;
+    let across_the_gap = sent.iter().filter(|output| late(output) != Some(10_000 * lag as u32));
+    assert_eq!(across_the_gap.map(late).collect::<Vec<_>>(), vec![Some(10_000 * (lag as u32 + 3)); lag]);
+    // The first four after start and gap go out before a window has covered them, and the gap
+    // takes the last five before it their window.
+    let degraded =
+        sent.iter().filter(|output| output.navigation.status == Degraded).map(|o| o.navigation.tick);
+    assert_eq!(
+        degraded.collect::<Vec<_>>(),
+        [300, 301, 302, 303, 395, 396, 397, 398, 399, 403, 404, 405, 406]
+    );
+    // They are made up for all the same.
+    let less = i64::from(rate(0.25).0 - rate(0.001).0 - rate(0.002).0);
+    let sum: i64 = sent.iter().map(|output| i64::from(output.navigation.rate.0)).sum();
+    assert_eq!(sum + pipeline.owed().navigation.0, less * 197);
 }

@@ -2,6 +2,7 @@
 //! names file, line and column.
 
 use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled::SIMULATED_DRIVE;
 use gyronet_tools::drive::{Drive, DriveError};
@@ -34,7 +35,7 @@ fn cut(text: &str, skip: usize) -> String {
 
 fn run(recording: &Recording) -> Result<Drive, DriveError> {
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-    Drive::run(recording, &mut GyroNet::new(blob), || {})
+    Drive::run(recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! what the part rounds. `cargo gyronet replay --via PART FILE` prints the same figures.
 
 use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::units::{AngularRate, Micros};
 use gyronet_host_tests::recordings;
@@ -10,6 +11,7 @@ use gyronet_tools::drive::Drive;
 use gyronet_tools::recording::{Recording, Row};
 use gyronet_tools::via::compare::{Bound, Difference};
 use gyronet_tools::via::{Part, Quantisation, Via};
+use gyronet_tools::wheel_rates::WheelRates;
 
 const PARTS: [Part; 3] = [Part::Xsens, Part::Dsp1760, Part::Icm42688];
 
@@ -18,7 +20,8 @@ fn network() -> GyroNet<'static> {
 }
 
 fn drive(recording: &Recording) -> Drive {
-    Drive::run(recording, &mut network(), || {}).expect("it stands still first")
+    Drive::run(recording, &PipelineConfig::DEFAULT, WheelRates::new(recording), &mut network(), || {})
+        .expect("it stands still first")
 }
 
 /// Largest departures of rate and acceleration, rad/s and m/s^2.

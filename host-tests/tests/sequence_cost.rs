@@ -2,6 +2,7 @@
 //! so that nothing else runs in it.
 
 use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set};
@@ -44,7 +45,8 @@ fn import_and_replay_of_twenty_minutes() {
     if cfg!(debug_assertions) {
         recording.rows.truncate(12_000);
     }
-    let drive = Drive::run(&recording, &mut network, || {}).expect("it stands at first");
+    let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut network, || {})
+        .expect("it stands at first");
     let replayed = processor_seconds().expect("it was there") - begin - imported;
     let peak = peak_megabytes().expect("as the other");
     println!(

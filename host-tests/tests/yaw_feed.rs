@@ -117,12 +117,12 @@ fn details() {
     let detailed = YawSample {
         correction: rate(-0.022),
         sigma: Some(rate(0.02)),
-        latency_us: Some(1_234),
+        latency_us: Some(71_234),
         ..sample(rate(1.0), Yaw(0))
     };
     let [.., detail] = feed.process(&detailed).expect("every sample");
     let detail = DetailMessage::parse(&detail).expect("a detail message");
-    assert_eq!((detail.correction, detail.latency), (-110, 13));
+    assert_eq!((detail.correction, detail.latency), (-110, 143));
     assert!([2000, 2001].contains(&detail.sigma), "{}", detail.sigma);
     assert_eq!(encode_sigma(Some(AngularRate(1))), 1, "a small error is not none");
     assert_eq!(encode_sigma(Some(AngularRate(0))), 0);

@@ -34,9 +34,12 @@ mod firmware {
     use core::hint::black_box;
     use cortex_m_semihosting::{debug, hprintln};
     use gyronet::model::gyronet::GyroNetState;
-    use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+    use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};
     use gyronet::nn::dense::Dense;
     use gyronet::nn::lstm::{self, Scratch};
+    use gyronet::pipeline::{Pipeline, PipelineConfig};
+    use gyronet::sample::{ImuSample, PERIOD_US, Standstill, WHEELS, WheelSample};
+    use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
     use gyronet::window::{FEATURES, Features, WINDOW};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
@@ -59,6 +62,7 @@ mod firmware {
     fn run(meter: &mut Meter) {
         meter.run("empty", || {});
         gyronet(meter);
+        pipeline(meter);
         kernels(meter);
         crate::parsers::run(meter);
         hprintln!("gyronet/state bytes={}", size_of::<GyroNetState>());
@@ -105,6 +109,44 @@ mod firmware {
             }),
             None => hprintln!("FAILED: the checkpoint is not to be read"),
         }
+    }
+
+    /// What the pipeline adds to the network: five samples with wheels that stand, one of which
+    /// takes an estimate back and hands out the next window.
+    fn pipeline(meter: &mut Meter) {
+        let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+        let mut numbers = Numbers::new(3);
+        let mut five_samples = |from: u32| {
+            for tick in from..from + 5 {
+                let time = Micros(u64::from(tick) * PERIOD_US);
+                let speeds = [Some(WheelSpeed(0)); WHEELS];
+                pipeline.wheels(WheelSample { time, speeds, standstill: Standstill::Still });
+                let sample = ImuSample {
+                    time,
+                    specific_force: [
+                        SpecificForce(numbers.within(1 << 14)),
+                        SpecificForce(0),
+                        SpecificForce(10_286_530),
+                    ],
+                    angular_rate: [AngularRate(0), AngularRate(0), AngularRate(numbers.within(1 << 18))],
+                    temperature: None,
+                    clipped: false,
+                };
+                if let Ok(output) = black_box(pipeline.process(black_box(sample)))
+                    && let Some(due) = output.window
+                {
+                    let estimate = Estimate {
+                        corrections: [AngularRate(1_000); WINDOW],
+                        scale: SCALE_MIN,
+                        clamped_inputs: 0,
+                    };
+                    pipeline.deliver(due.end, estimate);
+                }
+            }
+        };
+        // Past static initialisation and the first windows.
+        (0..80).for_each(|n| five_samples(5 * n));
+        meter.run("pipeline/five_samples", || five_samples(400));
     }
 
     fn kernels(meter: &mut Meter) {

@@ -42,7 +42,7 @@ impl Feeds {
 
     /// The frames of one sample, in a driver's own type.
     pub fn process<F: Frame>(&mut self, sample: &VehicleSample) -> Vec<F, MAX_MESSAGES> {
-        let (status, validity) = match sample.yaw.quality {
+        let (status, validity) = match sample.prompt.quality {
             Quality::Good | Quality::Degraded => (SignalStatus::OK, Validity::Valid),
             Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
             Quality::Unusable => (SignalStatus::FAILURE, Validity::Error),
@@ -68,7 +68,7 @@ impl Feeds {
             }
         }
         if let Some(vdc2) = settings.vdc2 {
-            let message = self.vdc2.encode(sample.yaw.rate, validity, &sample.specific_force);
+            let message = self.vdc2.encode(sample.prompt.rate, validity, &sample.specific_force);
             count(&mut self.out_of_range, u32::from(validity != Validity::Error && message.has_error()));
             send(message.frame(vdc2.source));
         }
@@ -79,7 +79,7 @@ impl Feeds {
 /// The grid step is the counter, so that a receiver sees what is missing.
 fn motion(sample: &VehicleSample, rate_status: SignalStatus) -> Motion {
     Motion {
-        angular_rate: [sample.roll_rate, sample.pitch_rate, sample.yaw.rate],
+        angular_rate: [sample.roll_rate, sample.pitch_rate, sample.prompt.rate],
         specific_force: sample.specific_force,
         temperature: sample.temperature,
         rate_status,

@@ -13,7 +13,7 @@
 //! | | 7 | [`Faults`] | |
 //! | detail | 3-4 | correction that was taken off, i16 | 2e-4 deg/s |
 //! | | 5-6 | expected error (1 sigma), u16, rounded up | 1e-5 deg/s; FFFF unknown |
-//! | | 7 | latency, u8, rounded up | 0.1 ms; FE that or more, FF unknown |
+//! | | 7 | latency, u8, rounded up | 0.5 ms; FE that or more, FF unknown |
 //!
 //! The accumulated yaw wraps where an angle does, so the difference of two readings, taken in 32
 //! bits, is the angle turned between them, and a receiver that missed messages misses no angle.
@@ -196,6 +196,6 @@ pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
 #[must_use]
 pub const fn encode_latency(latency_us: Option<u32>) -> u8 {
     let Some(latency_us) = latency_us else { return LATENCY_UNKNOWN };
-    let code = latency_us.div_ceil(100);
+    let code = latency_us.div_ceil(500);
     if code < LATENCY_UNKNOWN as u32 { code as u8 } else { LATENCY_UNKNOWN - 1 }
 }

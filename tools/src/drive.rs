@@ -2,15 +2,17 @@
 
 use crate::candump::Log;
 use crate::recording::Recording;
+use crate::wheel_rates::WheelRates;
 use gyronet::bias::StaticError;
 use gyronet::can::DataFrame;
 use gyronet::can::feeds::Feeds;
 use gyronet::health::{Counters, Status};
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::{Output, Pipeline, PipelineConfig, YawRate};
-use gyronet::units::{AngularRate, Micros};
+use gyronet::units::{AngularRate, Micros, Yaw};
 use gyronet::vehicle::VehicleSample;
 use std::io::{self, Write};
+use std::ops::Range;
 
 /// Why a recording gives no corrected rate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -41,12 +43,15 @@ pub struct Step {
     pub row: usize,
     /// The sample's time stamp.
     pub time: Micros,
-    /// The corrected yaw rate.
-    pub yaw_rate: YawRate,
-    /// The best estimate of the correction, known some samples later; the one that went out
-    /// where none came (after the last window, before a gap).
+    /// Its rate, as sent at once.
+    pub prompt: YawRate,
+    /// Its rate, as sent for navigation some samples later; `None` before static initialisation
+    /// is over, and of the last samples, whose turn never came.
+    pub navigation: Option<YawRate>,
+    /// Gyro less static bias less the best estimate of the network, known some samples later;
+    /// the prompt rate where no such came.
     pub settled: AngularRate,
-    /// What the messages are made from.
+    /// What the messages are made from that went out with this row.
     pub vehicle: VehicleSample,
 }
 
@@ -59,26 +64,33 @@ pub struct Drive {
     pub start: usize,
     /// The gyro's static bias.
     pub gyro_bias: [AngularRate; 3],
+    /// What the navigation rates still owe at the end.
+    pub owed: Yaw,
     /// Events.
     pub counters: Counters,
 }
 
 impl Drive {
     /// Runs a recording; every window's estimate is delivered at once. `tick` is called once
-    /// for each row.
+    /// for each row. `wheels` stand in for the vehicle's bus.
     ///
     /// # Errors
     /// [`DriveError`], when static initialisation does not succeed at its first attempt.
     pub fn run(
         recording: &Recording,
+        config: &PipelineConfig,
+        mut wheels: Option<WheelRates>,
         network: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
     ) -> Result<Self, DriveError> {
-        let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
-        let mut steps = Vec::with_capacity(recording.rows.len());
+        let mut pipeline = Pipeline::new(*config);
+        let mut steps: Vec<Step> = Vec::with_capacity(recording.rows.len());
         let mut start = None;
         for (index, row) in recording.rows.iter().enumerate() {
             tick();
+            if let Some(wheels) = &mut wheels {
+                pipeline.wheels(wheels.at(row));
+            }
             // What has no place in time gives no frame; the pipeline has counted it.
             let Ok(output) = pipeline.process(row.sample) else { continue };
             if let Some(source) = output.refused {
@@ -88,23 +100,45 @@ impl Drive {
             if let Some(window) = output.window {
                 pipeline.deliver(window.end, network.estimate(&window.features));
             }
-            if start.is_none() && output.yaw_rate.status != Status::Init {
+            let Output { prompt, navigation, settled, vehicle, .. } = output;
+            if start.is_none() && prompt.status != Status::Init {
                 start = Some(steps.len());
             }
-            let Output { yaw_rate, vehicle, .. } = output;
-            let (time, settled) = (row.sample.time, yaw_rate.correction);
-            steps.push(Step { row: index, time, yaw_rate, settled, vehicle });
-            if let Some(settled) = output.settled {
-                // It is at most a few steps back.
-                let step = steps.iter_mut().rev().find(|step| step.yaw_rate.tick == settled.tick);
-                step.into_iter().for_each(|step| step.settled = settled.correction);
+            let (time, rate) = (row.sample.time, prompt.rate);
+            steps.push(Step { row: index, time, prompt, navigation: None, settled: rate, vehicle });
+            if navigation.status != Status::Init
+                && let Some(step) = earlier(&mut steps, navigation.tick)
+            {
+                step.navigation = Some(navigation);
+            }
+            if let Some(settled) = settled
+                && let Some(step) = earlier(&mut steps, settled.tick)
+            {
+                step.settled = AngularRate(settled.rate.0.saturating_sub(settled.correction.0));
             }
         }
         let gyro_bias = pipeline
             .gyro_bias()
             .ok_or_else(|| DriveError::NeverInitialised { path: recording.path.clone() })?;
         let start = start.unwrap_or(steps.len());
-        Ok(Self { steps, start, gyro_bias, counters: *pipeline.counters() })
+        Ok(Self { steps, start, gyro_bias, owed: pipeline.owed().navigation, counters: *pipeline.counters() })
+    }
+
+    /// The steps that have a navigation rate: from the end of static initialisation on.
+    #[must_use]
+    pub fn compared(&self) -> Range<usize> {
+        let sent = self.steps[self.start..].iter().take_while(|step| step.navigation.is_some()).count();
+        self.start..self.start + sent
+    }
+
+    /// The navigation rates of those.
+    pub fn navigation(&self) -> impl Iterator<Item = YawRate> {
+        self.steps[self.compared()].iter().filter_map(|step| step.navigation)
+    }
+
+    /// Gyro less static bias less the network's best estimate, of those.
+    pub fn settled(&self) -> impl Iterator<Item = AngularRate> {
+        self.steps[self.compared()].iter().map(|step| step.settled)
     }
 
     /// Writes the messages of the whole drive as a candump log, and says how many they are.
@@ -125,8 +159,13 @@ impl Drive {
     #[must_use]
     pub fn status_counts(&self) -> [(Status, usize); 4] {
         [Status::Init, Status::Degraded, Status::Ready, Status::Clipped]
-            .map(|status| (status, self.steps.iter().filter(|step| step.yaw_rate.status == status).count()))
+            .map(|status| (status, self.steps.iter().filter(|step| step.prompt.status == status).count()))
     }
+}
+
+/// The step of a sample, at most a few back.
+fn earlier(steps: &mut [Step], tick: u32) -> Option<&mut Step> {
+    steps.iter_mut().rev().find(|step| step.prompt.tick == tick)
 }
 
 #[cfg(test)]
@@ -158,12 +197,15 @@ mod tests {
     fn the_first_three_seconds_initialise() {
         let recording = recording(1_000, |_| 0.01, usize::MAX);
         let mut ticks = 0;
-        let drive = Drive::run(&recording, &mut Constant, || ticks += 1).unwrap();
+        // Nothing ever moves here: zero-rate updates would take the correction back off.
+        let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
+        let drive = Drive::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
         assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
         assert_eq!(drive.gyro_bias[2], recording.rows[0].sample.angular_rate[2]);
-        // Two estimates of 100 codes: what all samples owe is paid by the end.
-        let owed: i64 = drive.steps[300..].iter().map(|step| i64::from(step.yaw_rate.rate.0)).sum();
-        assert_eq!(owed, -100 * 700);
+        // Two estimates of 100 codes: all samples but the last, which no window has covered.
+        let sent: i64 = drive.navigation().map(|rate| i64::from(rate.rate.0)).sum();
+        assert_eq!((drive.compared(), sent), (300..993, -100 * 693));
+        assert_eq!(drive.owed, Yaw(-100 * 7));
         let [(_, init), (_, degraded), (_, ready), (_, clipped)] = drive.status_counts();
         assert_eq!((init, clipped), (300, 0));
         assert_eq!(degraded + ready, 700);
@@ -173,14 +215,14 @@ mod tests {
     #[test]
     fn a_gap_is_no_error() {
         let recording = recording(1_000, |_| 0.01, 700);
-        let drive = Drive::run(&recording, &mut Constant, || {}).unwrap();
+        let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
         assert_eq!((drive.counters.missing, recording.missing), (1, 1));
     }
 
     #[test]
     fn starting_in_a_turn_is_refused() {
         let recording = recording(1_000, |k| 0.001 * k as f64, usize::MAX);
-        let error = Drive::run(&recording, &mut Constant, || {}).unwrap_err();
+        let error = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
         assert!(matches!(error, DriveError::StartsMoving { line: 301, .. }), "{error:?}");
         assert!(error.to_string().starts_with("a.csv: starts moving: line 301: "), "{error}");
     }
@@ -188,7 +230,7 @@ mod tests {
     #[test]
     fn never_three_seconds_whole() {
         let recording = recording(400, |_| 0.01, 200);
-        let error = Drive::run(&recording, &mut Constant, || {}).unwrap_err();
+        let error = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
         assert_eq!(error, DriveError::NeverInitialised { path: "a.csv".into() });
     }
 }

@@ -1,6 +1,6 @@
 //! The yaw errors of each method, drive by drive: a table for people, JSON for programs.
 
-use crate::methods::{NAMES, PerMethod, Rates};
+use crate::methods::{Method, PerMethod, Rates};
 use crate::metrics::{WINDOW, YawError};
 use crate::recording::Recording;
 use gyronet::sample::RATE_HZ;
@@ -50,7 +50,7 @@ impl DriveErrors {
     pub fn new(recording: &Recording, rates: &Rates) -> Result<Self, EvaluateError> {
         let path = || recording.path.clone();
         let Some(reference) = &rates.reference else {
-            let mut rows = rates.drive.steps[rates.drive.start..].iter().map(|s| &recording.rows[s.row]);
+            let mut rows = rates.drive.steps[rates.drive.compared()].iter().map(|s| &recording.rows[s.row]);
             let line = rows.find(|row| row.reference.is_none()).map_or(1, |row| row.line);
             return Err(EvaluateError::NoReference { path: path(), line });
         };
@@ -80,8 +80,8 @@ impl Report {
     #[must_use]
     pub fn new(drives: Vec<DriveErrors>) -> Self {
         let of_method =
-            |k: usize| YawError::mean(&drives.iter().map(|d| *d.methods.each()[k]).collect::<Vec<_>>());
-        let mean = PerMethod::from_each(std::array::from_fn(of_method)).all();
+            |method| YawError::mean(&drives.iter().map(|drive| drive.methods[method]).collect::<Vec<_>>());
+        let mean = PerMethod::new(of_method).all();
         Self { drives, mean }
     }
 }
@@ -108,9 +108,10 @@ impl fmt::Display for Report {
 
 fn table(f: &mut fmt::Formatter<'_>, errors: &PerMethod<YawError>) -> fmt::Result {
     writeln!(f, "  {:<24}{:>14}{:>16}{:>14}", "yaw error", "in 1 s, rad", "to static init", "final, rad")?;
-    let baseline = errors.static_init.mean_1s_rad;
-    for (name, error) in NAMES.each().into_iter().zip(errors.each()) {
+    let baseline = errors[Method::Static].mean_1s_rad;
+    for (method, error) in errors.each() {
         let ratio = error.mean_1s_rad / baseline;
+        let name = method.name();
         writeln!(f, "  {name:<24}{:>14.6}{ratio:>16.3}{:>14.6}", error.mean_1s_rad, error.final_rad)?;
     }
     Ok(())
@@ -122,13 +123,17 @@ mod tests {
 
     fn report(drives: usize) -> Report {
         let error = |x| YawError { mean_1s_rad: x, final_rad: 2.0 * x, final_unwrapped_rad: 2.0 * x };
-        let methods = |scale: f64| PerMethod {
-            raw: error(scale),
-            static_init: error(0.5 * scale),
-            fir: error(2.0 * scale),
-            gyronet_f32: error(0.25 * scale),
-            gyronet_int: error(0.125 * scale),
-            default: error(0.0625 * scale),
+        let methods = |scale: f64| {
+            PerMethod::new(|method| {
+                error(match method {
+                    Method::Raw => scale,
+                    Method::Static => 0.5 * scale,
+                    Method::Fir => 2.0 * scale,
+                    Method::GyronetF32 => 0.25 * scale,
+                    Method::GyronetInt => 0.125 * scale,
+                    _ => 0.0625 * scale,
+                })
+            })
         };
         let drive = |k| DriveErrors {
             name: format!("drive{k}"),
@@ -144,7 +149,7 @@ mod tests {
         let json = serde_json::to_value(report(2)).unwrap();
         assert_eq!(json["drives"][0]["name"], "drive0");
         for (method, value) in
-            [("raw", 1.5), ("static", 0.75), ("fir", 3.0), ("gyronet_f32", 0.375), ("gyronet_int", 0.1875)]
+            [("raw", 1.5), ("static", 0.75), ("fir", 3.0), ("gyronet_f32", 0.375), ("default", 0.09375)]
         {
             assert!(json["drives"][1]["methods"][method]["mean_1s_rad"].is_f64());
             assert!(json["drives"][1]["methods"][method]["final_rad"].is_f64());
@@ -157,7 +162,7 @@ mod tests {
     fn table_is_aligned() {
         let text = report(2).to_string();
         let widths: Vec<usize> = text.lines().filter(|line| line.starts_with("  ")).map(str::len).collect();
-        assert_eq!(widths.len(), 21);
+        assert_eq!(widths.len(), 30);
         assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
         assert!(text.contains("mean of 2 drives"));
         assert!(!report(1).to_string().contains("mean of"));

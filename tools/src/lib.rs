@@ -1,5 +1,6 @@
 //! gyronet on a host: read recordings, simulate, quantise, replay, evaluate, draw.
 
+pub mod ablation;
 pub mod bundled;
 pub mod candump;
 pub mod checkpoint;
@@ -26,3 +27,4 @@ pub mod tensors;
 pub mod trajectory_error;
 pub mod via;
 pub mod weight_file;
+pub mod wheel_rates;

@@ -1,71 +1,139 @@
 //! The ways of getting a yaw rate that are compared with each other.
 
-use crate::drive::{Drive, DriveError, Step};
+use crate::drive::{Drive, DriveError};
 use crate::fir;
 use crate::recording::Recording;
+use crate::wheel_rates::WheelRates;
+use gyronet::compensate::{CompensateConfig, Mode};
 use gyronet::model::WindowNetwork;
+use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::ImuSample;
-use serde::Serialize;
+use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// One thing for each method.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PerMethod<T> {
+/// One way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
     /// The gyro as it is.
-    pub raw: T,
+    Raw,
     /// The gyro less its mean over the first 3 s.
-    #[serde(rename = "static")]
-    pub static_init: T,
+    Static,
     /// The gyro through a low-pass ([`crate::fir`]).
-    pub fir: T,
+    Fir,
+    /// Static initialisation and the newest output of a window every sample.
+    Newest,
+    /// Static initialisation and the middle outputs of a window every five samples.
+    Middle,
     /// Static initialisation and GyroNet in f32: the mean of both windows over each sample,
     /// which is known 110 ms later.
-    pub gyronet_f32: T,
+    GyronetF32,
     /// The same in integers.
-    pub gyronet_int: T,
-    /// What the board sends at once, with the integer network.
-    pub default: T,
+    GyronetInt,
+    /// What the board sends at once: Bosch TX1, VDC2.
+    Prompt,
+    /// What the board sends in its own yaw messages, some samples later.
+    Default,
 }
 
-/// Names of the methods, for people.
-pub const NAMES: PerMethod<&str> = PerMethod {
-    raw: "raw gyro",
-    static_init: "static initialisation",
-    fir: "FIR 10/15 Hz",
-    gyronet_f32: "GyroNet f32",
-    gyronet_int: "GyroNet integer",
-    default: "sent on CAN at once",
-};
-
-impl<T> PerMethod<T> {
+impl Method {
     /// In the order of the table.
-    pub fn each(&self) -> [&T; 6] {
-        [&self.raw, &self.static_init, &self.fir, &self.gyronet_f32, &self.gyronet_int, &self.default]
+    pub const ALL: [Self; 9] = [
+        Self::Raw,
+        Self::Static,
+        Self::Fir,
+        Self::Newest,
+        Self::Middle,
+        Self::GyronetF32,
+        Self::GyronetInt,
+        Self::Prompt,
+        Self::Default,
+    ];
+
+    /// For people.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raw => "raw gyro",
+            Self::Static => "static initialisation",
+            Self::Fir => "FIR 10/15 Hz",
+            Self::Newest => "newest output",
+            Self::Middle => "middle outputs",
+            Self::GyronetF32 => "overlap f32",
+            Self::GyronetInt => "overlap integer",
+            Self::Prompt => "sent at once",
+            Self::Default => "sent for navigation",
+        }
     }
 
-    /// From the order of the table.
-    pub fn from_each([raw, static_init, fir, gyronet_f32, gyronet_int, default]: [T; 6]) -> Self {
-        Self { raw, static_init, fir, gyronet_f32, gyronet_int, default }
+    /// For programs.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Raw => "raw",
+            Self::Static => "static",
+            Self::Fir => "fir",
+            Self::Newest => "newest",
+            Self::Middle => "middle",
+            Self::GyronetF32 => "gyronet_f32",
+            Self::GyronetInt => "gyronet_int",
+            Self::Prompt => "prompt",
+            Self::Default => "default",
+        }
+    }
+}
+
+/// One thing for each method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PerMethod<T>([T; Method::ALL.len()]);
+
+impl<T> PerMethod<T> {
+    /// One for each.
+    pub fn new(of: impl FnMut(Method) -> T) -> Self {
+        Self(Method::ALL.map(of))
+    }
+
+    /// In the order of the table.
+    pub fn each(&self) -> impl Iterator<Item = (Method, &T)> {
+        Method::ALL.into_iter().zip(&self.0)
     }
 
     /// The same of every method.
-    pub fn map<U>(&self, of: impl FnMut(&T) -> U) -> PerMethod<U> {
-        PerMethod::from_each(self.each().map(of))
+    pub fn map<U>(&self, mut of: impl FnMut(&T) -> U) -> PerMethod<U> {
+        PerMethod::new(|method| of(&self[method]))
     }
 }
 
-impl<T> PerMethod<Option<T>> {
+impl<T: Copy> PerMethod<Option<T>> {
     /// All, or nothing where one is missing.
     pub fn all(self) -> Option<PerMethod<T>> {
-        let Self { raw, static_init, fir, gyronet_f32, gyronet_int, default } = self;
-        Some(PerMethod {
-            raw: raw?,
-            static_init: static_init?,
-            fir: fir?,
-            gyronet_f32: gyronet_f32?,
-            gyronet_int: gyronet_int?,
-            default: default?,
-        })
+        let values: Option<Vec<T>> = self.0.into_iter().collect();
+        values?.try_into().ok().map(PerMethod)
     }
+}
+
+impl<T> std::ops::Index<Method> for PerMethod<T> {
+    type Output = T;
+
+    fn index(&self, method: Method) -> &T {
+        // The order of `ALL` is that of the variants.
+        &self.0[method as usize]
+    }
+}
+
+impl<T: Serialize> Serialize for PerMethod<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(Method::ALL.len()))?;
+        for (method, value) in self.each() {
+            map.serialize_entry(method.key(), value)?;
+        }
+        map.end()
+    }
+}
+
+/// The default, with estimates chosen in this way.
+#[must_use]
+pub fn with_mode(mode: Mode) -> PipelineConfig {
+    let compensate = CompensateConfig { mode, ..CompensateConfig::DEFAULT };
+    PipelineConfig { compensate, ..PipelineConfig::DEFAULT }
 }
 
 /// Yaw rates of one drive by each method, from the first sample after static initialisation.
@@ -81,9 +149,12 @@ pub struct Rates {
     pub drive: Drive,
 }
 
+/// How often [`Rates::new`] goes through a recording.
+pub const RUNS: usize = 4;
+
 impl Rates {
-    /// Runs every method. Both networks go through the very same pipeline. `tick` is called
-    /// twice for each row.
+    /// Runs every method. All networks go through the very same pipeline. `tick` is called
+    /// [`RUNS`] times for each row.
     ///
     /// # Errors
     /// [`DriveError`], when static initialisation does not succeed.
@@ -93,28 +164,35 @@ impl Rates {
         integer: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
     ) -> Result<Self, DriveError> {
-        let drive = Drive::run(recording, integer, &mut tick)?;
-        let float = Drive::run(recording, float, &mut tick)?;
-        let rows = || drive.steps.iter().map(|step| &recording.rows[step.row]);
+        let drive =
+            Drive::run(recording, &PipelineConfig::DEFAULT, WheelRates::new(recording), integer, &mut tick)?;
+        let float =
+            Drive::run(recording, &PipelineConfig::DEFAULT, WheelRates::new(recording), float, &mut tick)?;
+        let newest =
+            Drive::run(recording, &with_mode(Mode::Newest), WheelRates::new(recording), integer, &mut tick)?;
+        let middle =
+            Drive::run(recording, &with_mode(Mode::Middle), WheelRates::new(recording), integer, &mut tick)?;
+        let compared = || drive.steps[drive.compared()].iter();
         let [.., bias] = drive.gyro_bias;
-        let raw: Vec<f64> = rows().map(|row| yaw_rate(&row.sample)).collect();
-        let from_start = |rates: &[f64]| rates[drive.start..].to_vec();
-        let settled = |drive: &Drive| {
-            let rate = |step: &Step| yaw_rate(&recording.rows[step.row].sample) - bias.rad_per_sec();
-            let steps = drive.steps[drive.start..].iter();
-            steps.map(|step| rate(step) - step.settled.rad_per_sec()).collect()
-        };
-        let rates = PerMethod {
-            raw: from_start(&raw),
-            static_init: raw[drive.start..].iter().map(|rate| rate - bias.rad_per_sec()).collect(),
-            fir: from_start(&fir::filter(&fir::Design::PAPER.taps(), &raw)),
-            gyronet_f32: settled(&float),
-            gyronet_int: settled(&drive),
-            default: drive.steps[drive.start..].iter().map(|s| s.yaw_rate.rate.rad_per_sec()).collect(),
-        };
+        let gyro = |row: usize| yaw_rate(&recording.rows[row].sample);
+        // A filter starts with the recording.
+        let raw: Vec<f64> = drive.steps.iter().map(|step| gyro(step.row)).collect();
+        let filtered = fir::filter(&fir::Design::PAPER.taps(), &raw);
+        let settled = |drive: &Drive| drive.settled().map(|rate| rate.rad_per_sec()).collect();
+        let rates = PerMethod::new(|method| match method {
+            Method::Raw => compared().map(|step| gyro(step.row)).collect(),
+            Method::Static => compared().map(|step| gyro(step.row) - bias.rad_per_sec()).collect(),
+            Method::Fir => filtered[drive.compared()].to_vec(),
+            Method::Newest => settled(&newest),
+            Method::Middle => settled(&middle),
+            Method::GyronetF32 => settled(&float),
+            Method::GyronetInt => settled(&drive),
+            Method::Prompt => compared().map(|step| step.prompt.rate.rad_per_sec()).collect(),
+            Method::Default => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
+        });
         let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
-        let seconds = drive.steps[drive.start..].iter().map(|s| (s.time.0 - first) as f64 * 1e-6).collect();
-        let reference = rows().skip(drive.start).map(|row| row.reference).collect();
+        let seconds = compared().map(|step| (step.time.0 - first) as f64 * 1e-6).collect();
+        let reference = compared().map(|step| recording.rows[step.row].reference).collect();
         Ok(Self { seconds, rates, reference, drive })
     }
 }

@@ -1,6 +1,6 @@
 //! One picture of a drive: the yaw of each method, and below it what each is off by.
 
-use crate::methods::{NAMES, PerMethod, Rates};
+use crate::methods::{Method, Rates};
 use crate::metrics::DT;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -16,14 +16,14 @@ const GREY: RGBColor = RGBColor(90, 90, 90);
 
 /// Colours that the colour-blind can tell apart (Okabe and Ito, 2008), and line widths: the
 /// wider is drawn first, so that one curve under another still shows.
-const STYLES: PerMethod<(RGBColor, u32)> = PerMethod {
-    raw: (RGBColor(230, 159, 0), 2),
-    static_init: (RGBColor(0, 114, 178), 2),
-    fir: (RGBColor(204, 121, 167), 2),
-    gyronet_f32: (RGBColor(86, 200, 160), 4),
-    gyronet_int: (RGBColor(190, 60, 0), 2),
-    default: (RGBColor(150, 150, 150), 1),
-};
+const STYLES: [(Method, RGBColor, u32); 6] = [
+    (Method::Raw, RGBColor(230, 159, 0), 2),
+    (Method::Static, RGBColor(0, 114, 178), 2),
+    (Method::Fir, RGBColor(204, 121, 167), 2),
+    (Method::Prompt, RGBColor(150, 150, 150), 1),
+    (Method::GyronetInt, RGBColor(86, 200, 160), 4),
+    (Method::Default, RGBColor(190, 60, 0), 2),
+];
 
 /// What the plotting library says.
 type Failure = DrawingAreaErrorKind<std::io::Error>;
@@ -58,54 +58,47 @@ fn draw(svg: &mut String, title: &str, rates: &Rates) -> Result<(), Failure> {
     head.draw(&Text::new(title.to_owned(), (24, 18), (FONT, 26).into_font()))?;
     let (legend, body) = body.split_vertically(LEGEND_HEIGHT);
 
-    let yaw = rates.rates.map(|rate| integral(rate));
+    let yaw = STYLES.map(|(method, ..)| integral(&rates.rates[method]));
     let truth = rates.reference.as_deref().map(integral);
-    let curve = |values: Vec<f64>, (color, width): (RGBColor, u32)| Curve {
-        points: thinned(&rates.seconds, &values),
-        color,
-        width,
+    let curve =
+        |values: &[f64], color, width| Curve { points: thinned(&rates.seconds, values), color, width };
+    let curves = |values: &[Vec<f64>]| -> Vec<Curve> {
+        let styled = values.iter().zip(STYLES);
+        styled.map(|(values, (_, color, width))| curve(values, color, width)).collect()
     };
     let degrees = |values: &Vec<f64>| values.iter().map(|rad| rad.to_degrees()).collect::<Vec<f64>>();
-    let mut curves = paired(&yaw.map(degrees), curve);
+    let mut angles = curves(&yaw.each_ref().map(degrees));
     let Some(truth) = truth else {
-        draw_legend(&legend, &NAMES.map(|name| (*name).to_owned()), false)?;
-        let range = span(curves.iter());
-        panel(&body, "yaw, deg", range, &curves, true)?;
+        draw_legend(&legend, &STYLES.map(|(method, ..)| method.name().to_owned()), false)?;
+        let range = span(angles.iter());
+        panel(&body, "yaw, deg", range, &angles, true)?;
         return root.present();
     };
-    curves.push(curve(degrees(&truth), (BLACK, 2)));
+    angles.push(curve(&degrees(&truth), BLACK, 2));
 
     let errors =
         yaw.map(|yaw| yaw.iter().zip(&truth).map(|(yaw, truth)| (yaw - truth) * 1e3).collect::<Vec<f64>>());
-    let ends = errors.map(|error| error.last().copied().unwrap_or(0.0));
-    let label = |k: usize| format!("{}: ends {:+.1} mrad off", NAMES.each()[k], ends.each()[k]);
-    draw_legend(&legend, &PerMethod::from_each(std::array::from_fn(label)), true)?;
+    let end = |error: &[f64]| error.last().copied().unwrap_or(0.0);
+    let label = |k: usize| format!("{}: ends {:+.1} mrad off", STYLES[k].0.name(), end(&errors[k]));
+    draw_legend(&legend, &std::array::from_fn(label), true)?;
     let (upper, lower) = body.split_vertically((SIZE.1 - TITLE_HEIGHT - LEGEND_HEIGHT) * 48 / 100);
-    let range = span(curves.iter());
-    panel(&upper, "yaw, deg", range, &curves, false)?;
+    let range = span(angles.iter());
+    panel(&upper, "yaw, deg", range, &angles, false)?;
 
     // The corrected methods set the scale; what still has its bias may run off it.
-    let error_curves = paired(&errors, curve);
-    let corrected = [&errors.static_init, &errors.gyronet_f32, &errors.gyronet_int, &errors.default];
-    let corrected = corrected.map(|error| curve(error.clone(), (BLACK, 1)));
-    let (bottom, top) = span(corrected.iter());
+    let error_curves = curves(&errors);
+    let corrected = error_curves.iter().zip(STYLES);
+    let corrected = corrected.filter(|(_, (method, ..))| !matches!(method, Method::Raw | Method::Fir));
+    let (bottom, top) = span(corrected.map(|(curve, _)| curve));
     let clipped: Vec<Curve> = error_curves
-        .into_iter()
+        .iter()
         .flat_map(|curve| {
-            let Curve { points, color, width } = curve;
-            inside(&points, bottom, top).into_iter().map(move |points| Curve { points, color, width })
+            let &Curve { ref points, color, width } = curve;
+            inside(points, bottom, top).into_iter().map(move |points| Curve { points, color, width })
         })
         .collect();
     panel(&lower, "yaw error, mrad", (bottom, top), &clipped, true)?;
     root.present()
-}
-
-/// Curves of all methods; what was sent at once lies under the others.
-fn paired(values: &PerMethod<Vec<f64>>, curve: impl Fn(Vec<f64>, (RGBColor, u32)) -> Curve) -> Vec<Curve> {
-    let pairs = values.each().into_iter().zip(STYLES.each());
-    let mut curves: Vec<Curve> = pairs.map(|(values, style)| curve(values.clone(), *style)).collect();
-    curves.rotate_right(1);
-    curves
 }
 
 fn panel(
@@ -149,9 +142,9 @@ fn panel(
 }
 
 /// Rows of three, above the curves.
-fn draw_legend(area: &Area<'_>, labels: &PerMethod<String>, truth: bool) -> Result<(), Failure> {
+fn draw_legend(area: &Area<'_>, labels: &[String; STYLES.len()], truth: bool) -> Result<(), Failure> {
     let reference = (String::from("reference"), (BLACK, 2));
-    let methods = labels.each().into_iter().cloned().zip(STYLES.each().into_iter().copied());
+    let methods = labels.iter().cloned().zip(STYLES.map(|(_, color, width)| (color, width)));
     for (k, (label, (color, width))) in truth.then_some(reference).into_iter().chain(methods).enumerate() {
         let (x, y) = (88 + 370 * (k as i32 % 3), 8 + 28 * (k as i32 / 3));
         let line = [(x, y + 8), (x + 34, y + 8)];

@@ -5,7 +5,7 @@ use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::can::slcan;
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
-use gyronet::vehicle::{VehicleSample, YawSample};
+use gyronet::vehicle::{PromptSample, VehicleSample, YawSample};
 use gyronet_tools::candump::Log;
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -18,6 +18,7 @@ fn frames(samples: u32) -> Vec<DataFrame> {
     let mut feeds = Feeds::new(Config::DEFAULT);
     let rate = AngularRate::from_rad_per_sec(1_f32.to_radians()).unwrap();
     let sample = |tick: u32| VehicleSample {
+        prompt: PromptSample { rate, quality: gyronet::health::Quality::Good },
         yaw: YawSample {
             rate,
             yaw: Yaw(i64::from(rate.0) * i64::from(tick)),

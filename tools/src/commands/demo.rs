@@ -5,7 +5,7 @@ use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
 use gyronet_tools::evaluate::{DriveErrors, EvaluateError, Report};
-use gyronet_tools::methods::Rates;
+use gyronet_tools::methods::{self, Rates};
 use gyronet_tools::recording::Recording;
 use gyronet_tools::{bundled, plot};
 use std::io::Write;
@@ -38,7 +38,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         None => (bundled::simulated_drive()?, String::from("Yaw of a simulated drive")),
     };
-    let bar = progress::bar(common, 2 * recording.rows.len(), recording.name());
+    let bar = progress::bar(common, methods::RUNS * recording.rows.len(), recording.name());
     let mut integer = GyroNet::new(weights.blob()?);
     let rates = Rates::new(&recording, &mut checkpoint.network(), &mut integer, || bar.inc(1));
     bar.finish_and_clear();

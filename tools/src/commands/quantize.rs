@@ -4,6 +4,7 @@ use super::{Common, WriteError};
 use gyronet::fog::FogConfig;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogNet, GyroNet};
+use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::bundled;
 use gyronet_tools::checkpoint::Checkpoint;
 use gyronet_tools::drive::Drive;
@@ -62,7 +63,7 @@ fn gyronet(args: &Args) -> Made {
     for drive in &drives {
         let (mut integer, mut reference) = (GyroNet::new(weights.blob()?), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
-        Drive::run(drive, &mut both, || {})?;
+        Drive::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
         let error = both.error();
         println!(
             "{}: quantisation adds {:.2} % RMS ({:.2} % to the scale) over {} windows, {} inputs clamped",

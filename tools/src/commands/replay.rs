@@ -5,10 +5,12 @@ use super::{Common, WriteError, progress};
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
+use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::recording::Recording;
 use gyronet_tools::via::compare::{Bound, Difference, STAND_INS};
 use gyronet_tools::via::{Part, Via};
+use gyronet_tools::wheel_rates::WheelRates;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -77,10 +79,11 @@ fn replay(
     network: &mut GyroNet<'_>,
     mut tick: impl FnMut(),
 ) -> Result<(Drive, Option<Detour>), Box<dyn std::error::Error>> {
-    let direct = Drive::run(recording, network, &mut tick)?;
+    let config = PipelineConfig::DEFAULT;
+    let direct = Drive::run(recording, &config, WheelRates::new(recording), network, &mut tick)?;
     let Some(part) = part else { return Ok((direct, None)) };
     let via = part.send(recording)?;
-    let drive = Drive::run(&via.recording, network, &mut tick)?;
+    let drive = Drive::run(&via.recording, &config, WheelRates::new(recording), network, &mut tick)?;
     let bound = Bound::new(via.quantisation, recording, &direct, network, &mut tick)?;
     let difference = Difference::of_rates(&direct, &drive);
     Ok((drive, Some(Detour { part, via, difference, bound })))

@@ -7,7 +7,7 @@
 //! Information Fusion 91, 2023), without a magnetometer, once with its published defaults and once
 //! with limits of rest that a vehicle with its engine running keeps.
 
-use crate::drive::Drive;
+use crate::drive::{Drive, Step};
 use crate::fir;
 use crate::fog_drive;
 use crate::metrics::DT;
@@ -18,6 +18,7 @@ use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
 use gyronet::fog::FogConfig;
 use gyronet::model::WindowNetwork;
 use gyronet::model::fognet::MinuteNetwork;
+use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::seconds::Padding;
 use gyronet::units::AngularRate;
@@ -149,7 +150,9 @@ impl Estimates {
         let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
         let started = Instant::now();
-        let drive = Drive::run(recording, network, tick);
+        // The paper's network alone: no zero-rate updates behind it.
+        let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
+        let drive = Drive::run(recording, &config, None, network, tick);
         let run_time = started.elapsed().as_secs_f64();
         self.add(RAW, || constant(0.0));
         match drive {
@@ -157,8 +160,8 @@ impl Estimates {
                 let still = &gyro[..self.start];
                 self.add(STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
                 for (method, rates) in [
-                    (GYRONET, corrected(&drive, &gyro, |step| step.yaw_rate.correction.0 - step.settled.0)),
-                    (GYRONET_ONLINE, corrected(&drive, &gyro, |_| 0)),
+                    (GYRONET, corrected(&drive, &gyro, |step| step.settled)),
+                    (GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.prompt.rate)),
                 ] {
                     self.add(method, || rates);
                     if let Some(estimate) = self.methods.last_mut() {
@@ -191,16 +194,15 @@ impl Estimates {
     }
 }
 
-/// Rates as the board sends them, with an adjustment to each; where the board got no sample, the
-/// gyro's value in between, less what was last taken off.
-fn corrected(drive: &Drive, gyro: &[f64], adjusted: impl Fn(&crate::drive::Step) -> i32) -> Vec<f64> {
+/// One of the rates of each step; where the board got no sample, the gyro's value in between, less
+/// what was last taken off.
+fn corrected(drive: &Drive, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
     let mut steps = drive.steps.iter().peekable();
     let mut taken_off = 0.0;
     let rate = |(k, gyro): (usize, &f64)| {
         // A sample's time is its step's.
         while let Some(step) = steps.next_if(|step| step.time.0 <= k as u64 * PERIOD_US) {
-            let sent = step.yaw_rate.rate.0.saturating_add(adjusted(step));
-            taken_off = gyro - AngularRate(sent).rad_per_sec();
+            taken_off = gyro - which(step).rad_per_sec();
         }
         gyro - taken_off
     };

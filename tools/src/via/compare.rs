@@ -9,7 +9,7 @@
 //! - **bias**: the mean of the 300 samples of static initialisation is off by q / sqrt(12) /
 //!   sqrt(300), and that is taken off every sample: times N dt. Both terms count four times, as
 //!   4 sigma.
-//! - **network**: its answer is no formula. It is measured, not on the part's samples but on
+//! - **network**, and the zero-rate updates behind it: their answer is no formula. It is measured, not on the part's samples but on
 //!   stand-ins: the recording with even noise of the same steps on all six channels, from
 //!   [`STAND_INS`] seeds. Twice the largest departure that the sum of the corrections shows.
 //!
@@ -19,8 +19,10 @@
 use super::Quantisation;
 use crate::drive::{Drive, DriveError, Step};
 use crate::recording::Recording;
+use crate::wheel_rates::WheelRates;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::model::WindowNetwork;
+use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::{AngularRate, SpecificForce};
 use rand_chacha::ChaCha8Rng;
@@ -48,15 +50,15 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Of the rates that were sent.
+    /// Of the rates that were sent at once.
     #[must_use]
     pub fn of_rates(direct: &Drive, via: &Drive) -> Self {
-        Self::of(direct, via, |step| step.yaw_rate.rate)
+        Self::of(direct, via, |step| step.prompt.rate)
     }
 
     /// Of the corrections in them.
     fn of_corrections(direct: &Drive, via: &Drive) -> Self {
-        Self::of(direct, via, |step| step.yaw_rate.correction)
+        Self::of(direct, via, |step| step.prompt.correction)
     }
 
     /// From the first step after both have been initialised.
@@ -123,7 +125,9 @@ impl Bound {
         let bias = SIGMAS * sigma / f64::from(STATIC_SAMPLES).sqrt();
         let mut answer = Difference::default();
         for seed in 0..STAND_INS {
-            let drive = Drive::run(&stand_in(recording, quantisation, seed), network, &mut tick)?;
+            let (config, wheels) = (PipelineConfig::DEFAULT, WheelRates::new(recording));
+            let stand_in = stand_in(recording, quantisation, seed);
+            let drive = Drive::run(&stand_in, &config, wheels, network, &mut tick)?;
             let one = Difference::of_corrections(direct, &drive);
             answer.yaw_largest = answer.yaw_largest.max(one.yaw_largest);
             answer.rate_rms = answer.rate_rms.max(one.rate_rms);

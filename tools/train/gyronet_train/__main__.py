@@ -35,7 +35,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], metavar="N")
     parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="CPU threads")
     parser.add_argument("--no-turns", dest="turns", action="store_false", help="add no turns")
-    parser.add_argument("--no-units", dest="units", action="store_false", help="add no other units")
+    parser.add_argument("--units", action="store_true", help="add other units of the part")
+    parser.add_argument("--windows", type=int, default=1, help="windows of a span")
     return parser.parse_args()
 
 
@@ -54,7 +55,7 @@ def main() -> None:
     validation_drive = load_drive(args.data / f"trial{args.validate}_100hz.csv")
     static = mean_1s_error(validation_drive.gyro_error)
     print(f"static initialisation: 1 s error {static:.6f} rad")
-    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units)
+    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units, args.windows)
     networks: dict[int, Trained] = {}
     for seed in args.seeds:
         networks[seed] = train(

@@ -1,9 +1,10 @@
 """Training of one network with one seed.
 
 As in the paper: Adam with an initial rate of 0.0015 and mean absolute error over shuffled windows
-of 0.1 s. Other than there, windows come in spans as the firmware overlaps them (loss.py), turns and
-other units are added (augment.py), the rate follows one cycle, and what is kept is the running
-mean of the weights.
+of 0.1 s. Other than there, turns are added (augment.py), the rate follows one cycle, what is kept is
+the running mean of the weights, and a scale is trained (loss.py). Windows can come in spans as the
+firmware overlaps them, and as other units of the part would give them; the defaults do without, for
+on the validation drive neither the 1 s error nor the windows' mean error was better with them.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ class Settings:
     """Add turns."""
     units: bool
     """Add other units."""
-    windows: int = 3
-    """Windows of a span."""
+    windows: int
+    """Windows of a span; with one, the overlap has no part in the loss."""
     memory: float = 0.999
     """Of the running mean of the weights, a batch."""
 

@@ -6,6 +6,8 @@
 //! speeds up. A steady straight drive can still look like standing; where wheel speeds are
 //! known they decide.
 
+use super::spread::Spread;
+use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
@@ -78,11 +80,16 @@ pub enum StaticError {
     },
     /// The wheels turn.
     Wheels,
+    /// The accelerometer shows no vertical.
+    Level(LevelError),
 }
 
 impl core::fmt::Display for StaticError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let name = |axis: u8| ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?");
+        if let Self::Level(error) = self {
+            return error.fmt(f);
+        }
         f.write_str("the vehicle moves during static initialisation: ")?;
         match *self {
             Self::GyroNoise { axis, std } => write!(f, "gyro {} has a spread of {std:.4} rad/s", name(axis)),
@@ -99,46 +106,47 @@ impl core::fmt::Display for StaticError {
                 write!(f, "gyro {} shows a steady {mean:.4} rad/s", name(axis))
             }
             Self::Wheels => f.write_str("the wheels turn"),
+            Self::Level(_) => Ok(()),
         }
     }
 }
 
 impl core::error::Error for StaticError {}
 
-/// Sums of one axis.
+/// One axis.
 #[derive(Debug, Clone, Copy, Default)]
 struct Axis {
-    /// Of each second, in codes: exact.
-    sums: [i64; SECONDS],
-    /// Running mean and sum of squared deviations (Welford), in units.
-    mean: f32,
-    squares: f32,
+    all: Spread,
+    /// Sums of the codes of each second: exact.
+    seconds: [i64; SECONDS],
 }
 
 impl Axis {
-    fn push(&mut self, n: u32, code: i32, value: f32) {
-        self.sums[(n / RATE_HZ) as usize % SECONDS] += i64::from(code);
-        let delta = value - self.mean;
-        self.mean += delta / (n + 1) as f32;
-        self.squares += delta * (value - self.mean);
-    }
-
-    fn std(&self) -> f32 {
-        libm::sqrtf(self.squares / STATIC_SAMPLES as f32)
+    fn push(&mut self, code: i32, value: f32) {
+        self.seconds[(self.all.count() / RATE_HZ) as usize % SECONDS] += i64::from(code);
+        self.all.push(code, value);
     }
 
     /// Largest less smallest one-second mean, in units.
     fn drift(&self, per_unit: f32) -> f32 {
-        let largest = self.sums.iter().max().copied().unwrap_or(0);
-        let smallest = self.sums.iter().min().copied().unwrap_or(0);
+        let largest = self.seconds.iter().max().copied().unwrap_or(0);
+        let smallest = self.seconds.iter().min().copied().unwrap_or(0);
         (largest - smallest) as f32 / RATE_HZ as f32 / per_unit
     }
+}
 
-    /// Mean over all seconds, rounded to nearest.
-    fn mean_code(&self) -> i32 {
-        let total: i64 = self.sums.iter().sum();
-        (total + i64::from(STATIC_SAMPLES / 2)).div_euclid(i64::from(STATIC_SAMPLES)) as i32
-    }
+/// What the sensor reads at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Rest {
+    /// Mean angular rate: bias and Earth rate.
+    pub angular_rate: [AngularRate; 3],
+    /// Mean specific force: where up is.
+    pub specific_force: [SpecificForce; 3],
+    /// Standard deviation of each gyro axis, rad/s.
+    pub gyro_std: [f32; 3],
+    /// Standard deviation of each accelerometer axis, m/s^2.
+    pub accel_std: [f32; 3],
 }
 
 /// Static initialisation under way.
@@ -147,7 +155,6 @@ pub struct StaticInit {
     config: StaticConfig,
     gyro: [Axis; 3],
     accel: [Axis; 3],
-    count: u32,
     /// Turning wheels have been refused, and no sample has been taken since.
     wheels_refused: bool,
 }
@@ -156,27 +163,21 @@ impl StaticInit {
     /// Starts collecting.
     #[must_use]
     pub fn new(config: StaticConfig) -> Self {
-        Self {
-            config,
-            gyro: [Axis::default(); 3],
-            accel: [Axis::default(); 3],
-            count: 0,
-            wheels_refused: false,
-        }
+        Self { config, gyro: [Axis::default(); 3], accel: [Axis::default(); 3], wheels_refused: false }
     }
 
-    /// Takes a sample; after [`STATIC_SAMPLES`] of them returns the gyro's bias, or why there
+    /// Takes a sample; after [`STATIC_SAMPLES`] of them returns what it reads at rest, or why there
     /// is none, and starts anew.
-    pub fn process(&mut self, sample: &ImuSample) -> Option<Result<[AngularRate; 3], StaticError>> {
+    pub fn process(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {
             let rate = sample.angular_rate[axis].0;
             let force = sample.specific_force[axis].0;
-            self.gyro[axis].push(self.count, rate, rate as f32 / AngularRate::PER_RAD_PER_SEC);
-            self.accel[axis].push(self.count, force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
+            self.gyro[axis].push(rate, rate as f32 / AngularRate::PER_RAD_PER_SEC);
+            self.accel[axis].push(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
-        self.count += 1;
-        if self.count < STATIC_SAMPLES {
+        let [first, ..] = &self.gyro;
+        if first.all.count() < STATIC_SAMPLES {
             return None;
         }
         let result = self.judge();
@@ -197,14 +198,14 @@ impl StaticInit {
         *self = Self::new(self.config);
     }
 
-    fn judge(&self) -> Result<[AngularRate; 3], StaticError> {
+    fn judge(&self) -> Result<Rest, StaticError> {
         for axis in 0..3u8 {
             let (gyro, accel) = (&self.gyro[usize::from(axis)], &self.accel[usize::from(axis)]);
-            let std = gyro.std();
+            let std = gyro.all.std();
             if std > self.config.gyro_std {
                 return Err(StaticError::GyroNoise { axis, std });
             }
-            let std = accel.std();
+            let std = accel.all.std();
             if std > self.config.accel_std {
                 return Err(StaticError::AccelNoise { axis, std });
             }
@@ -216,11 +217,16 @@ impl StaticInit {
             if spread > self.config.accel_drift {
                 return Err(StaticError::AccelDrift { axis, spread });
             }
-            let mean = gyro.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC;
+            let mean = gyro.all.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC;
             if libm::fabsf(mean) > self.config.gyro_bias {
                 return Err(StaticError::GyroBias { axis, mean });
             }
         }
-        Ok(core::array::from_fn(|axis| AngularRate(self.gyro[axis].mean_code())))
+        Ok(Rest {
+            angular_rate: self.gyro.map(|axis| AngularRate(axis.all.mean_code())),
+            specific_force: self.accel.map(|axis| SpecificForce(axis.all.mean_code())),
+            gyro_std: self.gyro.map(|axis| axis.all.std()),
+            accel_std: self.accel.map(|axis| axis.all.std()),
+        })
     }
 }

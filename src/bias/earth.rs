@@ -1,0 +1,126 @@
+//! The rotation of the Earth, which every gyro sees and no map does.
+//!
+//! About the vertical it is 15.041 deg/h times the sine of the latitude, 9 deg/h at 37 degrees:
+//! nothing to a MEMS part, nearly all of the error of a fibre-optic gyro. A mean over standing
+//! still contains it; a bias from elsewhere (a store, a data sheet, a filter) does not.
+//! [`ZeroPoint`] is made from either, together with [`EarthRate`], and gives out one reading to
+//! be taken off: whichever way it was made, the Earth is in it once or left alone.
+
+use crate::units::AngularRate;
+
+/// Rotation of the Earth against the stars, rad/s (WGS 84).
+const EARTH_RATE: f32 = 7.292_115e-5;
+
+/// A geographic latitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Latitude(f32);
+
+impl Latitude {
+    /// In degrees, north positive; `None` when not finite or beyond a pole.
+    #[must_use]
+    pub const fn from_degrees(degrees: f32) -> Option<Self> {
+        if degrees >= -90.0 && degrees <= 90.0 { Some(Self(degrees)) } else { None }
+    }
+
+    /// Earth rate about the upward vertical.
+    #[must_use]
+    pub fn vertical_rate(self) -> AngularRate {
+        let rate = EARTH_RATE * libm::sinf(self.0.to_radians());
+        // 7e-5 rad/s at most.
+        AngularRate(libm::roundf(rate * AngularRate::PER_RAD_PER_SEC) as i32)
+    }
+}
+
+/// What becomes of the Earth's rotation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum EarthRate {
+    /// It is part of what is called bias. Right for a gyro that is initialised at rest on each
+    /// start, and whose bias nobody else needs.
+    #[default]
+    LeftInBias,
+    /// It is known, and the bias is the part's own.
+    Subtracted(Latitude),
+}
+
+impl EarthRate {
+    fn vertical(self) -> AngularRate {
+        match self {
+            Self::LeftInBias => AngularRate::ZERO,
+            Self::Subtracted(latitude) => latitude.vertical_rate(),
+        }
+    }
+}
+
+/// What a gyro whose z axis is vertical reads at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ZeroPoint {
+    bias: [AngularRate; 3],
+    earth: AngularRate,
+}
+
+impl ZeroPoint {
+    /// From the mean at rest, which contains the Earth rate.
+    #[must_use]
+    pub fn at_rest([x, y, z]: [AngularRate; 3], earth: EarthRate) -> Self {
+        let earth = earth.vertical();
+        Self { bias: [x, y, AngularRate(z.0.saturating_sub(earth.0))], earth }
+    }
+
+    /// From a bias that was found without the Earth rate in it.
+    #[must_use]
+    pub fn from_bias(bias: [AngularRate; 3], earth: EarthRate) -> Self {
+        Self { bias, earth: earth.vertical() }
+    }
+
+    /// What to take off the gyro.
+    #[must_use]
+    pub fn reading(&self) -> [AngularRate; 3] {
+        let [x, y, z] = self.bias;
+        [x, y, AngularRate(z.0.saturating_add(self.earth.0))]
+    }
+
+    /// The part's bias; with [`EarthRate::LeftInBias`] the Earth rate is in it.
+    #[must_use]
+    pub fn bias(&self) -> [AngularRate; 3] {
+        self.bias
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AT_37: EarthRate = EarthRate::Subtracted(Latitude(37.0));
+
+    #[test]
+    fn nine_degrees_an_hour_at_37_north() {
+        let rate = AT_37.vertical().rad_per_sec().to_degrees() * 3600.0;
+        assert!((rate - 9.0519).abs() < 1e-3, "{rate}");
+        let south = Latitude::from_degrees(-37.0).unwrap().vertical_rate();
+        assert_eq!(south.0, -AT_37.vertical().0);
+        assert_eq!(Latitude::from_degrees(90.1), None);
+        assert_eq!(Latitude::from_degrees(f32::NAN), None);
+    }
+
+    #[test]
+    fn a_mean_at_rest_is_the_reading_whatever_is_subtracted() {
+        let mean = [AngularRate(1), AngularRate(-2), AngularRate(50_000)];
+        for earth in [EarthRate::LeftInBias, AT_37] {
+            assert_eq!(ZeroPoint::at_rest(mean, earth).reading(), mean);
+        }
+        let [_, _, z] = ZeroPoint::at_rest(mean, AT_37).bias();
+        assert_eq!(z.0, 50_000 - AT_37.vertical().0);
+        assert_eq!(ZeroPoint::at_rest(mean, EarthRate::LeftInBias).bias(), mean);
+    }
+
+    #[test]
+    fn a_bias_from_elsewhere_gets_the_earth_added() {
+        let bias = [AngularRate(1), AngularRate(-2), AngularRate(-50_000)];
+        let [x, y, z] = ZeroPoint::from_bias(bias, AT_37).reading();
+        assert_eq!((x.0, y.0, z.0), (1, -2, AT_37.vertical().0 - 50_000));
+        assert_eq!(ZeroPoint::from_bias(bias, EarthRate::LeftInBias).reading(), bias);
+    }
+}

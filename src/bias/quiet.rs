@@ -1,0 +1,111 @@
+//! Standing still without wheels: a judgement by the inertial sensors, which may only tighten.
+//!
+//! A steady turn looks like a bias, so an estimator that trusts a quiet gyro takes slow turns
+//! for bias and drifts worse than none. What counts as quiet here can therefore never be more
+//! than what static initialisation lets pass: each limit is the smaller of its own and of a
+//! margin above what this vehicle showed when it stood at the start. Quiet is asserted after
+//! some whole seconds whose means agree with the first one's, axis by axis, so that a turn that
+//! begins slowly ends it. And the mean itself must be one that the bias can have: that gate is
+//! [`super::zero_rate`]'s, and as narrow as the bias is well known.
+
+use super::spread::Spread;
+use super::static_init::{Rest, StaticConfig};
+use crate::sample::{ImuSample, RATE_HZ};
+use crate::units::{AngularRate, SpecificForce};
+
+/// How much tighter than static initialisation.
+#[derive(Debug, Clone, Copy)]
+pub struct QuietConfig {
+    /// Largest standard deviation over that of static initialisation.
+    pub std_ratio: f32,
+    /// Largest change of a gyro axis' one-second mean, rad/s.
+    pub gyro_drift: f32,
+    /// Largest change of an accelerometer axis' one-second mean, m/s^2.
+    pub accel_drift: f32,
+    /// Whole seconds before quiet is asserted.
+    pub seconds: u8,
+}
+
+impl QuietConfig {
+    /// For a car whose engine may run. The test `quiet_stretches` holds it against eight real
+    /// drives.
+    pub const DEFAULT: Self = Self { std_ratio: 1.5, gyro_drift: 7e-4, accel_drift: 0.06, seconds: 3 };
+}
+
+/// Six axes, gyro first: values in rad/s and m/s^2.
+type Axes = [f32; 6];
+
+/// The judgement under way.
+#[derive(Debug, Clone)]
+pub struct QuietDetector {
+    std: Axes,
+    drift: Axes,
+    seconds: u8,
+    block: [Spread; 6],
+    /// Means of the first second of the run.
+    first: Option<Axes>,
+    run: u8,
+}
+
+impl QuietDetector {
+    /// Limits for a vehicle that showed `rest` at the start; never above static initialisation's.
+    #[must_use]
+    pub fn new(config: QuietConfig, limits: &StaticConfig, rest: &Rest) -> Self {
+        let gyro = |axis: usize| (config.std_ratio * rest.gyro_std[axis]).min(limits.gyro_std);
+        let accel = |axis: usize| (config.std_ratio * rest.accel_std[axis]).min(limits.accel_std);
+        let gyro_drift = config.gyro_drift.min(limits.gyro_drift);
+        let accel_drift = config.accel_drift.min(limits.accel_drift);
+        Self {
+            std: [gyro(0), gyro(1), gyro(2), accel(0), accel(1), accel(2)],
+            drift: [gyro_drift, gyro_drift, gyro_drift, accel_drift, accel_drift, accel_drift],
+            seconds: config.seconds.max(1),
+            block: [Spread::default(); 6],
+            first: None,
+            run: 0,
+        }
+    }
+
+    /// Takes a sample; says whether all is quiet, as far as the last whole second tells.
+    pub fn process(&mut self, sample: &ImuSample) -> bool {
+        let [block_x, ..] = &self.block;
+        let count = block_x.count() + 1;
+        let (gyro, accel) = self.block.split_at_mut(3);
+        for (spread, rate) in gyro.iter_mut().zip(sample.angular_rate) {
+            spread.push(rate.0, rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
+        }
+        for (spread, force) in accel.iter_mut().zip(sample.specific_force) {
+            spread.push(force.0, force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
+        }
+        if sample.clipped {
+            self.restart();
+        } else if count == RATE_HZ {
+            self.judge();
+        }
+        self.run >= self.seconds
+    }
+
+    /// After a gap: what was quiet before it says nothing.
+    pub fn restart(&mut self) {
+        self.block = [Spread::default(); 6];
+        self.first = None;
+        self.run = 0;
+    }
+
+    fn judge(&mut self) {
+        let block = core::mem::take(&mut self.block);
+        let per_unit = |axis: usize| {
+            if axis < 3 { AngularRate::PER_RAD_PER_SEC } else { SpecificForce::PER_METRE_PER_SEC2 }
+        };
+        let means: Axes = core::array::from_fn(|axis| block[axis].mean_code() as f32 / per_unit(axis));
+        let calm = (0..6).all(|axis| block[axis].std() <= self.std[axis]);
+        let first = *self.first.get_or_insert(means);
+        let steady = (0..6).all(|axis| libm::fabsf(means[axis] - first[axis]) <= self.drift[axis]);
+        if calm && steady {
+            self.run = self.run.saturating_add(1);
+        } else {
+            // This second may be the first of a new run.
+            self.first = calm.then_some(means);
+            self.run = u8::from(calm);
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! Mean and spread of a run of readings, in one pass.
+
+/// Sum (exact) and squared deviations (Welford's way: B. P. Welford, Technometrics 4, 1962).
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Spread {
+    count: u32,
+    sum: i64,
+    mean: f32,
+    squares: f32,
+}
+
+impl Spread {
+    /// Takes a reading as code and as value.
+    pub fn push(&mut self, code: i32, value: f32) {
+        self.count += 1;
+        self.sum += i64::from(code);
+        let delta = value - self.mean;
+        self.mean += delta / self.count as f32;
+        self.squares += delta * (value - self.mean);
+    }
+
+    /// How many readings.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Mean of the codes, rounded to nearest; zero of none.
+    pub fn mean_code(&self) -> i32 {
+        let count = i64::from(self.count.max(1));
+        (self.sum + count / 2).div_euclid(count) as i32
+    }
+
+    /// Variance of the values.
+    pub fn variance(&self) -> f32 {
+        self.squares / self.count.max(1) as f32
+    }
+
+    /// Standard deviation of the values.
+    pub fn std(&self) -> f32 {
+        libm::sqrtf(self.variance())
+    }
+}

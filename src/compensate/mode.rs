@@ -1,0 +1,134 @@
+//! Which of a window's outputs are used, how often a window runs, and how late the rate goes out.
+
+use crate::window::WINDOW;
+use core::ops::Range;
+
+/// An estimate is used this many samples after its window's newest one, whatever the time the
+/// network took: the board's frames then do not depend on its speed. A window every sample has
+/// to be ready with the next one.
+pub const DELAY: u32 = 2;
+
+/// Samples between two windows: 1 to [`WINDOW`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Hop(u8);
+
+impl Hop {
+    /// Half a window: every sample is seen by two.
+    pub const HALF: Self = Self(WINDOW as u8 / 2);
+
+    /// `None` outside the range: samples would be left without an estimate.
+    #[must_use]
+    pub const fn new(samples: u8) -> Option<Self> {
+        if samples >= 1 && samples as usize <= WINDOW { Some(Self(samples)) } else { None }
+    }
+
+    /// In samples.
+    #[must_use]
+    pub const fn samples(self) -> u32 {
+        self.0 as u32
+    }
+}
+
+/// Samples between one that was taken and the frame with its rate: 0 to [`Lag::MAX`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Lag(u8);
+
+impl Lag {
+    /// At once.
+    pub const NONE: Self = Self(0);
+    /// From here on no window changes a sample's estimate any more.
+    pub const MAX: Self = Self((WINDOW + DELAY as usize - 1) as u8);
+
+    /// `None` beyond [`Lag::MAX`]: waiting longer gains nothing.
+    #[must_use]
+    pub const fn new(samples: u8) -> Option<Self> {
+        if samples <= Self::MAX.0 { Some(Self(samples)) } else { None }
+    }
+
+    /// In samples.
+    #[must_use]
+    pub const fn samples(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// How the estimate of a sample is chosen from the windows that cover it.
+///
+/// The newest output of a window knows only the past and is the worst, those in the middle know
+/// both sides. `cargo gyronet evaluate --ablation` compares the modes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Mode {
+    /// A window every sample, of which the newest output is used: the obvious online choice.
+    Newest,
+    /// A window every five samples, of which the five in the middle are used.
+    Middle,
+    /// The mean of all windows that cover a sample.
+    Overlap {
+        /// Samples between two windows.
+        hop: Hop,
+    },
+}
+
+impl Mode {
+    /// Samples between two windows.
+    #[must_use]
+    pub const fn hop(self) -> u32 {
+        match self {
+            Self::Newest => 1,
+            Self::Middle => Hop::HALF.samples(),
+            Self::Overlap { hop } => hop.samples(),
+        }
+    }
+
+    /// Samples from a window's newest one to the use of its estimate.
+    #[must_use]
+    pub const fn delay(self) -> u32 {
+        if self.hop() < DELAY { self.hop() } else { DELAY }
+    }
+
+    /// The outputs of a window that are used, oldest first.
+    #[must_use]
+    pub const fn used(self) -> Range<usize> {
+        match self {
+            Self::Newest => WINDOW - 1..WINDOW,
+            // One each for every sample, and as many behind the newest used one as before the
+            // oldest, where the number allows.
+            Self::Middle => 3..8,
+            Self::Overlap { .. } => 0..WINDOW,
+        }
+    }
+
+    /// Samples after which no window changes an estimate any more.
+    #[must_use]
+    pub const fn settled_after(self) -> usize {
+        WINDOW - 1 - self.used().start + self.delay() as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_makes_sense_can_be_said() {
+        assert_eq!((Hop::new(0), Hop::new(11)), (None, None));
+        assert_eq!(Hop::new(5), Some(Hop::HALF));
+        assert_eq!((Lag::new(11), Lag::new(12)), (Some(Lag::MAX), None));
+    }
+
+    #[test]
+    fn every_sample_gets_an_estimate_and_none_is_read_too_late() {
+        let overlap = (1..=10).filter_map(Hop::new).map(|hop| Mode::Overlap { hop });
+        for mode in [Mode::Newest, Mode::Middle].into_iter().chain(overlap) {
+            assert!(mode.used().len() >= mode.hop() as usize, "{mode:?}");
+            assert!(mode.delay() >= 1 && mode.delay() <= mode.hop(), "{mode:?}");
+            assert!(mode.settled_after() <= Lag::MAX.samples(), "{mode:?}");
+        }
+        assert_eq!(Mode::Newest.settled_after(), 1);
+        assert_eq!(Mode::Middle.settled_after(), 8);
+        assert_eq!(Mode::Overlap { hop: Hop::HALF }.settled_after(), 11);
+    }
+}

@@ -1,0 +1,41 @@
+//! Everything that can be set.
+
+use crate::bias::{EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
+use crate::compensate::CompensateConfig;
+use crate::mounting::{Levelling, Rotation};
+use crate::uncertainty::UncertaintyConfig;
+
+/// Settings of the pipeline.
+#[derive(Debug, Clone, Copy)]
+pub struct PipelineConfig {
+    /// How the board sits in the vehicle.
+    pub mounting: Rotation,
+    /// When the accelerometer corrects that.
+    pub levelling: Levelling,
+    /// Limits of static initialisation.
+    pub static_init: StaticConfig,
+    /// What becomes of the Earth's rotation.
+    pub earth_rate: EarthRate,
+    /// Zero-rate updates; without them static initialisation is all.
+    pub zero_rate: Option<ZeroRateConfig>,
+    /// Standing still without wheels.
+    pub quiet: QuietConfig,
+    /// From estimates to rates.
+    pub compensate: CompensateConfig,
+    /// What a rate is said to be worth.
+    pub uncertainty: UncertaintyConfig,
+}
+
+impl PipelineConfig {
+    /// A MEMS part on a car.
+    pub const DEFAULT: Self = Self {
+        mounting: Rotation::IDENTITY,
+        levelling: Levelling::DEFAULT,
+        static_init: StaticConfig::DEFAULT,
+        earth_rate: EarthRate::LeftInBias,
+        zero_rate: Some(ZeroRateConfig::DEFAULT),
+        quiet: QuietConfig::DEFAULT,
+        compensate: CompensateConfig::DEFAULT,
+        uncertainty: UncertaintyConfig::DEFAULT,
+    };
+}

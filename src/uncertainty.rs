@@ -1,0 +1,63 @@
+//! What a corrected rate is said to be worth.
+//!
+//! The number sent with each rate is the expected error of the mean rate over one second, 1
+//! sigma: over a single sample vibration is all there is, and nobody turns a car in 10 ms. Its
+//! parts are taken for independent: the network's, from what it expects of its own windows
+//! ([`crate::model::Estimate::scale`]), and the bias', from the zero-rate updates.
+
+use crate::units::AngularRate;
+
+/// From the network's own expectation to the error over a second.
+#[derive(Debug, Clone, Copy)]
+pub struct UncertaintyConfig {
+    /// Sigma of a second's error over the RMS of the scales of its windows.
+    pub per_scale: f32,
+    /// Sigma of a second that the network has not corrected, rad/s.
+    pub uncorrected: f32,
+}
+
+impl UncertaintyConfig {
+    /// Calibrated on the validation drive alone (`cargo gyronet evaluate --ablation`).
+    pub const DEFAULT: Self = Self { per_scale: 0.25, uncorrected: 2.5e-4 };
+}
+
+/// Windows over which the network's expectation is averaged: about a second at the default hop.
+const WINDOWS: f32 = 20.0;
+
+/// What is expected now.
+#[derive(Debug, Clone)]
+pub struct Uncertainty {
+    config: UncertaintyConfig,
+    /// Running mean square of the windows' scales, (rad/s)^2.
+    scale_square: Option<f32>,
+}
+
+impl Uncertainty {
+    /// No window yet.
+    #[must_use]
+    pub fn new(config: UncertaintyConfig) -> Self {
+        Self { config, scale_square: None }
+    }
+
+    /// Takes what a window expects of itself.
+    pub fn window(&mut self, scale: AngularRate) {
+        let scale = scale.0 as f32 / AngularRate::PER_RAD_PER_SEC;
+        let square = scale * scale;
+        let before = self.scale_square.unwrap_or(square);
+        self.scale_square = Some(before + (square - before) / WINDOWS);
+    }
+
+    /// Of a rate that the network has `corrected` or not, with a bias of this uncertainty, rad/s;
+    /// rounded up.
+    #[must_use]
+    pub fn sigma(&self, corrected: bool, bias: f32) -> AngularRate {
+        let UncertaintyConfig { per_scale, uncorrected } = self.config;
+        let own = match self.scale_square {
+            Some(scale_square) if corrected => per_scale * per_scale * scale_square,
+            _ => uncorrected * uncorrected,
+        };
+        let sigma = libm::sqrtf(own + bias * bias);
+        // Beyond the code's range the cast saturates.
+        AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
+    }
+}

@@ -1,0 +1,85 @@
+//! Wheel speeds from wherever they come, and whether the vehicle stands.
+//!
+//! Standing still is decided here, because a bias estimator that trusts the gyro alone takes a
+//! slow turn for bias. It is asserted late and dropped at once: all wheels must have been fresh
+//! and slow for a while, and one wheel that moves, is silent or not valid ends it. Wheel
+//! sensors of the passive kind show zero below walking pace, hence the while.
+
+use crate::sample::{Standstill, WHEELS, WheelSample};
+use crate::units::{Micros, WheelSpeed};
+
+/// When wheels stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct StandstillRule {
+    /// A speed that is older says nothing.
+    pub timeout_us: u64,
+    /// Up to this speed a wheel may stand still.
+    pub still_speed: WheelSpeed,
+    /// So long all wheels must be that slow.
+    pub still_for_us: u64,
+}
+
+/// The wheels of a vehicle: the newest speed of each, and since when they have been slow.
+#[derive(Debug, Clone, Copy)]
+pub struct Wheels {
+    rule: StandstillRule,
+    /// Wheels that there are.
+    expected: [bool; WHEELS],
+    speeds: [Option<(WheelSpeed, Micros)>; WHEELS],
+    still_since: Option<Micros>,
+}
+
+impl Wheels {
+    /// Nothing known yet.
+    #[must_use]
+    pub const fn new(rule: StandstillRule, expected: [bool; WHEELS]) -> Self {
+        Self { rule, expected, speeds: [None; WHEELS], still_since: None }
+    }
+
+    /// Drops what is too old. Call it before new speeds are taken.
+    pub fn expire(&mut self, now: Micros) {
+        for slot in &mut self.speeds {
+            let old = |(_, at): &(_, Micros)| now.0.saturating_sub(at.0) > self.rule.timeout_us;
+            *slot = slot.take_if(|speed| !old(speed));
+        }
+        if !self.complete() {
+            self.still_since = None;
+        }
+    }
+
+    /// Takes a wheel's speed; `None` where it is marked as not valid.
+    pub fn set(&mut self, wheel: usize, speed: Option<WheelSpeed>, now: Micros) {
+        if let Some(slot) = self.speeds.get_mut(wheel) {
+            *slot = speed.map(|speed| (speed, now));
+        }
+    }
+
+    /// Looks at the new speeds.
+    pub fn judge(&mut self, now: Micros) {
+        let limit = self.rule.still_speed.0.unsigned_abs();
+        let slow = self.speeds.iter().flatten().all(|(speed, _)| speed.0.unsigned_abs() <= limit);
+        if slow && self.complete() {
+            self.still_since.get_or_insert(now);
+        } else {
+            self.still_since = None;
+        }
+    }
+
+    /// What is known now.
+    #[must_use]
+    pub fn sample(&self, now: Micros) -> WheelSample {
+        let standstill = match self.still_since {
+            Some(since) if now.0.saturating_sub(since.0) >= self.rule.still_for_us => Standstill::Still,
+            Some(_) => Standstill::Unknown,
+            None if self.complete() => Standstill::Moving,
+            None => Standstill::Unknown,
+        };
+        WheelSample { time: now, speeds: self.speeds.map(|speed| speed.map(|(speed, _)| speed)), standstill }
+    }
+
+    /// Every wheel that there is has a fresh speed.
+    fn complete(&self) -> bool {
+        self.speeds.iter().zip(self.expected).all(|(speed, expected)| speed.is_some() || !expected)
+    }
+}
