@@ -11,6 +11,7 @@
 //! drifts by in minutes.
 
 use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork, weights};
+use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet::window::{Features, WINDOW};
 use gyronet_host_tests::recordings;
@@ -94,7 +95,8 @@ impl WindowNetwork for Seen<'_> {
 /// 1 s error of the settled rate, and of the gyro less its static mean, rad.
 fn errors(recording: &Recording, seen: Unit) -> [f64; 2] {
     let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-    let drive = Drive::run(recording, &mut Seen(network, seen), || {}).expect("it stands still first");
+    let drive = Drive::run(recording, &PipelineConfig::DEFAULT, None, &mut Seen(network, seen), || {})
+        .expect("it stands still first");
     let steps = &drive.steps[drive.start..];
     let reference: Vec<f64> =
         steps.iter().map(|step| recording.rows[step.row].reference.expect("the trials have one")).collect();

@@ -90,7 +90,7 @@ impl<'w> GyroNet<'w> {
     }
 
     /// The newest sample's correction only, without a scale, and the clamped inputs. The backward half of layer 2
-    /// needs just its first steps for that, which saves a third of the work; the result is the
+    /// needs just its first step for that, which saves a third of the work; the result is the
     /// last of [`WindowNetwork::estimate`]'s, bit for bit.
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
         let clamped_inputs = self.load(window);
@@ -112,8 +112,9 @@ impl<'w> GyroNet<'w> {
         };
         Pass::new(Way::Forward)
             .finish(&second.forward, layer1, scratch, |step, hidden| add(forward, step, hidden));
-        Pass::new(Way::Backward)
-            .advance(&second.backward, layer1, scratch, |step, hidden| add(backward, step, hidden));
+        Pass::first(Way::Backward, &second.backward, layer1, scratch, |step, hidden| {
+            add(backward, step, hidden);
+        });
         (AngularRate(dense.scale(sum)), clamped_inputs)
     }
 

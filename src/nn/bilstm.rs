@@ -79,6 +79,27 @@ impl Pass {
         self.done < pairs
     }
 
+    /// The first step of a pass alone, for whoever needs no other: half a pair. Hands its number
+    /// and hidden state to `emit`.
+    pub fn first<const U: usize, const W: usize>(
+        way: Way,
+        direction: &Direction<'_>,
+        input: &[u32],
+        scratch: &mut Scratch<U, W>,
+        emit: impl FnOnce(usize, &[u32; W]),
+    ) {
+        let words = direction.inputs();
+        let (pair, first) = match way {
+            Way::Forward => (0, 0),
+            Way::Backward => (input.len() / words - 1, 1),
+        };
+        let Scratch { cell_state, hidden: [hidden, _], projection } = scratch;
+        lstm::project(direction, &input[pair * words..(pair + 1) * words], projection);
+        *cell_state = [0; U];
+        lstm::step(direction, &projection[first], None, cell_state, hidden);
+        emit(2 * pair + first, hidden);
+    }
+
     /// All steps that are left.
     pub fn finish<const U: usize, const W: usize>(
         mut self,
