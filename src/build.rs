@@ -3,9 +3,13 @@
 
 use std::{env, fs, path::PathBuf};
 
+/// What only the image that is flashed must keep to.
+const SLOTS: &str = "src/bin/coprocessor/slots.x";
+
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rerun-if-changed=src/build.rs");
+    println!("cargo:rerun-if-changed={SLOTS}");
     println!("cargo:rustc-check-cfg=cfg(gyronet_dsp, gyronet_armv8m)");
     if env::var("TARGET").is_ok_and(|target| target.starts_with("thumbv8m.main")) {
         println!("cargo:rustc-cfg=gyronet_armv8m");
@@ -18,6 +22,7 @@ fn main() {
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
         fs::copy("memory.x", out.join("memory.x")).expect("memory.x stands in the package root");
         println!("cargo:rustc-link-search={}", out.display());
+        println!("cargo:rustc-link-arg-bin=coprocessor=-T{SLOTS}");
     }
 }
 

@@ -1,5 +1,7 @@
 //! What the board thinks of itself: status, source and one counter for each kind of event.
 
+use serde::{Deserialize, Serialize};
+
 /// State of the corrected yaw rate.
 ///
 /// | status | when | yaw rate on CAN |
@@ -8,7 +10,7 @@
 /// | `Degraded` | bias known, no believable window yet, or a gap or clipping broke it | gyro less bias |
 /// | `Ready` | a believable window covers the recent samples | gyro less bias and correction |
 /// | `Clipped` | the part says that it is saturated | marked failed |
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {
     /// No bias yet: the rate is shown but not good.
@@ -100,7 +102,7 @@ pub const fn judge(status: Status) -> (Source, Quality) {
 }
 
 /// How often each kind of event happened since start. They saturate, they do not wrap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
     /// Samples that became frames.

@@ -15,6 +15,8 @@ pub mod pipeline;
 pub mod sample;
 pub mod seconds;
 pub mod sensor;
+pub mod service;
+pub mod store;
 pub mod uncertainty;
 pub mod units;
 pub mod vehicle;

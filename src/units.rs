@@ -4,6 +4,8 @@
 //! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
 //! and the scaled reading are different methods.
 
+use serde::{Deserialize, Serialize};
+
 /// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
@@ -30,7 +32,7 @@ impl core::fmt::Display for RangeError {
 impl core::error::Error for RangeError {}
 
 /// Angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngularRate(pub i32);
 
@@ -58,7 +60,7 @@ impl AngularRate {
 }
 
 /// Specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpecificForce(pub i32);
 
@@ -171,7 +173,7 @@ impl WheelSpeed {
 }
 
 /// Temperature of the part, in 1/100 deg C.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CentiCelsius(pub i16);
 

@@ -39,7 +39,9 @@ impl Window {
 
     /// Adds the newest sample.
     pub fn push(&mut self, features: Features) {
-        self.ring[self.next] = features;
+        if let Some(place) = self.ring.get_mut(self.next) {
+            *place = features;
+        }
         self.next = (self.next + 1) % WINDOW;
         self.filled = (self.filled + 1).min(WINDOW);
     }

@@ -36,7 +36,7 @@ struct Bar {
 const BARS: [Bar; 4] = [
     Bar { name: "gyronet/window", instructions: 1_200_000, cycles: 1_500_000 },
     Bar { name: "gyronet/newest", instructions: 850_000, cycles: 1_100_000 },
-    Bar { name: "fognet/window", instructions: 23_500_000, cycles: 30_000_000 },
+    Bar { name: "fognet/window", instructions: 20_500_000, cycles: 26_000_000 },
     // What keeps a task of the same priority waiting.
     Bar { name: "fognet/piece", instructions: 190_000, cycles: 230_000 },
 ];

@@ -10,6 +10,7 @@ use super::spread::Spread;
 use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
+use serde::{Deserialize, Serialize};
 
 /// Samples of the static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
@@ -18,7 +19,7 @@ const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 /// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
 /// none of 656 (overlapping) stretches with standing wheels and a running engine is refused, and
 /// 3,177 of 3,247 driven ones are.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StaticConfig {
     /// Standard deviation of each gyro axis, rad/s.
     pub gyro_std: f32,

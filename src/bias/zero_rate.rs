@@ -176,8 +176,8 @@ impl ZeroRate {
     pub fn bias(&self) -> AngularRate {
         let stands = self.proof != Proof::None && !self.refused;
         let bias = if stands { self.bias + self.offset } else { self.bias };
-        let largest = 2.0 * self.config.max_bias;
-        AngularRate(libm::roundf(bias.clamp(-largest, largest) * AngularRate::PER_RAD_PER_SEC) as i32)
+        let bias = within(bias, 2.0 * self.config.max_bias);
+        AngularRate(libm::roundf(bias * AngularRate::PER_RAD_PER_SEC) as i32)
     }
 
     /// Uncertainty of the bias when driving, 1 sigma, rad/s.
@@ -246,12 +246,17 @@ impl ZeroRate {
         let per_variance = 1.0 / (with_bias + with_offset + measured.variance);
         let (bias_gain, offset_gain) = (with_bias * per_variance, with_offset * per_variance);
         let largest = self.config.max_bias;
-        self.bias = (self.bias + bias_gain * innovation).clamp(-largest, largest);
-        self.offset = (self.offset + offset_gain * innovation).clamp(-largest, largest);
+        self.bias = within(self.bias + bias_gain * innovation, largest);
+        self.offset = within(self.offset + offset_gain * innovation, largest);
         self.covariance = Covariance {
             bias: (bias - bias_gain * with_bias).max(0.0),
             both: both - bias_gain * with_offset,
             offset: (offset - offset_gain * with_offset).max(0.0),
         };
     }
+}
+
+/// Bounded to +-`largest`. (`clamp` would panic on bounds that a configuration has made NaN.)
+fn within(value: f32, largest: f32) -> f32 {
+    value.max(-largest).min(largest)
 }

@@ -39,6 +39,6 @@ impl Frame for DataFrame {
     }
 
     fn data(&self) -> &[u8] {
-        &self.data[..usize::from(self.len)]
+        self.data.get(..usize::from(self.len)).unwrap_or_default()
     }
 }

@@ -112,7 +112,7 @@ impl Mean {
     }
 
     fn take(&mut self, samples: u8) -> i32 {
-        let mean = self.sum.div_euclid(samples.into());
+        let mean = self.sum.checked_div_euclid(samples.into()).unwrap_or(0);
         self.sum -= mean * i64::from(samples);
         // A mean of i32 is one.
         self.carry.encode(AngularRate(mean as i32))

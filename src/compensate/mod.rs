@@ -25,14 +25,15 @@
 
 mod mode;
 
-pub use mode::{DELAY, Hop, Lag, Mode};
+pub use mode::{DELAY, Hop, Lag, Mode, OutOfRange};
 
 use crate::model::Corrections;
 use crate::units::AngularRate;
 use crate::window::WINDOW;
+use serde::{Deserialize, Serialize};
 
 /// How estimates become rates.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CompensateConfig {
     /// Which estimates.
     pub mode: Mode,
@@ -167,7 +168,7 @@ impl Compensator {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
             entry.sum += i64::from(correction.0);
             entry.count += 1;
-            let estimate = (entry.sum / i64::from(entry.count)) as i32;
+            let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0) as i32;
             let revision = i64::from(estimate) - i64::from(entry.estimate);
             entry.estimate = estimate;
             self.prompt_carry += revision;
@@ -203,7 +204,7 @@ impl Compensator {
     ///
     /// `stands`: the vehicle has stood since before that sample was taken, so its rate is zero.
     pub fn navigation(&mut self, bias: AngularRate, stands: bool) -> Option<Emitted> {
-        let entry = self.kept[KEPT - 1 - self.config.lag.samples()].as_mut()?;
+        let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && !entry.clipped;
         let mut taken = i64::from(entry.estimate) + i64::from(bias.0);
         if entry.held {
@@ -216,7 +217,7 @@ impl Compensator {
     /// The newest sample that no window will change any more; each sample is it once.
     #[must_use]
     pub fn settled(&self) -> Option<Settled> {
-        let entry = self.kept[KEPT - 1 - self.config.mode.settled_after()]?;
+        let entry = self.kept.iter().nth_back(self.config.mode.settled_after())?.as_ref()?;
         Some(Settled {
             tick: entry.tick,
             rate: AngularRate(entry.rate),
@@ -262,7 +263,8 @@ impl Compensator {
 
 /// Takes off the estimate and a bounded part of the carry. What the code cannot hold stays owed.
 fn emit(entry: &Entry, taken: i64, carry: &mut i64, max_carry: AngularRate) -> Emitted {
-    let bound = if entry.clipped { 0 } else { i64::from(max_carry.0) };
+    // A negative bound would be none.
+    let bound = if entry.clipped { 0 } else { i64::from(max_carry.0).max(0) };
     let carried = (*carry).clamp(-bound, bound);
     let wanted = i64::from(entry.rate) - taken - carried;
     let rate = wanted.clamp(i64::from(i32::MIN), i64::from(i32::MAX));

@@ -20,6 +20,7 @@
 
 use crate::nn::lstm::{Direction, ROW_LIMIT, row_bound};
 use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
+use serde::{Deserialize, Serialize};
 
 /// First bytes of a weight file.
 pub const MAGIC: [u8; 4] = *b"GYRN";
@@ -39,7 +40,7 @@ compile_error!("weights are read in place as little-endian words");
 pub type Topology = [u16; 5];
 
 /// Why a weight file is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BlobError {

@@ -17,7 +17,7 @@
 
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
 use super::gyronet::normalise;
-use crate::nn::bilstm::{self, Run, Way};
+use crate::nn::bilstm::{self, Layer, Pass, Run, Way};
 use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};
 use crate::seconds::{STEPS, SecondsWindow};
@@ -50,13 +50,14 @@ pub trait MinuteNetwork {
     fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
 }
 
-/// Which of the two LSTMs is under way. `Idle` is zero, so that a state at rest needs no place in
-/// flash.
+/// What is under way. FC2 takes the last step, and the way back of LSTM2's second layer begins with
+/// it: that is [`Stage::Last`]. `Idle` is zero, so that a state at rest needs no place in flash.
 #[derive(Debug, Clone, Copy)]
 enum Stage {
     Idle,
     First(Run),
     Second(Run),
+    Last,
 }
 
 /// Working memory of one window. Both LSTMs share it: they run one after the other.
@@ -161,14 +162,22 @@ impl<'w, 's> FogNet<'w, 's> {
                 run.advance(&blob.lstm2, input, between, second, |way, step, hidden| {
                     if step == STEPS - 1 {
                         *f2 = f2.wrapping_add(half(blob.fc2.weights, way, hidden));
-                        // FC2 takes the last step, and the way back begins with it.
-                        last = way == Way::Backward;
+                        last = true;
                     }
                 });
-                last.then(|| {
-                    state.stage = Stage::Idle;
-                    state.estimate(blob)
-                })
+                if last {
+                    *stage = Stage::Last;
+                }
+                None
+            }
+            Stage::Last => {
+                let [_, Layer { backward, .. }] = &blob.lstm2;
+                let between = &between[..STEPS * HIDDEN2];
+                Pass::first(Way::Backward, backward, between, second, |_, hidden| {
+                    *f2 = f2.wrapping_add(half(blob.fc2.weights, Way::Backward, hidden));
+                });
+                state.stage = Stage::Idle;
+                Some(state.estimate(blob))
             }
         }
     }

@@ -71,8 +71,9 @@ impl<'w> GyroNet<'w> {
         let Self { blob, state } = self;
         let GyroNetState { input, layer1, scratch, sums, clamped_inputs, run } = state;
         let more = run.as_mut()?.advance(&blob.layers, input, layer1, scratch, |way, step, hidden| {
-            for (sum, row) in sums[step].iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
-                let (forward, backward) = row.weights.split_at(HIDDEN);
+            let Some(sums) = sums.get_mut(step) else { return };
+            for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
+                let (forward, backward) = row.weights.split_at_checked(HIDDEN).unwrap_or_default();
                 let weights = if way == Way::Forward { forward } else { backward };
                 *sum = sum.wrapping_add(Dense::partial(weights, hidden));
             }
@@ -89,7 +90,7 @@ impl<'w> GyroNet<'w> {
     }
 
     /// The newest sample's correction only, without a scale, and the clamped inputs. The backward half of layer 2
-    /// needs just its first steps for that, which saves a third of the work; the result is the
+    /// needs just its first step for that, which saves a third of the work; the result is the
     /// last of [`WindowNetwork::estimate`]'s, bit for bit.
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
         let clamped_inputs = self.load(window);
@@ -102,7 +103,7 @@ impl<'w> GyroNet<'w> {
                 bilstm::store(layer1, step, offset, 2 * HIDDEN, HIDDEN, hidden);
             });
         }
-        let (forward, backward) = dense.weights.split_at(HIDDEN);
+        let (forward, backward) = dense.weights.split_at_checked(HIDDEN).unwrap_or_default();
         let mut sum = dense.bias;
         let mut add = |weights, step, hidden: &[u32]| {
             if step == WINDOW - 1 {
@@ -111,8 +112,9 @@ impl<'w> GyroNet<'w> {
         };
         Pass::new(Way::Forward)
             .finish(&second.forward, layer1, scratch, |step, hidden| add(forward, step, hidden));
-        Pass::new(Way::Backward)
-            .advance(&second.backward, layer1, scratch, |step, hidden| add(backward, step, hidden));
+        Pass::first(Way::Backward, &second.backward, layer1, scratch, |step, hidden| {
+            add(backward, step, hidden);
+        });
         (AngularRate(dense.scale(sum)), clamped_inputs)
     }
 
@@ -124,7 +126,7 @@ impl<'w> GyroNet<'w> {
             let mut values = [0; FEATURES];
             for ((to, code), n) in values.iter_mut().zip(features).zip(&self.blob.normalisation) {
                 let value = normalise(*code, *n);
-                let inside = value.clamp(-clamp, clamp);
+                let inside = value.min(clamp).max(-clamp);
                 clamped += u16::from(inside != value);
                 *to = inside as i16;
             }

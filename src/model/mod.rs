@@ -1,7 +1,7 @@
 //! The networks of the paper, with their topology, on top of [`crate::nn`].
 
 pub mod blob;
-mod file;
+pub mod file;
 pub mod fognet;
 pub mod fognet_blob;
 pub mod fognet_f32;

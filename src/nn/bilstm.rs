@@ -53,17 +53,19 @@ impl Pass {
         scratch: &mut Scratch<U, W>,
         mut emit: impl FnMut(usize, &[u32; W]),
     ) -> bool {
-        let pairs = input.len() / direction.inputs();
-        if self.done >= pairs {
+        let words = direction.inputs();
+        let pairs = input.len().checked_div(words).unwrap_or(0);
+        // Weights of another size than the caller's have no step; a checked blob has its own.
+        if self.done >= pairs || direction.units() != U {
             return false;
         }
         let (pair, order) = match self.way {
             Way::Forward => (self.done, [0, 1]),
             Way::Backward => (pairs - 1 - self.done, [1, 0]),
         };
-        let words = direction.inputs();
+        let Some(columns) = input.get(pair * words..(pair + 1) * words) else { return false };
         let Scratch { cell_state, hidden: [even, odd], projection } = scratch;
-        lstm::project(direction, &input[pair * words..(pair + 1) * words], projection);
+        lstm::project(direction, columns, projection);
         if self.done == 0 {
             *cell_state = [0; U];
         }
@@ -75,6 +77,27 @@ impl Pass {
         emit(2 * pair + second, odd);
         self.done += 1;
         self.done < pairs
+    }
+
+    /// The first step of a pass alone, for whoever needs no other: half a pair. Hands its number
+    /// and hidden state to `emit`.
+    pub fn first<const U: usize, const W: usize>(
+        way: Way,
+        direction: &Direction<'_>,
+        input: &[u32],
+        scratch: &mut Scratch<U, W>,
+        emit: impl FnOnce(usize, &[u32; W]),
+    ) {
+        let words = direction.inputs();
+        let (pair, first) = match way {
+            Way::Forward => (0, 0),
+            Way::Backward => (input.len() / words - 1, 1),
+        };
+        let Scratch { cell_state, hidden: [hidden, _], projection } = scratch;
+        lstm::project(direction, &input[pair * words..(pair + 1) * words], projection);
+        *cell_state = [0; U];
+        lstm::step(direction, &projection[first], None, cell_state, hidden);
+        emit(2 * pair + first, hidden);
     }
 
     /// All steps that are left.
@@ -100,7 +123,7 @@ pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
 /// from column `offset` on: the next layer's input.
 pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, units: usize, hidden: &[u32]) {
     let words = sequence.iter_mut().skip(word_index(step, offset, columns)).step_by(2);
-    for (to, from) in words.zip(&hidden[..units / 2]) {
+    for (to, from) in words.zip(hidden.iter().take(units / 2)) {
         *to = *from;
     }
 }

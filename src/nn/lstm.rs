@@ -91,12 +91,14 @@ impl<'w> Direction<'w> {
     }
 
     fn input_records(&self) -> impl Iterator<Item = (&'w [u32], &'w [u32])> {
-        self.input.chunks_exact(BIAS_WORDS + self.inputs).map(|record| record.split_at(BIAS_WORDS))
+        let words = (BIAS_WORDS + self.inputs).max(1);
+        self.input.chunks_exact(words).filter_map(|record| record.split_at_checked(BIAS_WORDS))
     }
 
     fn recurrent_records(&self) -> impl Iterator<Item = (&'w [u32], &'w [u32])> {
         let columns = Self::padded(self.units);
-        self.recurrent.chunks_exact(columns + MULTIPLIER_WORDS).map(move |record| record.split_at(columns))
+        let words = (columns + MULTIPLIER_WORDS).max(1);
+        self.recurrent.chunks_exact(words).filter_map(move |record| record.split_at_checked(columns))
     }
 }
 
@@ -253,11 +255,10 @@ pub fn row_bound(direction: &Direction<'_>, unit: usize, input_max: i32) -> [i64
     let mut bound = [0i64; GATES];
     let records = direction.input_records().nth(unit).zip(direction.recurrent_records().nth(unit));
     let Some(((bias, input), (recurrent, _))) = records else { return bound };
-    for pair in 0..2 {
-        let (low, packed) = (bias[2 * pair] as i32, bias[2 * pair + 1] as i32);
-        bound[2 * pair] = i64::from(low).abs();
+    for (bound, [low, packed]) in bound.as_chunks_mut::<2>().0.iter_mut().zip(bias.as_chunks::<2>().0) {
+        let (low, packed) = (*low as i32, *packed as i32);
         // 256 times the high row's bias, modulo 2^32: all of it, where it is below 2^23.
-        bound[2 * pair + 1] = i64::from(packed.wrapping_sub(low) >> 8).abs();
+        *bound = [i64::from(low).abs(), i64::from(packed.wrapping_sub(low) >> 8).abs()];
     }
     for (rows, max) in [(input, input_max), (recurrent, super::HIDDEN_MAX)] {
         for (n, word) in rows.iter().enumerate() {

@@ -125,7 +125,8 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
     }
 
     fn drop_front(&mut self, count: usize) {
-        let left = self.buffer.len() - count.min(self.buffer.len());
+        let count = count.min(self.buffer.len());
+        let left = self.buffer.len() - count;
         // Nearly always all of it goes, or nothing.
         if count > 0 && left > 0 {
             self.buffer.copy_within(count.., 0);

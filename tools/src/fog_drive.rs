@@ -114,3 +114,49 @@ fn features(sequence: &Sequence) -> Vec<Option<Features>> {
 fn angle(rad: f64) -> Angle {
     Angle((rad * f64::from(Angle::PER_RAD)).round() as i64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::layout::{self, Layout, Spec};
+    use gyronet::model::fognet::FogEstimate;
+    use gyronet::seconds::SecondsWindow;
+
+    /// Says that a constant bias and nothing else is wrong.
+    struct Bias;
+
+    impl MinuteNetwork for Bias {
+        fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+            assert_eq!(window.iter().count(), 60);
+            FogEstimate { correction: angle(6e-4), linear: Angle::ZERO, gain: 0, clamped_inputs: 0 }
+        }
+    }
+
+    #[test]
+    fn a_rate_in_the_place_of_the_gyro_is_as_good_as_its_increments() {
+        let folder = std::env::temp_dir().join(format!("gyronet-fog-drive-{}", std::process::id()));
+        let spec =
+            Spec { layout: Layout::Kaist, name: String::from("short"), seconds: 40, device: 1, run: 1 };
+        layout::write(&spec, &folder, || {}).unwrap();
+        let sequence = Sequence::read(&folder, |_| {}).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let rates: Vec<f64> = sequence.steps.iter().map(|step| step.fog * 100.0).collect();
+        let fog = run(&sequence, &mut Bias, FogConfig::DEFAULT, || {});
+        let pseudo = run_pseudo(&sequence, &rates, &mut Bias, FogConfig::DEFAULT, || {});
+        assert_eq!(fog.windows, 39);
+        assert_eq!((fog.corrected, fog.windows), (pseudo.corrected, pseudo.windows));
+        let sum = |turns: &[f64]| turns.iter().sum::<f64>();
+        // A rate code for 10 ms is 7e-11 rad, and rounds either way.
+        assert!((sum(&fog.turns) - sum(&pseudo.turns)).abs() < 1e-7);
+        let raw: f64 = sequence.steps.iter().map(|step| step.fog).sum();
+        // 1e-7 rad in each corrected step, whatever the gyro says.
+        let taken = 1e-7 * fog.corrected as f64;
+        assert!((raw - sum(&fog.turns) - taken).abs() < 1e-9, "{} {taken}", raw - sum(&fog.turns));
+        // A rate that no part has is a gap, and ends the window.
+        let mut broken = rates;
+        broken[1_050] = f64::NAN;
+        let broken = run_pseudo(&sequence, &broken, &mut Bias, FogConfig::DEFAULT, || {});
+        assert_eq!(broken.broken, 1);
+        assert!(broken.corrected + 200 <= fog.corrected, "{} {}", broken.corrected, fog.corrected);
+    }
+}

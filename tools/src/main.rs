@@ -28,6 +28,8 @@ enum Command {
     Monitor(commands::monitor::Args),
     Bus(commands::bus::Args),
     BenchTarget(commands::bench_target::Args),
+    Device(commands::device::Args),
+    Size(commands::size::Args),
 }
 
 fn main() -> ExitCode {
@@ -43,6 +45,8 @@ fn main() -> ExitCode {
         Command::Bus(args) => commands::bus::run(args, common),
         Command::Monitor(args) => commands::monitor::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
+        Command::Device(args) => commands::device::run(args, common),
+        Command::Size(args) => commands::size::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
     // Who reads our output has seen enough: `gyronet replay FILE | head`.

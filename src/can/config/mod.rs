@@ -85,7 +85,12 @@ impl Config {
             let id = broadcast_id(VDC2_PGN, VDC2_PRIORITY, vdc2.source)?;
             Some(Periodic { id: Id::Extended(id), period_ms: SAMPLE_MS })
         });
-        bosch.chain(yaw).chain(vdc2).collect()
+        let mut messages = Vec::new();
+        for message in bosch.chain(yaw).chain(vdc2) {
+            // There is room for all that can be configured.
+            let _ = messages.push(message);
+        }
+        messages
     }
 
     /// Whether a message with this identifier is ours: an input must not have it.

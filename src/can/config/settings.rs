@@ -1,9 +1,10 @@
 //! What a user sets.
 
 use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
+use serde::{Deserialize, Serialize};
 
 /// E2E profile of the three yaw messages with their identifiers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum E2e {
     /// Profile 1.
@@ -46,7 +47,7 @@ impl E2e {
 }
 
 /// The Bosch MM5.10 set; its layout fixes the period at 10 ms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoschSettings {
     /// TX1 alone, for receivers of the yaw rate only.
@@ -54,7 +55,7 @@ pub struct BoschSettings {
 }
 
 /// Our own yaw messages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct YawSettings {
     /// 11-bit identifiers of rate, angle, detail.
@@ -66,7 +67,7 @@ pub struct YawSettings {
 }
 
 /// J1939 VDC2; the standard fixes the period at 10 ms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vdc2Settings {
     /// Our address on the bus.
@@ -74,7 +75,7 @@ pub struct Vdc2Settings {
 }
 
 /// Everything that can be set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// Bit rate of the bus.

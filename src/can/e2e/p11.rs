@@ -2,9 +2,10 @@
 
 use super::Fault;
 use super::p01::{DataIdMode, P01};
+use serde::{Deserialize, Serialize};
 
 /// How the identifier enters the CRC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum P11Mode {
     /// Low byte, high byte (variant 11A).

@@ -47,7 +47,8 @@ impl Sequence {
     pub fn process(&mut self, counter: u8) -> Verdict {
         let Some(last) = self.last.replace(counter) else { return Verdict::First };
         let step = u16::from(counter) + self.counters - u16::from(last);
-        let delta = (step % self.counters) as u8;
+        // Of no values at all each one is the same.
+        let delta = step.checked_rem(self.counters).unwrap_or(0) as u8;
         match delta {
             0 => Verdict::Repeated,
             1 => Verdict::Ok,

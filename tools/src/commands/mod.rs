@@ -3,6 +3,7 @@
 pub mod bench_target;
 pub mod bus;
 pub mod demo;
+pub mod device;
 pub mod evaluate;
 pub mod import;
 pub mod monitor;
@@ -11,6 +12,7 @@ mod progress;
 pub mod quantize;
 pub mod replay;
 pub mod simulate;
+pub mod size;
 pub mod tables;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line

@@ -1,36 +1,36 @@
 //! Vehicles and parts of the two data sets, with every number and where it is from.
 //!
-//! None of the numbers was chosen by a result. [M] marks what was written down from memory of a
-//! data sheet that was not at hand; [A] what nobody has published and was assumed.
+//! None of the numbers was chosen by a result. (M) marks what was written down from memory of a
+//! data sheet that was not at hand; (A) what nobody has published and was assumed.
 //!
 //! | what | value | source |
 //! |---|---|---|
 //! | KAIST IMU: gyro noise, walk; accelerometer noise, walk | 1.7453e-4, 1e-5; 5.886e-3, 1e-4 (SI) | OpenVINS `config/kaist/kalibr_imu_chain.yaml` (Xsens MTi-100 series) |
 //! | KAIST IMU: gyro bias at power-on | 0.5 deg/s a year, taken as 2 sigma | Xsens knowledge base, Bias repeatability of gyroscopes |
-//! | KAIST IMU: accelerometer bias | 0.03 m/s^2 | MTi 100 series data sheet [M] |
-//! | KAIST IMU: scale; misalignment; gyro on force | 0.001; 0.05 deg; 0.003 deg/s/g | MTi 100 series data sheet [M] |
+//! | KAIST IMU: accelerometer bias | 0.03 m/s^2 | MTi 100 series data sheet (M) |
+//! | KAIST IMU: scale; misalignment; gyro on force | 0.001; 0.05 deg; 0.003 deg/s/g | MTi 100 series data sheet (M) |
 //! | KAIST FoG: angle random walk; bias stability | 0.012 deg/sqrt(h); 0.05 deg/h | KVH DSP-1760 data sheet; the second also in the paper, section III-C |
-//! | KAIST FoG: bias offset | 0.5 deg/h, taken as 2 sigma | DSP-1760 data sheet [M] |
-//! | KAIST FoG: bias random walk | 0.05 deg/h in an hour: the stability, once more | [A] |
-//! | KAIST FoG: scale; misalignment | 200 ppm; 0.4 mrad | DSP-1760 data sheet [M] |
+//! | KAIST FoG: bias offset | 0.5 deg/h, taken as 2 sigma | DSP-1760 data sheet (M) |
+//! | KAIST FoG: bias random walk | 0.05 deg/h in an hour: the stability, once more | (A) |
+//! | KAIST FoG: scale; misalignment | 200 ppm; 0.4 mrad | DSP-1760 data sheet (M) |
 //! | KAIST wheels: diameters, base, 4096 counts | 0.623022, 0.622356, 1.5285 m | a published EncoderParameter.txt |
 //! | KAIST wheels: error of both diameters, of each | 0.0006, 0.00003 | spread of three published calibrations of that car |
-//! | slip stiffness | 30 | slope of dry asphalt, 20 to 50: Gustafsson, Slip-based tire-road friction estimation, 1997 [M] |
-//! | cornering stiffness of the rear axle, over its load | 20 /rad | Rajamani, table of a passenger car: 2 x 80,000 N/rad over 7.7 kN [M] |
+//! | slip stiffness | 30 | slope of dry asphalt, 20 to 50: Gustafsson, Slip-based tire-road friction estimation, 1997 (M) |
+//! | cornering stiffness of the rear axle, over its load | 20 /rad | Rajamani, table of a passenger car: 2 x 80,000 N/rad over 7.7 kN (M) |
 //! | KAIST speed limits | 30, 50, 70 km/h | Korean towns |
-//! | waiting at a junction; share of junctions | 5 to 45 s; 0.4 | signal cycles of 60 to 120 s [A] |
+//! | waiting at a junction; share of junctions | 5 to 45 s; 0.4 | signal cycles of 60 to 120 s (A) |
 //! | acceleration, braking, comfort in corners | 2.0, 1.8, 2.0 m/s^2 | as [`super::car::Config::DEFAULT`]; calm drivers |
-//! | grade, bank | 0.03, 0.015 rad | streets are drained by 1.5 to 2 % of bank; grades up to 3 % [A] |
-//! | wave lengths of the bank | 223 and 71 m | [A]: other ones than the grade's, see [`super::car::Config::bank_waves`] |
+//! | grade, bank | 0.03, 0.015 rad | streets are drained by 1.5 to 2 % of bank; grades up to 3 % (A) |
+//! | wave lengths of the bank | 223 and 71 m | (A): other ones than the grade's, see [`super::car::Config::bank_waves`] |
 //! | shaking | [`super::vibration::Config::DEFAULT`] | measured on a car (WID recordings) |
 //! | KAIST latitude | 36.37 deg N | Daejeon |
-//! | KAIST delay of a stamp | 0.1 ms, exponential | [A]: the paper's Fig. 11 shows it small |
-//! | NCLT IMU: gyro noise; bias stability; initial bias | 0.03 deg/s/sqrt(Hz); 18 deg/h in an hour; 0.25 deg/s, taken as 2 sigma | MicroStrain 3DM-GX3-45 data sheet [M] |
-//! | NCLT IMU: accelerometer noise, bias; scale; misalignment | 80 ug/sqrt(Hz), 0.002 g; 0.0005; 0.05 deg | the same [M] |
-//! | NCLT FoG: noise; bias stability; offset | 4 deg/h/sqrt(Hz); 1 deg/h; 20 deg/h, taken as 2 sigma | KVH DSP-3000 manual 54-0215 [M] |
+//! | KAIST delay of a stamp | 0.1 ms, exponential | (A): the paper's Fig. 11 shows it small |
+//! | NCLT IMU: gyro noise; bias stability; initial bias | 0.03 deg/s/sqrt(Hz); 18 deg/h in an hour; 0.25 deg/s, taken as 2 sigma | MicroStrain 3DM-GX3-45 data sheet (M) |
+//! | NCLT IMU: accelerometer noise, bias; scale; misalignment | 80 ug/sqrt(Hz), 0.002 g; 0.0005; 0.05 deg | the same (M) |
+//! | NCLT FoG: noise; bias stability; offset | 4 deg/h/sqrt(Hz); 1 deg/h; 20 deg/h, taken as 2 sigma | KVH DSP-3000 manual 54-0215 (M) |
 //! | NCLT FoG: scale | 1000 ppm | the same, table 2, linearity |
-//! | NCLT wheels: errors of diameters | 0.01 both, 0.003 each | the order of UMBmark, Borenstein and Feng 1996 [M]; the paper calls these wheels inaccurate |
-//! | NCLT speeds | 1.0, 1.3, 1.6 m/s | a Segway among people: 5.5 km in 73 min on average [M] |
+//! | NCLT wheels: errors of diameters | 0.01 both, 0.003 each | the order of UMBmark, Borenstein and Feng 1996 (M); the paper calls these wheels inaccurate |
+//! | NCLT speeds | 1.0, 1.3, 1.6 m/s | a Segway among people: 5.5 km in 73 min on average (M) |
 //! | NCLT rates and gaps | 47.1 Hz, gaps to 72 ms; 41.2 Hz, to 201 ms | measured on 2013-01-10 |
 //! | NCLT latitude | 42.29 deg N | Ann Arbor |
 

@@ -118,7 +118,9 @@ def main() -> None:
     data, held_out = Windows(train, "repeat"), Windows([validate], "none")
     model = FoGNet(*normalisation(data))
     if args.init:
-        model.load_state_dict(load_file(args.init))
+        # Another device's units are not these drives'.
+        weights = {k: v for k, v in load_file(args.init).items() if k not in dict(model.named_buffers())}
+        model.load_state_dict(weights, strict=False)
     for name, parameter in model.named_parameters():
         parameter.requires_grad_(not args.head_only or name.startswith(("fc3", "fc4")))
     parameters = [p for p in model.parameters() if p.requires_grad]

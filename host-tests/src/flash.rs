@@ -1,0 +1,310 @@
+//! A mock of the STM32F405's flash: its sectors, its rules, and a power cut at any operation.
+//!
+//! The rules (RM0090 3.5, 3.6): a sector is erased as a whole, and the sectors are of unequal
+//! sizes; a word that has been programmed is not programmed again until its sector has been
+//! erased, and programming only clears bits. Breaking a rule is a bug of the caller and panics.
+//! One relief: a word that a power cut has torn may be programmed again if that only clears
+//! bits, as the part allows.
+
+use crate::noise::Noise;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use gyronet::service::MappedSlots;
+use gyronet::store::layout::{self, SECTORS, SLOT_SIZE, sector_at};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::rc::Rc;
+
+const WORD: usize = 4;
+const BYTES: usize = 1 << 20;
+
+/// What a power cut does to the operation that it hits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cut {
+    /// It comes just before.
+    Before,
+    /// In the middle: a word has some of its bits, a sector is partly erased, from its start on.
+    Front,
+    /// In the middle: any part of the sector may be erased.
+    Anywhere,
+    /// In the middle, while the part still programs all of a sector's words to zero before it
+    /// erases them: any of them may be zero.
+    Zeros,
+    /// It comes just after: the operation is done, but nobody hears of it.
+    After,
+}
+
+impl Cut {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Before, Self::Front, Self::Anywhere, Self::Zeros, Self::After];
+
+    const fn tears(self) -> bool {
+        matches!(self, Self::Front | Self::Anywhere | Self::Zeros)
+    }
+}
+
+/// Why an operation was not done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MockError {
+    /// There is no power.
+    PowerCut,
+    /// Not a word or a sector.
+    Alignment,
+}
+
+impl NorFlashError for MockError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::PowerCut => NorFlashErrorKind::Other,
+            Self::Alignment => NorFlashErrorKind::NotAligned,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Word {
+    Erased,
+    Programmed,
+    Torn,
+}
+
+/// The whole flash.
+#[derive(Debug, Clone)]
+pub struct F405 {
+    words: Vec<u32>,
+    states: Vec<Word>,
+    operations: u64,
+    cut: Option<(u64, Cut)>,
+    powered: bool,
+    noise: Noise,
+}
+
+impl Default for F405 {
+    /// As it leaves the factory.
+    fn default() -> Self {
+        Self {
+            words: vec![u32::MAX; BYTES / WORD],
+            states: vec![Word::Erased; BYTES / WORD],
+            operations: 0,
+            cut: None,
+            powered: true,
+            noise: Noise::new(405),
+        }
+    }
+}
+
+impl F405 {
+    /// Operations (words programmed, sectors erased) so far.
+    #[must_use]
+    pub fn operations(&self) -> u64 {
+        self.operations
+    }
+
+    /// Cuts the power at the operation that `after` others precede, counted from now.
+    pub fn cut_after(&mut self, after: u64, cut: Cut) {
+        self.cut = Some((self.operations + after, cut));
+    }
+
+    /// Switches power on again; whether it had been cut.
+    pub fn restore(&mut self) -> bool {
+        self.cut = None;
+        !std::mem::replace(&mut self.powered, true)
+    }
+
+    /// Its content.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.words)
+    }
+
+    /// Changes a byte, as a fault of the part would.
+    pub fn damage(&mut self, offset: usize, bits: u8) {
+        bytemuck::cast_slice_mut::<u32, u8>(&mut self.words)[offset] ^= bits;
+    }
+
+    /// How far the next operation gets; `None`: to its end.
+    fn step(&mut self) -> Result<Option<Cut>, MockError> {
+        if !self.powered {
+            return Err(MockError::PowerCut);
+        }
+        let hit = self.cut.filter(|(at, _)| *at == self.operations).map(|(_, cut)| cut);
+        self.operations += 1;
+        self.powered = hit.is_none();
+        if hit == Some(Cut::Before) { Err(MockError::PowerCut) } else { Ok(hit) }
+    }
+
+    fn program(&mut self, word: usize, value: u32) -> Result<(), MockError> {
+        let (old, state) = (self.words[word], self.states[word]);
+        let at = word * WORD;
+        assert!(state != Word::Programmed, "the word at {at:#x} is programmed twice");
+        assert!(value & old == value, "the word at {at:#x}: {old:08x} cannot become {value:08x}");
+        let hit = self.step()?;
+        if hit.is_some_and(Cut::tears) {
+            let kept = u32::from_le_bytes(std::array::from_fn(|_| self.noise.byte()));
+            self.words[word] = old & (value | kept);
+            self.states[word] = Word::Torn;
+        } else {
+            self.words[word] = value;
+            self.states[word] = Word::Programmed;
+        }
+        if hit.is_some() { Err(MockError::PowerCut) } else { Ok(()) }
+    }
+
+    fn erase_sector(&mut self, sector: Range<usize>) -> Result<(), MockError> {
+        let hit = self.step()?;
+        let words = sector.start / WORD..sector.end / WORD;
+        let middle = words.start + self.noise.int(0, words.len() as i64) as usize;
+        for word in words {
+            let erased = match hit {
+                Some(Cut::Front) => word < middle,
+                Some(Cut::Anywhere | Cut::Zeros) => self.noise.byte().is_multiple_of(2),
+                _ => true,
+            };
+            if erased {
+                self.words[word] = if hit == Some(Cut::Zeros) { 0 } else { u32::MAX };
+            }
+            // After a torn erasure no word may be relied on to take a value.
+            self.states[word] = if hit.is_some_and(Cut::tears) { Word::Programmed } else { Word::Erased };
+        }
+        if hit.is_some() { Err(MockError::PowerCut) } else { Ok(()) }
+    }
+}
+
+/// A part of the flash whose sectors are `SECTOR` bytes long, its offsets counted from its start.
+#[derive(Debug, Clone)]
+pub struct Region<const SECTOR: usize> {
+    flash: Rc<RefCell<F405>>,
+    range: Range<usize>,
+}
+
+impl<const SECTOR: usize> Region<SECTOR> {
+    /// A range of a flash.
+    #[must_use]
+    pub fn new(flash: &Rc<RefCell<F405>>, range: Range<u32>) -> Self {
+        Self { flash: Rc::clone(flash), range: range.start as usize..range.end as usize }
+    }
+
+    fn absolute(&self, offset: u32, len: usize, unit: usize) -> Result<Range<usize>, MockError> {
+        let start = self.range.start + offset as usize;
+        let inside = start + len <= self.range.end;
+        let aligned = (offset as usize).is_multiple_of(unit) && len.is_multiple_of(unit);
+        if inside && aligned { Ok(start..start + len) } else { Err(MockError::Alignment) }
+    }
+}
+
+impl<const SECTOR: usize> ErrorType for Region<SECTOR> {
+    type Error = MockError;
+}
+
+impl<const SECTOR: usize> ReadNorFlash for Region<SECTOR> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), MockError> {
+        let range = self.absolute(offset, bytes.len(), 1)?;
+        let flash = self.flash.borrow();
+        if !flash.powered {
+            return Err(MockError::PowerCut);
+        }
+        bytes.copy_from_slice(&flash.bytes()[range]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.range.len()
+    }
+}
+
+impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), MockError> {
+        let range = self.absolute(from, (to - from) as usize, SECTOR)?;
+        for start in range.step_by(SECTOR) {
+            let sector = sector_at(start as u32).expect("the start of a sector");
+            assert_eq!(SECTORS[usize::from(sector)] as usize, SECTOR, "the size of sector {sector}");
+            self.flash.borrow_mut().erase_sector(start..start + SECTOR)?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), MockError> {
+        let range = self.absolute(offset, bytes.len(), WORD)?;
+        for (word, value) in (range.start / WORD..).zip(bytes.as_chunks::<WORD>().0) {
+            self.flash.borrow_mut().program(word, u32::from_le_bytes(*value))?;
+        }
+        Ok(())
+    }
+}
+
+/// The weight slots, which can also be read in place.
+///
+/// What [`MappedSlots::slots`] hands out is a copy of the content at the last operation: the
+/// mock's bytes are behind a cell.
+#[derive(Debug)]
+pub struct MappedRegion {
+    region: Region<SLOT_SIZE>,
+    copy: [Vec<u32>; 2],
+}
+
+impl MappedRegion {
+    /// The slots of a flash.
+    #[must_use]
+    pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
+        let mut mapped = Self { region: Region::new(flash, layout::SLOTS), copy: [Vec::new(), Vec::new()] };
+        mapped.refresh();
+        mapped
+    }
+
+    /// Both slots.
+    #[must_use]
+    pub fn current(&self) -> [&[u8]; 2] {
+        self.copy.each_ref().map(|words| bytemuck::cast_slice(words))
+    }
+
+    fn refresh(&mut self) {
+        let flash = self.region.flash.borrow();
+        for (words, start) in self.copy.iter_mut().zip(self.region.range.clone().step_by(SLOT_SIZE)) {
+            words.clear();
+            words.extend(&flash.words[start / WORD..(start + SLOT_SIZE) / WORD]);
+        }
+    }
+}
+
+impl MappedSlots for MappedRegion {
+    fn slots(&self) -> [&[u8]; 2] {
+        self.current()
+    }
+}
+
+impl ErrorType for MappedRegion {
+    type Error = MockError;
+}
+
+impl ReadNorFlash for MappedRegion {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), MockError> {
+        self.region.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.region.capacity()
+    }
+}
+
+impl NorFlash for MappedRegion {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = SLOT_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), MockError> {
+        let result = self.region.erase(from, to);
+        self.refresh();
+        result
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), MockError> {
+        let result = self.region.write(offset, bytes);
+        self.refresh();
+        result
+    }
+}

@@ -1,0 +1,107 @@
+//! The image's service line in QEMU, asked by the tool's own code: what it says of itself, what
+//! it refuses without a flash controller, a flood of noise, a restart.
+
+use gyronet::service::event::EventKind;
+use gyronet::service::message::{FlashState, Info, Origin, Refusal};
+use gyronet::service::{Reply, Request};
+use gyronet::store::slots::{SlotError, WeightSource};
+use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::{image, qemu, replay};
+use gyronet_tools::device::line::Line;
+use gyronet_tools::device::{Device, DeviceError};
+use std::time::{Duration, Instant};
+
+const LIMIT: Duration = Duration::from_secs(60);
+const IMU: usize = 1;
+const SLCAN: usize = 2;
+const SERVICE: usize = 6;
+/// Frames of one sample.
+const SET: usize = 6;
+
+fn boot(test: &str) -> Option<(qemu::Board, Device<Line>)> {
+    let elf = image::coprocessor(test, env!("CARGO_TARGET_TMPDIR"))?;
+    let mut board = qemu::Board::boot(&elf, SERVICE, &[]);
+    // Its receiver is on.
+    board.send(SERVICE, &[0], LIMIT);
+    let port = board.serve(SERVICE).to_string();
+    let line = Line::open(&port).expect("the harness listens");
+    Some((board, Device::new(line, &port)))
+}
+
+fn info(device: &mut Device<Line>) -> Info {
+    match device.ask(&Request::Info) {
+        Ok(Reply::Info(info)) => info,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn board_without_flash_says_so() {
+    let Some((_board, mut device)) = boot("board_without_flash_says_so") else { return };
+    let about = info(&mut device);
+    assert_eq!(about.flash, FlashState::Absent);
+    assert_eq!(about.configuration, Origin::BuiltIn);
+    assert_eq!(about.weights, WeightSource::BuiltIn);
+    assert_eq!((about.identity.device_id, about.identity.crash), (None, None));
+    let configuration = match device.ask(&Request::GetConfiguration) {
+        Ok(Reply::Configuration { configuration, .. }) => configuration,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(configuration, Configuration::DEFAULT);
+    let mut set = |configuration| {
+        let request = Request::SetConfiguration { version: Configuration::VERSION, configuration };
+        match device.ask(&request) {
+            Err(DeviceError::Refused(refusal)) => refusal,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(set(configuration), Refusal::Store(StoreError::NoFlash));
+    let wild = Configuration { latitude_deg: Some(91.0), ..configuration };
+    let range = FieldError::Range { field: Field::LatitudeDeg, value: 91.0, low: -90.0, high: 90.0 };
+    assert_eq!(set(wild), Refusal::Store(StoreError::Field(range)));
+    match device.ask(&Request::WeightsBegin { length: 64 }) {
+        Err(DeviceError::Refused(Refusal::Slot(SlotError::NoFlash))) => {}
+        other => panic!("{other:?}"),
+    }
+    match device.ask(&Request::Log { after: 0 }) {
+        Ok(Reply::Log(page)) => assert!(matches!(page.events[0].kind, EventKind::Started(_)), "{page:?}"),
+        other => panic!("{other:?}"),
+    }
+    // It starts anew and answers again.
+    assert_eq!(device.ask(&Request::Restart).expect("an answer"), Reply::Done);
+    assert_eq!(info(&mut device), about);
+}
+
+#[test]
+fn board_flooded_on_its_service_line() {
+    const NAME: &str = "board_flooded_on_its_service_line";
+    let Some((mut board, mut device)) = boot(NAME) else { return };
+    let (mut noise, samples, rounds) = (Noise::new(6), 50, 20);
+    let bytes = |round: usize| -> Vec<u8> {
+        (round * samples..(round + 1) * samples).flat_map(|number| replay::turning(number, 0.001)).collect()
+    };
+    let all: Vec<u8> = (0..rounds).flat_map(bytes).collect();
+    let expected = replay::lines(&all);
+    for round in 0..rounds {
+        board.send(IMU, &bytes(round), LIMIT);
+        let flood: Vec<u8> = (0..1_000).map(|_| noise.byte()).collect();
+        board.send(SERVICE, &flood, LIMIT);
+    }
+    // Every frame is as if nothing had come on the service line.
+    let lines = board.lines(SLCAN, b'\r', rounds * samples * SET, LIMIT);
+    let text = |line: &Vec<u8>| line.escape_ascii().to_string();
+    assert_eq!(lines.iter().map(text).collect::<Vec<_>>(), expected.iter().map(text).collect::<Vec<_>>());
+    // The question stands behind what is left of the flood.
+    let until = Instant::now() + 2 * LIMIT;
+    let answer = std::iter::repeat_with(|| device.ask(&Request::Counters))
+        .find(|answer| answer.is_ok() || Instant::now() > until);
+    match answer {
+        Some(Ok(Reply::Counters(counters))) => {
+            println!("{NAME}: {} frames, {counters:?}", lines.len());
+            assert!(counters.lines.service_errors > 40, "{counters:?}");
+            assert_eq!(counters.pipeline.samples as usize, rounds * samples);
+        }
+        other => panic!("{other:?}"),
+    }
+}

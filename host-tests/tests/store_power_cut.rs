@@ -1,0 +1,203 @@
+//! Power cuts at every operation of a configuration write, a calibration write and a weight
+//! upload, on a flash with the F405's rules: the old or the new is always there, whole.
+
+use gyronet::model::weights;
+use gyronet::store::layout::{self, RECORD_SECTOR, SLOT_SIZE};
+use gyronet::store::slots::{Selection, Upload, WeightSource, select};
+use gyronet::store::{Accepted, Calibration, Configuration, Record, Slot, Store};
+use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet_host_tests::flash::{Cut, F405, Region};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+type Records = Store<Region<RECORD_SECTOR>>;
+
+fn open(flash: &Rc<RefCell<F405>>) -> Result<Records, gyronet::store::StoreError> {
+    Store::open(Region::new(flash, layout::STORE), 0)
+}
+
+fn configuration(k: usize) -> Configuration {
+    Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT }
+}
+
+fn calibration(k: usize) -> Calibration {
+    let mut calibration = Calibration::default();
+    for point in 0..8 {
+        let bias = [AngularRate(k as i32), AngularRate(-(k as i32)), AngularRate(point)];
+        calibration.add_bias(bias, Some(CentiCelsius(point as i16 * 1000)));
+    }
+    calibration
+}
+
+/// Flash contents before writes that need the most different operations: the first of all, a
+/// plain one, and each that changes to another sector, until both sectors have been used twice.
+fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    // The other records must survive too.
+    let mut store = open(&flash).expect("an empty flash");
+    store.set(&Accepted::NONE.with(Slot::B, 7)).expect("it is stored");
+    store.set(&calibration(1)).expect("it is stored");
+    store.set(&configuration(1)).expect("it is stored");
+    store.set(&make(1)).expect("it is stored");
+    let (mut starts, mut plain, mut changes) = (Vec::new(), 0, 0);
+    for k in 2..5_000 {
+        let before = flash.borrow().clone();
+        store.set(&make(k)).expect("it is stored");
+        let operations = flash.borrow().operations() - before.operations();
+        if k == 2 {
+            plain = operations;
+        }
+        let change = operations.abs_diff(plain) > 2;
+        changes += usize::from(change);
+        if k == 2 || change {
+            starts.push((before, k, operations));
+        }
+        if changes == 3 {
+            return starts;
+        }
+    }
+    panic!("only {changes} changes of sector in 5,000 writes");
+}
+
+/// What must be there after a cut: the record before or the new one, and all others.
+fn whole<R: Record + PartialEq + std::fmt::Debug>(
+    flash: &Rc<RefCell<F405>>,
+    make: fn(usize) -> R,
+    k: usize,
+    at: &str,
+) {
+    let mut store = open(flash).unwrap_or_else(|error| panic!("{at}: {error}"));
+    let found = store.get::<R>().unwrap_or_else(|error| panic!("{at}: {error}"));
+    assert!(found == Some(make(k - 1)) || found == Some(make(k)), "{at}: {found:?}");
+    let accepted = store.get::<Accepted>().unwrap_or_else(|error| panic!("{at}: {error}"));
+    assert_eq!(accepted, Some(Accepted::NONE.with(Slot::B, 7)), "{at}");
+    if R::KEY == Configuration::KEY {
+        assert_eq!(store.get::<Calibration>(), Ok(Some(calibration(1))), "{at}");
+    } else {
+        assert_eq!(store.get::<Configuration>(), Ok(Some(configuration(1))), "{at}");
+    }
+}
+
+/// Every cut of every write, and after it every cut of the next attempt.
+fn every_cut<R: Record + PartialEq + std::fmt::Debug>(name: &str, make: fn(usize) -> R) {
+    let (mut cuts, mut second_cuts) = (0u64, 0u64);
+    for (start, k, operations) in starts(make) {
+        for cut in Cut::ALL {
+            for after in 0..operations {
+                let at = format!("{name} {k}, cut {cut:?} operation {after} of {operations}");
+                let flash = Rc::new(RefCell::new(start.clone()));
+                let mut store = open(&flash).expect("it was whole");
+                flash.borrow_mut().cut_after(after, cut);
+                assert!(store.set(&make(k)).is_err(), "{at}: nobody can have heard of success");
+                assert!(flash.borrow_mut().restore(), "{at}: the power was cut");
+                cuts += 1;
+                let torn = flash.borrow().clone();
+                whole(&flash, make, k, &at);
+                // The next attempt works, and may be cut itself.
+                let retry = |flash: &Rc<RefCell<F405>>| open(flash).and_then(|mut store| store.set(&make(k)));
+                retry(&flash).unwrap_or_else(|error| panic!("{at}: {error}"));
+                assert_eq!(open(&flash).and_then(|mut store| store.get::<R>()), Ok(Some(make(k))), "{at}");
+                let retried = flash.borrow().operations() - torn.operations();
+                for again in 0..retried {
+                    let flash = Rc::new(RefCell::new(torn.clone()));
+                    flash.borrow_mut().cut_after(again, cut);
+                    assert!(retry(&flash).is_err(), "{at}");
+                    flash.borrow_mut().restore();
+                    second_cuts += 1;
+                    whole(&flash, make, k, &format!("{at}, then {again} of {retried}"));
+                }
+            }
+        }
+    }
+    println!("{name}: {cuts} cut points tried, {second_cuts} more in the attempt after");
+    assert!(cuts > 300, "{cuts}");
+}
+
+#[test]
+fn configuration_write() {
+    every_cut("configuration", configuration);
+}
+
+#[test]
+fn calibration_write() {
+    every_cut("calibration", calibration);
+}
+
+/// The built-in weights under another name: other provenance, other checksum.
+fn other_weights() -> Vec<u8> {
+    let mut file = weights::DEFAULT.0.to_vec();
+    let end = file.len() - 4;
+    let letter = file[76..].iter().position(u8::is_ascii_lowercase).expect("provenance is text");
+    file[76 + letter].make_ascii_uppercase();
+    let crc = gyronet::model::blob::CRC.checksum(&file[..end]);
+    file[end..].copy_from_slice(&crc.to_le_bytes());
+    file
+}
+
+fn slots(flash: &F405) -> [&[u8]; 2] {
+    let bytes = &flash.bytes()[layout::SLOTS.start as usize..layout::SLOTS.end as usize];
+    bytes.split_at(SLOT_SIZE).into()
+}
+
+/// Uploads a file to a slot, checks it and accepts it, as the board does.
+fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), String> {
+    let text = |error: &dyn std::error::Error| error.to_string();
+    let mut region = Region::<SLOT_SIZE>::new(flash, layout::SLOTS);
+    let mut upload = Upload::begin(&mut region, slot, file.len() as u32).map_err(|e| text(&e))?;
+    for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
+        upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
+    }
+    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?;
+    let mut store = open(flash).map_err(|e| text(&e))?;
+    let accepted = store.get::<Accepted>().map_err(|e| text(&e))?.unwrap_or(Accepted::NONE);
+    store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))
+}
+
+/// What the board would run on after a restart.
+fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
+    let accepted = open(flash).and_then(|mut store| store.get::<Accepted>());
+    let accepted = accepted.expect("records are whole").unwrap_or(Accepted::NONE);
+    let flash = flash.borrow();
+    let Selection { weights, source, .. } = select(&accepted, slots(&flash), &weights::DEFAULT.0);
+    (source, weights.expect("there always are some").crc)
+}
+
+#[test]
+fn weight_upload() {
+    let (old, new) = (weights::DEFAULT.0.to_vec(), other_weights());
+    let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
+    let flash = Rc::new(RefCell::new(F405::default()));
+    assert_eq!(running(&flash), (WeightSource::BuiltIn, crc(&old)));
+    upload(&flash, Slot::A, &old).expect("it is accepted");
+    assert_eq!(running(&flash), (WeightSource::Slot(Slot::A), crc(&old)));
+    let start = flash.borrow().clone();
+    upload(&flash, Slot::B, &new).expect("it is accepted");
+    assert_eq!(running(&flash), (WeightSource::Slot(Slot::B), crc(&new)));
+    let operations = flash.borrow().operations() - start.operations();
+    let mut cuts = 0;
+    // Once the slot is erased, only how many words are there matters, not how the cut tore one:
+    // the ways to cut take turns there.
+    for after in 0..operations {
+        let edge = after < 4 || after + 64 > operations;
+        let turn = Cut::ALL[after as usize % Cut::ALL.len()];
+        for cut in Cut::ALL.into_iter().filter(|cut| edge || *cut == turn) {
+            let flash = Rc::new(RefCell::new(start.clone()));
+            flash.borrow_mut().cut_after(after, cut);
+            assert!(upload(&flash, Slot::B, &new).is_err());
+            assert!(flash.borrow_mut().restore());
+            cuts += 1;
+            let found = running(&flash);
+            let done = (WeightSource::Slot(Slot::B), crc(&new));
+            assert!(
+                found == (WeightSource::Slot(Slot::A), crc(&old)) || found == done,
+                "cut {cut:?} operation {after}: {found:?}"
+            );
+        }
+    }
+    println!("weight upload: {cuts} cut points tried in {operations} operations");
+    // And over a slot that is named: the other one takes over, then the built-in weights do.
+    flash.borrow_mut().damage(layout::SLOTS.start as usize + SLOT_SIZE + 90_000, 1);
+    assert_eq!(running(&flash), (WeightSource::Slot(Slot::A), crc(&old)));
+    flash.borrow_mut().damage(layout::SLOTS.start as usize + 5, 0x80);
+    assert_eq!(running(&flash), (WeightSource::BuiltIn, crc(&old)));
+}

@@ -1,0 +1,179 @@
+//! The flash controller (RM0090 3), which the emulator lacks.
+#![allow(unsafe_code, reason = "flash is memory that is written by address; each block says why it is sound")]
+
+use core::cell::RefCell;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use gyronet::service::MappedSlots;
+use gyronet::store::layout::{FLASH_BASE, RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector_at};
+use stm32f4::stm32f405 as pac;
+
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// Polls before an operation is given up. Code runs from the same flash and stands still while
+/// it is busy, so this many are never needed.
+const POLLS: u32 = 10_000_000;
+const WORD: usize = 4;
+
+/// What the controller or the caller did wrong.
+#[derive(Debug, Clone, Copy)]
+pub struct FlashError(NorFlashErrorKind);
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        self.0
+    }
+}
+
+/// The controller, locked but while it works.
+pub struct Flash {
+    registers: RefCell<pac::FLASH>,
+}
+
+impl Flash {
+    /// The controller, if there is one: after a reset it is locked, and the emulator's nothing
+    /// reads as not locked.
+    pub fn probe(registers: pac::FLASH) -> Option<Self> {
+        let locked = registers.cr().read().lock().bit_is_set();
+        locked.then(|| Self { registers: RefCell::new(registers) })
+    }
+
+    fn operate(
+        &self,
+        operation: impl FnOnce(&pac::FLASH) -> Result<(), FlashError>,
+    ) -> Result<(), FlashError> {
+        let refused = FlashError(NorFlashErrorKind::Other);
+        let registers = self.registers.try_borrow_mut().map_err(|_| refused)?;
+        for key in KEYS {
+            registers.keyr().write(|w| unsafe {
+                // SAFETY: the two keys that unlock it, in order.
+                w.bits(key)
+            });
+        }
+        let result = idle(&registers).and_then(|()| operation(&registers)).and_then(|()| idle(&registers));
+        registers.cr().write(|w| w.lock().set_bit());
+        flush_cache(&registers);
+        result
+    }
+
+    fn erase(&self, offset: u32) -> Result<(), FlashError> {
+        let sector = sector_at(offset).ok_or(FlashError(NorFlashErrorKind::NotAligned))?;
+        self.operate(|registers| {
+            // SAFETY: a number from the part's own table, and words of 32 bits.
+            registers.cr().write(|w| unsafe { w.ser().set_bit().snb().bits(sector).psize().bits(2) });
+            registers.cr().modify(|_, w| w.strt().set_bit());
+            Ok(())
+        })
+    }
+
+    fn write(&self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        self.operate(|registers| {
+            // SAFETY: words of 32 bits.
+            registers.cr().write(|w| unsafe { w.pg().set_bit().psize().bits(2) });
+            for (at, word) in (FLASH_BASE + offset..).step_by(WORD).zip(bytes.as_chunks::<WORD>().0) {
+                // SAFETY: inside the records or the weight slots, as the regions below check; on
+                // a word boundary. No reference to these bytes is alive: records are only copied
+                // out, and a slot in use is not written.
+                unsafe { (at as *mut u32).write_volatile(u32::from_le_bytes(*word)) };
+                idle(registers)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Both slots as they are when the image starts; the one that the network then runs on is
+    /// not written while it does.
+    pub fn slots_at_start(&self) -> [&'static [u8]; 2] {
+        [SLOTS.start, SLOTS.start + SLOT_SIZE as u32].map(|offset| {
+            // SAFETY: memory that is always there and readable.
+            unsafe { core::slice::from_raw_parts((FLASH_BASE + offset) as *const u8, SLOT_SIZE) }
+        })
+    }
+}
+
+/// Waits until the controller is idle, and reports what went wrong.
+fn idle(registers: &pac::FLASH) -> Result<(), FlashError> {
+    let refused = Err(FlashError(NorFlashErrorKind::Other));
+    if !(0..POLLS).any(|_| registers.sr().read().bsy().bit_is_clear()) {
+        return refused;
+    }
+    let status = registers.sr().read();
+    let failed = status.pgserr().bit_is_set()
+        || status.pgperr().bit_is_set()
+        || status.pgaerr().bit_is_set()
+        || status.wrperr().bit_is_set();
+    // SAFETY: these flags are cleared by writing ones (RM0090 3.9.4).
+    registers.sr().write(|w| unsafe { w.bits(0xF2) });
+    if failed { refused } else { Ok(()) }
+}
+
+/// What the data cache still holds of flash that has changed (RM0090 3.5.4).
+fn flush_cache(registers: &pac::FLASH) {
+    if registers.acr().read().dcen().bit_is_set() {
+        registers.acr().modify(|_, w| w.dcen().clear_bit());
+        registers.acr().modify(|_, w| w.dcrst().set_bit());
+        registers.acr().modify(|_, w| w.dcrst().clear_bit().dcen().set_bit());
+    }
+}
+
+/// Offsets of a region as offsets into the flash.
+fn absolute(region: &core::ops::Range<u32>, offset: u32, len: usize, unit: usize) -> Result<u32, FlashError> {
+    let start = region.start.checked_add(offset).ok_or(FlashError(NorFlashErrorKind::OutOfBounds))?;
+    let end = u32::try_from(len).ok().and_then(|len| start.checked_add(len));
+    if end.is_none_or(|end| end > region.end) {
+        return Err(FlashError(NorFlashErrorKind::OutOfBounds));
+    }
+    let aligned = (start as usize).is_multiple_of(unit) && len.is_multiple_of(unit);
+    if aligned { Ok(start) } else { Err(FlashError(NorFlashErrorKind::NotAligned)) }
+}
+
+macro_rules! region {
+    ($name:ident, $range:expr, $sector:expr, $doc:literal) => {
+        #[doc = $doc]
+        pub struct $name(pub &'static Flash);
+
+        impl ErrorType for $name {
+            type Error = FlashError;
+        }
+
+        impl ReadNorFlash for $name {
+            const READ_SIZE: usize = 1;
+
+            fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+                let start = absolute(&$range, offset, bytes.len(), 1)?;
+                for (at, byte) in (FLASH_BASE + start..).zip(bytes) {
+                    // SAFETY: inside the region, which is always there and readable.
+                    *byte = unsafe { (at as *const u8).read_volatile() };
+                }
+                Ok(())
+            }
+
+            fn capacity(&self) -> usize {
+                $range.len()
+            }
+        }
+
+        impl NorFlash for $name {
+            const WRITE_SIZE: usize = WORD;
+            const ERASE_SIZE: usize = $sector;
+
+            fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+                let len = to.checked_sub(from).ok_or(FlashError(NorFlashErrorKind::OutOfBounds))? as usize;
+                let start = absolute(&$range, from, len, $sector)?;
+                (start..start + len as u32).step_by($sector).try_for_each(|sector| self.0.erase(sector))
+            }
+
+            fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+                let start = absolute(&$range, offset, bytes.len(), WORD)?;
+                self.0.write(start, bytes)
+            }
+        }
+    };
+}
+
+region!(Records, STORE, RECORD_SECTOR, "The sectors of records.");
+region!(Slots, SLOTS, SLOT_SIZE, "The weight slots.");
+
+impl MappedSlots for Slots {
+    fn slots(&self) -> [&[u8]; 2] {
+        self.0.slots_at_start()
+    }
+}

@@ -1,0 +1,373 @@
+//! The board's side of the service line: what it keeps, and what it answers.
+
+use super::calibrate::{Calibrator, State};
+use super::event::{EventKind, EventLog};
+use super::frame::{Deframer, Frame, FrameError, emit};
+use super::message::{
+    AllCounters, BLOCK, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal,
+    Reply, Request,
+};
+use crate::health::{Counters, Status, count};
+use crate::model::Blob;
+use crate::sample::ImuSample;
+use crate::store::slots::{Selection, SlotError, Upload, WeightSource, select};
+use crate::store::{
+    Accepted, Calibration, Configuration, FieldError, ImuPart, Record, Slot, Store, StoreError,
+};
+use embedded_storage::nor_flash::NorFlash;
+
+/// The flash of the weight slots, which the processor can also read in place.
+pub trait MappedSlots: NorFlash {
+    /// Both slots, each on a word boundary.
+    fn slots(&self) -> [&[u8]; 2];
+}
+
+/// An upload, and its file's checksum once checked.
+#[derive(Debug, Clone, Copy)]
+struct Uploading {
+    upload: Upload,
+    checked: Option<u32>,
+}
+
+/// What the board keeps beside the pipeline.
+///
+/// Owns the flash: records in `R`, weight slots in `W`, `None` where there is no controller.
+pub struct Device<R: NorFlash, W> {
+    store: Option<Store<R>>,
+    slots: Option<W>,
+    /// Parts that the image drives.
+    parts: &'static [ImuPart],
+    identity: Identity,
+    flash: FlashState,
+    configuration: Configuration,
+    configuration_origin: Origin,
+    calibration: Calibration,
+    calibration_origin: Origin,
+    calibrator: Option<Calibrator>,
+    calibration_state: State,
+    accepted: Accepted,
+    weights: WeightSource,
+    weights_crc: Option<u32>,
+    refused_slots: [Option<SlotError>; 2],
+    uploading: Option<Uploading>,
+    status: Status,
+    tick: u32,
+    log: EventLog,
+    deframer: Deframer,
+    /// What went wrong on the lines; the wiring adds its own.
+    pub lines: LineCounters,
+    restart: bool,
+}
+
+impl<R: NorFlash, W: MappedSlots> Device<R, W> {
+    /// With built-in values, before [`Device::begin`]. A constant: it can be made where it stays.
+    #[must_use]
+    pub const fn new(parts: &'static [ImuPart]) -> Self {
+        Self {
+            store: None,
+            slots: None,
+            parts,
+            identity: Identity::UNKNOWN,
+            flash: FlashState::Absent,
+            configuration: Configuration::DEFAULT,
+            configuration_origin: Origin::BuiltIn,
+            calibration: Calibration::NONE,
+            calibration_origin: Origin::BuiltIn,
+            calibrator: None,
+            calibration_state: State::Idle,
+            accepted: Accepted::NONE,
+            weights: WeightSource::None,
+            weights_crc: None,
+            refused_slots: [None; 2],
+            uploading: None,
+            status: Status::Init,
+            tick: 0,
+            log: EventLog::new(),
+            deframer: Deframer::new(),
+            lines: LineCounters::NONE,
+            restart: false,
+        }
+    }
+
+    /// Reads what is stored; what is not whole or not in its range is not used and noted.
+    pub fn begin(&mut self, records: Option<R>, slots: Option<W>, identity: Identity) {
+        self.identity = identity;
+        self.slots = slots;
+        self.note(EventKind::Started(identity.reset));
+        if let Some(crash) = identity.crash {
+            self.note(EventKind::Crashed(crash));
+        }
+        if let Some(records) = records {
+            match Store::open(records, 0) {
+                Ok(store) => self.load(store),
+                Err(error) => self.flash = FlashState::Failed(error),
+            }
+        }
+    }
+
+    fn load(&mut self, mut store: Store<R>) {
+        match store.get::<Configuration>().and_then(|found| self.drivable(found)) {
+            Ok(Some(configuration)) => {
+                self.configuration = configuration;
+                self.configuration_origin = Origin::Stored;
+            }
+            Ok(None) => {}
+            Err(error) => {
+                self.configuration_origin = Origin::Refused(error);
+                self.note(EventKind::ConfigurationRefused(error));
+            }
+        }
+        match store.get() {
+            Ok(Some(calibration)) => {
+                self.calibration = calibration;
+                self.calibration_origin = Origin::Stored;
+            }
+            Ok(None) => {}
+            Err(error) => {
+                self.calibration_origin = Origin::Refused(error);
+                self.note(EventKind::CalibrationRefused(error));
+            }
+        }
+        match store.get() {
+            Ok(accepted) => self.accepted = accepted.unwrap_or(Accepted::NONE),
+            Err(error) => self.note(EventKind::AcceptedRefused(error)),
+        }
+        self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
+        self.store = Some(store);
+    }
+
+    fn drivable(&self, found: Option<Configuration>) -> Result<Option<Configuration>, StoreError> {
+        match found {
+            Some(configuration)
+                if !self.parts.contains(&configuration.imu) || configuration.fog.is_some() =>
+            {
+                Err(StoreError::Field(FieldError::PartNotInImage))
+            }
+            found => Ok(found),
+        }
+    }
+
+    /// The weights to run on: `slots` as the processor reads them, the image's own last.
+    pub fn weights<'w>(&mut self, slots: Option<[&'w [u8]; 2]>, built_in: &'w [u8]) -> Option<Blob<'w>> {
+        let Selection { weights, source, refused } =
+            select(&self.accepted, slots.unwrap_or_default(), built_in);
+        self.weights = source;
+        self.weights_crc = weights.map(|blob| blob.crc);
+        self.refused_slots = refused;
+        for (slot, error) in Slot::ALL.into_iter().zip(refused) {
+            if let Some(error) = error {
+                self.note(EventKind::SlotRefused(slot, error));
+            }
+        }
+        if source == WeightSource::None {
+            self.note(EventKind::NoWeights);
+        }
+        weights
+    }
+
+    /// What the image is to run with.
+    #[must_use]
+    pub fn configuration(&self) -> &Configuration {
+        &self.configuration
+    }
+
+    /// What is known of the sensor.
+    #[must_use]
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Whether a restart was asked for; the answer should go out first.
+    #[must_use]
+    pub fn restart_wanted(&self) -> bool {
+        self.restart
+    }
+
+    /// Takes every sample of the sensor, with the status of what was made of it.
+    pub fn observe(&mut self, sample: &ImuSample, tick: u32, status: Status) {
+        self.tick = tick;
+        if status != self.status {
+            self.status = status;
+            self.note(EventKind::Status(status));
+        }
+        let Some(calibrator) = self.calibrator.as_mut() else { return };
+        let task = calibrator.task();
+        if let Some(result) = calibrator.process(sample, &self.configuration.mounting, &mut self.calibration)
+        {
+            self.calibrator = None;
+            self.calibration_state = match result {
+                Ok(()) => State::Found(task),
+                Err(fault) => State::Failed(task, fault),
+            };
+            self.note(EventKind::Calibrated(result.err()));
+        }
+    }
+
+    /// Takes a byte of the service line; with the last one of a request returns the answer.
+    pub fn push(&mut self, byte: u8, counters: &Counters) -> Option<Frame> {
+        let (number, reply) = match self.deframer.push(byte)? {
+            Ok((number, request)) => (number, self.handle(request, counters)),
+            Err(error) => {
+                count(&mut self.lines.service_errors, 1);
+                let FrameError::Message { number } = error else { return None };
+                (number, Reply::Refused(Refusal::Unknown))
+            }
+        };
+        emit(number, &reply)
+    }
+
+    /// Answers a request.
+    pub fn handle(&mut self, request: Request, counters: &Counters) -> Reply {
+        let answer = match request {
+            Request::Info => Ok(Reply::Info(self.info())),
+            Request::GetConfiguration => Ok(Reply::Configuration {
+                version: Configuration::VERSION,
+                origin: self.configuration_origin,
+                configuration: self.configuration,
+            }),
+            Request::SetConfiguration { version, configuration } => {
+                self.set_configuration(version, configuration)
+            }
+            Request::GetCalibration => Ok(Reply::Calibration {
+                version: Calibration::VERSION,
+                origin: self.calibration_origin,
+                state: self.calibration_state,
+                calibration: self.calibration.clone(),
+            }),
+            Request::Calibrate(what) => self.calibrate(what),
+            Request::Log { after } => Ok(Reply::Log(self.log.page(after))),
+            Request::Counters => Ok(Reply::Counters(AllCounters { pipeline: *counters, lines: self.lines })),
+            Request::WeightsBegin { length } => self.weights_begin(length),
+            Request::WeightsBlock { offset, bytes } => self.weights_block(offset, &bytes),
+            Request::WeightsVerify => self.weights_verify(),
+            Request::WeightsActivate => self.weights_activate(),
+            Request::Restart => {
+                self.restart = true;
+                Ok(Reply::Done)
+            }
+        };
+        answer.unwrap_or_else(Reply::Refused)
+    }
+
+    fn note(&mut self, kind: EventKind) {
+        self.log.push(self.tick, kind);
+    }
+
+    fn info(&self) -> Info {
+        Info {
+            protocol: PROTOCOL,
+            identity: self.identity,
+            record_versions: [Configuration::VERSION, Calibration::VERSION],
+            flash: self.flash,
+            configuration: self.configuration_origin,
+            calibration: self.calibration_origin,
+            weights: self.weights,
+            weights_crc: self.weights_crc,
+            refused_slots: self.refused_slots,
+            status: self.status,
+        }
+    }
+
+    fn store(&mut self) -> Result<&mut Store<R>, StoreError> {
+        self.store.as_mut().ok_or(StoreError::NoFlash)
+    }
+
+    fn set_configuration(&mut self, found: u8, configuration: Configuration) -> Result<Reply, Refusal> {
+        let expected = Configuration::VERSION;
+        if found != expected {
+            return Err(Refusal::Version { found, expected });
+        }
+        // Where nothing can be stored, a bad value is named all the same.
+        configuration.check().map_err(StoreError::from)?;
+        self.drivable(Some(configuration))?;
+        self.store()?.set(&configuration)?;
+        self.note(EventKind::ConfigurationStored);
+        Ok(Reply::Done)
+    }
+
+    fn calibrate(&mut self, what: Calibrate) -> Result<Reply, Refusal> {
+        match what {
+            Calibrate::Start(task) => {
+                self.calibrator = Some(Calibrator::new(task, self.configuration.static_init));
+                self.calibration_state = State::Running(task);
+            }
+            Calibrate::Cancel => {
+                self.calibrator = None;
+                self.calibration_state = State::Idle;
+            }
+            Calibrate::Store => {
+                if !matches!(self.calibration_state, State::Found(_)) {
+                    return Err(Refusal::NothingFound);
+                }
+                let calibration = self.calibration.clone();
+                self.store()?.set(&calibration)?;
+                self.calibration_origin = Origin::Stored;
+                self.calibration_state = State::Idle;
+                self.note(EventKind::CalibrationStored);
+            }
+        }
+        Ok(Reply::Done)
+    }
+
+    /// The slot that the network does not run on.
+    fn unused_slot(&self) -> Slot {
+        match self.weights {
+            WeightSource::Slot(slot) => slot.other(),
+            // The network runs on neither; the file accepted last is spared all the same.
+            WeightSource::BuiltIn | WeightSource::None => self.accepted.active.map_or(Slot::A, Slot::other),
+        }
+    }
+
+    fn weights_begin(&mut self, length: u32) -> Result<Reply, Refusal> {
+        let slot = self.unused_slot();
+        self.uploading = None;
+        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
+        let upload = Upload::begin(flash, slot, length)?;
+        self.uploading = Some(Uploading { upload, checked: None });
+        self.progress()
+    }
+
+    fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<Reply, Refusal> {
+        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
+        let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
+        // Every block but the last one is full, so a block that is there already ends where the
+        // next one begins.
+        let written = uploading.upload.written();
+        let repeated = bytes.len() <= BLOCK && offset.checked_add(bytes.len() as u32) == Some(written);
+        if repeated {
+            return self.progress();
+        }
+        match uploading.upload.block(flash, offset, bytes) {
+            Ok(()) => self.progress(),
+            Err(error) => {
+                if let SlotError::Flash(_) = error {
+                    self.uploading = None;
+                }
+                Err(error.into())
+            }
+        }
+    }
+
+    fn weights_verify(&mut self) -> Result<Reply, Refusal> {
+        let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
+        let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
+        uploading.checked = Some(uploading.upload.verify(flash.slots())?);
+        self.progress()
+    }
+
+    fn weights_activate(&mut self) -> Result<Reply, Refusal> {
+        let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
+        let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
+        let accepted = self.accepted.with(upload.slot(), file);
+        self.store()?.set(&accepted)?;
+        self.accepted = accepted;
+        self.uploading = None;
+        self.note(EventKind::WeightsAccepted(upload.slot()));
+        Ok(Reply::Done)
+    }
+
+    fn progress(&self) -> Result<Reply, Refusal> {
+        let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
+        Ok(Reply::Weights { slot: upload.slot(), written: upload.written(), checked })
+    }
+}

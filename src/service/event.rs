@@ -1,0 +1,150 @@
+//! What has happened to the board, kept until it is overwritten.
+
+use super::calibrate::CalibrationFault;
+use crate::health::Status;
+use crate::store::{Slot, StoreError, slots::SlotError};
+use heapless::{Deque, Vec};
+use serde::{Deserialize, Serialize};
+
+/// Events that are kept.
+pub const KEPT: usize = 32;
+/// Events of one page.
+pub const PAGE: usize = 8;
+
+/// Why the processor has started, as its reset flags say (RM0090 7.3.21).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ResetCause {
+    /// No flag is set: the emulator has none.
+    Unknown,
+    /// Power came on.
+    PowerOn,
+    /// Power was too low.
+    BrownOut,
+    /// The reset pin.
+    Pin,
+    /// Asked for, or after a crash: see [`Crash`].
+    Software,
+    /// A watchdog.
+    Watchdog,
+    /// A forbidden low-power mode.
+    LowPower,
+}
+
+/// What stopped the image before this start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum CrashKind {
+    /// A panic of the program.
+    Panic,
+    /// A hard fault: a bus, usage or memory fault, or a broken vector.
+    HardFault,
+    /// An exception or interrupt that nothing handles; its number (ICSR.VECTACTIVE).
+    Unhandled(u16),
+}
+
+/// A crash, kept over the reset that it led to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Crash {
+    /// What it was.
+    pub kind: CrashKind,
+    /// Where: the program counter of a fault, the line of a panic.
+    pub place: u32,
+    /// Crashes since power came on.
+    pub count: u32,
+}
+
+/// What can happen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum EventKind {
+    /// The image started.
+    Started(ResetCause),
+    /// It had crashed before.
+    Crashed(Crash),
+    /// The stored configuration is not used; the defaults are.
+    ConfigurationRefused(StoreError),
+    /// The stored calibration is not used.
+    CalibrationRefused(StoreError),
+    /// The record of accepted weights is not used.
+    AcceptedRefused(StoreError),
+    /// A weight slot is not used.
+    SlotRefused(Slot, SlotError),
+    /// No weights are good: the network is off.
+    NoWeights,
+    /// The status has changed.
+    Status(Status),
+    /// A configuration was stored.
+    ConfigurationStored,
+    /// A calibration was stored.
+    CalibrationStored,
+    /// A calibration ended; with why it found nothing.
+    Calibrated(Option<CalibrationFault>),
+    /// The file in a slot was accepted.
+    WeightsAccepted(Slot),
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Event {
+    /// Counted from 1 since the start.
+    pub number: u32,
+    /// 10 ms steps of the sensor's time.
+    pub tick: u32,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// A part of the log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LogPage {
+    /// In order.
+    pub events: Vec<Event, PAGE>,
+    /// Events since the start.
+    pub total: u32,
+    /// Of those asked for, how many were overwritten before.
+    pub lost: u32,
+}
+
+/// The newest events; the oldest one gives way.
+#[derive(Debug, Default)]
+pub struct EventLog {
+    events: Deque<Event, KEPT>,
+    total: u32,
+}
+
+impl EventLog {
+    /// Nothing has happened.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { events: Deque::new(), total: 0 }
+    }
+
+    /// Notes an event.
+    pub fn push(&mut self, tick: u32, kind: EventKind) {
+        self.total = self.total.saturating_add(1);
+        if self.events.is_full() {
+            self.events.pop_front();
+        }
+        // There is room.
+        let _ = self.events.push_back(Event { number: self.total, tick, kind });
+    }
+
+    /// The events after number `after`, a page of them.
+    #[must_use]
+    pub fn page(&self, after: u32) -> LogPage {
+        let oldest = self.events.front().map_or(1, |event| event.number);
+        let mut events = Vec::new();
+        for event in self.events.iter().filter(|event| event.number > after).take(PAGE) {
+            // There is room for a page.
+            let _ = events.push(*event);
+        }
+        let lost = oldest.saturating_sub(after.saturating_add(1));
+        LogPage { events, total: self.total, lost }
+    }
+}

@@ -1,0 +1,143 @@
+//! What the board has found out about its own sensor.
+
+use super::error::{Field, FieldError, within};
+use super::record::Record;
+use crate::mounting::Rotation;
+use crate::units::{AngularRate, CentiCelsius};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Most points of the temperature table.
+pub const MAX_POINTS: usize = 8;
+/// Points that are closer are one.
+const POINT_SPACING: i16 = 500;
+/// Largest believable bias, rad/s.
+const MAX_BIAS: f32 = 1.0;
+/// Temperatures that parts are made for, deg C.
+const TEMPERATURE: (f32, f32) = (-60.0, 150.0);
+/// Furthest from level that a mounting calibration may find, deg; more is a wrong rotation.
+pub const MAX_TILT_DEG: f32 = 45.0;
+
+/// The gyro's bias at a temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BiasPoint {
+    /// Of the part.
+    pub temperature: CentiCelsius,
+    /// About x, y, z.
+    pub gyro_bias: [AngularRate; 3],
+}
+
+/// How the configured sensor frame is tilted against level ground.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Level {
+    /// About x, deg.
+    pub roll_deg: f32,
+    /// About y, deg.
+    pub pitch_deg: f32,
+}
+
+impl Level {
+    /// From the configured frame into the vehicle's; `None` when an angle is not finite.
+    #[must_use]
+    pub fn rotation(&self) -> Option<Rotation> {
+        Rotation::from_mounting(self.roll_deg, self.pitch_deg, 0.0)
+    }
+}
+
+/// Bias, its temperature table, and the mounting as found on level ground.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Of the last static calibration.
+    pub gyro_bias: Option<[AngularRate; 3]>,
+    /// Rising temperatures, at least 5 deg C apart.
+    pub temperature_table: Vec<BiasPoint, MAX_POINTS>,
+    /// Of the last mounting calibration.
+    pub level: Option<Level>,
+}
+
+impl Calibration {
+    /// Nothing is known.
+    pub const NONE: Self = Self { gyro_bias: None, temperature_table: Vec::new(), level: None };
+
+    /// Takes over the bias of a static calibration, and into the table where the part gives its
+    /// temperature: instead of a point that is nearer than 5 deg C, else as a new one. A full
+    /// table gives up its nearest point.
+    pub fn add_bias(&mut self, gyro_bias: [AngularRate; 3], temperature: Option<CentiCelsius>) {
+        self.gyro_bias = Some(gyro_bias);
+        let Some(temperature) = temperature else { return };
+        let distance = |point: &BiasPoint| point.temperature.0.abs_diff(temperature.0);
+        self.temperature_table.retain(|point| distance(point) >= POINT_SPACING.unsigned_abs());
+        if self.temperature_table.is_full()
+            && let Some(nearest) = self.temperature_table.iter().map(distance).min()
+        {
+            self.temperature_table.retain(|point| distance(point) != nearest);
+        }
+        // There is room: a full table has just lost a point.
+        let _ = self.temperature_table.push(BiasPoint { temperature, gyro_bias });
+        // All others are in order: one way through takes the new one to its place.
+        for k in (1..self.temperature_table.len()).rev() {
+            if let Some([low, high]) = self.temperature_table.get_mut(k - 1..=k)
+                && low.temperature > high.temperature
+            {
+                core::mem::swap(low, high);
+            }
+        }
+    }
+
+    /// The bias at a temperature, linear between the table's points and level beyond its ends;
+    /// the last static calibration's where there is no table or no temperature.
+    #[must_use]
+    pub fn bias_at(&self, temperature: Option<CentiCelsius>) -> Option<[AngularRate; 3]> {
+        let (Some(at), Some(first), Some(last)) =
+            (temperature, self.temperature_table.first(), self.temperature_table.last())
+        else {
+            return self.gyro_bias;
+        };
+        let mut points = self.temperature_table.iter().zip(self.temperature_table.iter().skip(1));
+        let between = points.find(|(low, high)| (low.temperature..=high.temperature).contains(&at));
+        Some(match between {
+            Some((low, high)) => interpolate(low, high, at),
+            None if at < first.temperature => first.gyro_bias,
+            None => last.gyro_bias,
+        })
+    }
+}
+
+fn interpolate(low: &BiasPoint, high: &BiasPoint, at: CentiCelsius) -> [AngularRate; 3] {
+    let distance = |from: CentiCelsius, to: CentiCelsius| i64::from(to.0) - i64::from(from.0);
+    let span = distance(low.temperature, high.temperature).max(1);
+    let mut bias = low.gyro_bias;
+    for (bias, high) in bias.iter_mut().zip(high.gyro_bias) {
+        let rise = i64::from(high.0) - i64::from(bias.0);
+        bias.0 += (rise * distance(low.temperature, at)).div_euclid(span) as i32;
+    }
+    bias
+}
+
+impl Record for Calibration {
+    const KEY: u8 = 2;
+    const VERSION: u8 = 1;
+
+    fn check(&self) -> Result<(), FieldError> {
+        let biases = self.gyro_bias.iter().chain(self.temperature_table.iter().map(|point| &point.gyro_bias));
+        for rate in biases.flatten() {
+            let rate = rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
+            within(Field::CalibrationGyroBias, rate, -MAX_BIAS, MAX_BIAS)?;
+        }
+        let mut before = f32::NEG_INFINITY;
+        for point in &self.temperature_table {
+            let celsius = f32::from(point.temperature.0) / 100.0;
+            let (low, high) = TEMPERATURE;
+            within(Field::CalibrationTemperature, celsius, low, high)?;
+            within(Field::CalibrationTemperatureOrder, celsius, before, high)?;
+            before = celsius + f32::from(POINT_SPACING) / 100.0;
+        }
+        if let Some(Level { roll_deg, pitch_deg }) = self.level {
+            within(Field::CalibrationRollDeg, roll_deg, -MAX_TILT_DEG, MAX_TILT_DEG)?;
+            within(Field::CalibrationPitchDeg, pitch_deg, -MAX_TILT_DEG, MAX_TILT_DEG)?;
+        }
+        Ok(())
+    }
+}

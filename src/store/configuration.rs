@@ -1,0 +1,141 @@
+//! What a user sets, whole.
+
+use super::error::{Field, FieldError, within};
+use super::record::Record;
+use super::{Calibration, Level};
+use crate::bias::{EarthRate, Latitude, StaticConfig};
+use crate::can::config::{Config, Settings};
+use crate::compensate::CompensateConfig;
+use crate::mounting::{Levelling, Rotation};
+use crate::pipeline::PipelineConfig;
+use crate::units::AngularRate;
+use serde::{Deserialize, Serialize};
+
+/// The inertial sensor that is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ImuPart {
+    /// Xsens MTi, MTData2 on a UART.
+    XsensMti,
+    /// TDK ICM-42688-P on SPI.
+    Icm42688,
+    /// ADI ADIS16465 or 16470 on SPI.
+    Adis16465,
+}
+
+/// The fibre-optic gyro that is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FogPart {
+    /// KVH DSP-1760 or 17xx.
+    Dsp1760,
+    /// KVH DSP-3000.
+    Dsp3000,
+}
+
+/// How the sensor is turned against the vehicle: about x (forward), then y (left), then z (up).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Mounting {
+    /// About x, -180 to 180 deg.
+    pub roll_deg: f32,
+    /// About y, -90 to 90 deg.
+    pub pitch_deg: f32,
+    /// About z, -180 to 180 deg.
+    pub yaw_deg: f32,
+}
+
+impl Mounting {
+    /// From the sensor's axes into the vehicle's; `None` when an angle is not finite.
+    #[must_use]
+    pub fn rotation(&self) -> Option<Rotation> {
+        Rotation::from_mounting(self.roll_deg, self.pitch_deg, self.yaw_deg)
+    }
+}
+
+/// Everything that a user can set. It holds from the next start on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Configuration {
+    /// Inertial sensor.
+    pub imu: ImuPart,
+    /// Fibre-optic gyro, where one is fitted.
+    pub fog: Option<FogPart>,
+    /// Messages, identifiers, periods, protection.
+    pub can: Settings,
+    /// -90 to 90 deg, north positive; `None`: the Earth's rate stays in the bias.
+    pub latitude_deg: Option<f32>,
+    /// Of the sensor.
+    pub mounting: Mounting,
+    /// When the vehicle counts as standing.
+    pub static_init: StaticConfig,
+    /// How much correction is believed.
+    pub compensate: CompensateConfig,
+}
+
+impl Configuration {
+    /// An Xsens MTi, level, on a car, with the Bosch set and our own messages.
+    pub const DEFAULT: Self = Self {
+        imu: ImuPart::XsensMti,
+        fog: None,
+        can: Settings::DEFAULT,
+        latitude_deg: None,
+        mounting: Mounting { roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 0.0 },
+        static_init: StaticConfig::DEFAULT,
+        compensate: CompensateConfig::DEFAULT,
+    };
+}
+
+impl Configuration {
+    /// What it and a calibration mean for the pipeline. A level that was found on level ground is
+    /// the mounting: the street is not asked any more.
+    #[must_use]
+    pub fn pipeline(&self, calibration: &Calibration) -> PipelineConfig {
+        // All angles have been checked to be finite.
+        let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
+        let level = calibration.level.as_ref().and_then(Level::rotation);
+        PipelineConfig {
+            mounting: level.map_or(mounting, |level| mounting.then(&level)),
+            levelling: if level.is_some() { Levelling::Off } else { Levelling::DEFAULT },
+            static_init: self.static_init,
+            earth_rate: self
+                .latitude_deg
+                .and_then(Latitude::from_degrees)
+                .map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
+            compensate: self.compensate,
+            ..PipelineConfig::DEFAULT
+        }
+    }
+}
+
+impl Record for Configuration {
+    const KEY: u8 = 1;
+    const VERSION: u8 = 1;
+
+    fn check(&self) -> Result<(), FieldError> {
+        Config::new(self.can).map_err(FieldError::Can)?;
+        let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
+        let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
+        // What modes and lags there are, their types say.
+        let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_carry } = self.compensate;
+        let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
+        for (field, value, low, high) in [
+            (Field::LatitudeDeg, self.latitude_deg.unwrap_or(0.0), -90.0, 90.0),
+            (Field::MountingRollDeg, roll_deg, -180.0, 180.0),
+            (Field::MountingPitchDeg, pitch_deg, -90.0, 90.0),
+            (Field::MountingYawDeg, yaw_deg, -180.0, 180.0),
+            (Field::StaticGyroStd, gyro_std, 1e-5, 1.0),
+            (Field::StaticAccelStd, accel_std, 1e-4, 20.0),
+            (Field::StaticGyroDrift, gyro_drift, 1e-5, 0.1),
+            (Field::StaticAccelDrift, accel_drift, 1e-4, 2.0),
+            (Field::StaticGyroBias, gyro_bias, 1e-5, 1.0),
+            (Field::CompensateMaxMean, rate(max_mean), 0.0, 0.5),
+            (Field::CompensateMaxSingle, rate(max_single), 0.0, 5.0),
+            (Field::CompensateMaxCarry, rate(max_carry), 0.0, 0.5),
+        ] {
+            within(field, value, low, high)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,162 @@
+//! Why something is not stored, or not read.
+
+use crate::can::config::ConfigError;
+use serde::{Deserialize, Serialize};
+
+/// A value of the configuration or calibration that has a range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "named as the fields that they stand for")]
+pub enum Field {
+    LatitudeDeg,
+    MountingRollDeg,
+    MountingPitchDeg,
+    MountingYawDeg,
+    StaticGyroStd,
+    StaticAccelStd,
+    StaticGyroDrift,
+    StaticAccelDrift,
+    StaticGyroBias,
+    CompensateMaxMean,
+    CompensateMaxSingle,
+    CompensateMaxCarry,
+    CalibrationGyroBias,
+    CalibrationTemperature,
+    CalibrationTemperatureOrder,
+    CalibrationRollDeg,
+    CalibrationPitchDeg,
+}
+
+impl Field {
+    /// The field as a user writes it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LatitudeDeg => "latitude_deg",
+            Self::MountingRollDeg => "mounting.roll_deg",
+            Self::MountingPitchDeg => "mounting.pitch_deg",
+            Self::MountingYawDeg => "mounting.yaw_deg",
+            Self::StaticGyroStd => "static_init.gyro_std",
+            Self::StaticAccelStd => "static_init.accel_std",
+            Self::StaticGyroDrift => "static_init.gyro_drift",
+            Self::StaticAccelDrift => "static_init.accel_drift",
+            Self::StaticGyroBias => "static_init.gyro_bias",
+            Self::CompensateMaxMean => "compensate.max_mean",
+            Self::CompensateMaxSingle => "compensate.max_single",
+            Self::CompensateMaxCarry => "compensate.max_carry",
+            Self::CalibrationGyroBias => "gyro_bias",
+            Self::CalibrationTemperature => "temperature_table.temperature",
+            Self::CalibrationTemperatureOrder => "temperature_table (order)",
+            Self::CalibrationRollDeg => "level.roll_deg",
+            Self::CalibrationPitchDeg => "level.pitch_deg",
+        }
+    }
+}
+
+/// Why a configuration or calibration is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FieldError {
+    /// A value is not a number or outside its range.
+    Range {
+        /// Which one.
+        field: Field,
+        /// What it is.
+        value: f32,
+        /// Least that it may be.
+        low: f32,
+        /// Most that it may be.
+        high: f32,
+    },
+    /// The messages on the bus are no configuration.
+    Can(ConfigError),
+    /// This firmware image does not drive the part.
+    PartNotInImage,
+}
+
+impl core::fmt::Display for FieldError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Range { field, value, low, high } => {
+                write!(f, "{}: {value} is not within {low} to {high}", field.name())
+            }
+            Self::Can(error) => write!(f, "can: {error}"),
+            Self::PartNotInImage => f.write_str("sensor: this firmware image does not drive the part"),
+        }
+    }
+}
+
+impl core::error::Error for FieldError {}
+
+/// Passes a value that is inside its range.
+pub(super) fn within(field: Field, value: f32, low: f32, high: f32) -> Result<(), FieldError> {
+    // NaN is inside nothing.
+    if (low..=high).contains(&value) { Ok(()) } else { Err(FieldError::Range { field, value, low, high }) }
+}
+
+/// What the flash itself said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FlashFault {
+    /// An address that is no start of a word or sector.
+    NotAligned,
+    /// Beyond the end.
+    OutOfBounds,
+    /// It did not take the operation, or did not finish it in time.
+    Refused,
+}
+
+/// Why the store has not done what it was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum StoreError {
+    /// There is no flash controller (the emulator): nothing can be stored.
+    NoFlash,
+    /// The flash reports an error.
+    Flash(FlashFault),
+    /// No room is left.
+    Full,
+    /// The sectors do not hold what they should, even after repair.
+    Corrupt,
+    /// A record of another layout.
+    Version {
+        /// As stored.
+        found: u8,
+        /// What this firmware reads.
+        expected: u8,
+    },
+    /// A record that is not what its version says.
+    Encoding,
+    /// A value is out of its range.
+    Field(FieldError),
+}
+
+impl core::fmt::Display for StoreError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NoFlash => f.write_str("there is no flash controller: nothing can be stored"),
+            Self::Flash(FlashFault::NotAligned) => f.write_str("flash: not the start of a word or sector"),
+            Self::Flash(FlashFault::OutOfBounds) => f.write_str("flash: beyond its end"),
+            Self::Flash(FlashFault::Refused) => f.write_str("flash: did not take or finish the operation"),
+            Self::Full => f.write_str("no room is left for the record"),
+            Self::Corrupt => f.write_str("the record sectors are damaged"),
+            Self::Version { found, expected } => {
+                write!(f, "the record has layout {found}, this firmware reads {expected}")
+            }
+            Self::Encoding => f.write_str("the record is not what its version says"),
+            Self::Field(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for StoreError {}
+
+impl From<FieldError> for StoreError {
+    fn from(error: FieldError) -> Self {
+        Self::Field(error)
+    }
+}

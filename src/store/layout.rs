@@ -1,0 +1,53 @@
+//! Where things lie in the flash of an STM32F405xG (RM0090 table 5): 1 MiB, twelve sectors.
+//!
+//! | sectors | size | what |
+//! |---|---|---|
+//! | 0 | 16 KiB | vector table |
+//! | 1, 2 | 2 x 16 KiB | records ([`STORE`]) |
+//! | 3 to 9 | 16 + 64 + 5 x 128 KiB | code and constants, the built-in weights among them |
+//! | 10, 11 | 2 x 128 KiB | weight slots ([`SLOTS`]) |
+//!
+//! Records want sectors that are small and of one size, and the processor wants its vectors in
+//! sector 0; so the code begins behind the records. `memory.x` says the same to the linker, and
+//! a test holds the two together.
+
+use core::ops::Range;
+
+/// Where the processor sees the flash.
+pub const FLASH_BASE: u32 = 0x0800_0000;
+/// Size of each sector, bytes.
+pub const SECTORS: [u32; 12] = {
+    let mut sizes = [128 << 10; 12];
+    let mut k = 0;
+    while k < 4 {
+        sizes[k] = 16 << 10;
+        k += 1;
+    }
+    sizes[4] = 64 << 10;
+    sizes
+};
+/// Size of a sector of records.
+pub const RECORD_SECTOR: usize = 16 << 10;
+/// Records, as offsets into the flash.
+pub const STORE: Range<u32> = 0x4000..0xC000;
+/// First byte of the code.
+pub const CODE: u32 = 0xC000;
+/// First byte behind the code.
+pub const CODE_END: u32 = 0xC_0000;
+/// Size of a weight slot: one sector.
+pub const SLOT_SIZE: usize = 128 << 10;
+/// Both weight slots.
+pub const SLOTS: Range<u32> = 0xC_0000..0x10_0000;
+
+/// Number of the sector that begins at an offset; `None` where none begins.
+#[must_use]
+pub fn sector_at(offset: u32) -> Option<u8> {
+    let mut start = 0;
+    for (number, size) in (0u8..).zip(SECTORS) {
+        if start == offset {
+            return Some(number);
+        }
+        start += size;
+    }
+    None
+}

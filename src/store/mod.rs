@@ -1,0 +1,23 @@
+//! What outlives a power cut: configuration, calibration, and two slots for weight files.
+//!
+//! | what | where | written as | after an interrupted write |
+//! |---|---|---|---|
+//! | [`Configuration`], [`Calibration`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
+//! | weight files | two 128 KiB sectors, [`slots`] | the slot that is not in use | the slot in use |
+//!
+//! Records are found by key and protected by CRC-32; each carries the version of its layout, and
+//! every value is checked against its range when it is stored and when it is read. A weight file is used only after all of [`crate::model::Blob::new_checked`].
+//! [`layout`] says where everything lies.
+
+pub mod calibration;
+pub mod configuration;
+mod error;
+pub mod layout;
+mod record;
+pub mod slots;
+
+pub use calibration::{BiasPoint, Calibration, Level};
+pub use configuration::{Configuration, FogPart, ImuPart, Mounting};
+pub use error::{Field, FieldError, FlashFault, StoreError};
+pub use record::{Record, Store};
+pub use slots::{Accepted, Slot};

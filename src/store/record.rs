@@ -1,0 +1,305 @@
+//! Records in two sectors of flash, each found by its key, the newest of a kind counting.
+//!
+//! A sector is a header of two words, then records one behind the other:
+//!
+//! | words | record | | header |
+//! |---|---|---|---|
+//! | 1 | key, version of its layout, length n (u16) | 1 | generation |
+//! | n / 4, rounded up | postcard's encoding, then FF | 1 | CRC-32 of the generation |
+//! | 1 | CRC-32 of all words before it | | |
+//!
+//! All little-endian. A record is appended until the sector in use is full, or ends in a record
+//! that a power cut has torn. Then the *other* sector is erased, the newest record of each key is
+//! copied there with the new one, and the header comes last, with the next generation: only with
+//! it does that sector take over. So whatever is erased or half written is never what counts, and
+//! how an interrupted erasure leaves a sector does not matter.
+
+use super::error::{FieldError, FlashFault, StoreError};
+use crate::model::blob::CRC;
+use core::ops::Range;
+use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
+use serde::{Serialize, de::DeserializeOwned};
+
+const WORD: usize = 4;
+const WORD_U32: u32 = WORD as u32;
+/// Bytes of a sector's header.
+const HEADER: u32 = 2 * WORD_U32;
+/// Most bytes of an encoded record.
+const MAX_LEN: usize = 248;
+/// With its first and last word.
+const BUFFER: usize = MAX_LEN + 2 * WORD;
+/// Highest key.
+const MAX_KEY: u8 = 7;
+/// A header is not to be mistaken for one of some other use of the flash.
+const FORMAT: u32 = u32::from_le_bytes(*b"GYR1");
+
+/// Something that is kept.
+pub trait Record: Serialize + DeserializeOwned {
+    /// Its place among the records, 1 to 7; never given to another one.
+    const KEY: u8;
+    /// Of its layout; raised with every change of it.
+    const VERSION: u8;
+
+    /// Whether all values are inside their ranges.
+    ///
+    /// # Errors
+    /// [`FieldError`] that names the first one that is not.
+    fn check(&self) -> Result<(), FieldError>;
+}
+
+/// A record as it lies in flash.
+#[derive(Clone, Copy)]
+struct Raw {
+    words: [u8; BUFFER],
+    len: usize,
+}
+
+impl Raw {
+    const fn size(len: usize) -> usize {
+        2 * WORD + len.next_multiple_of(WORD)
+    }
+
+    fn encode<R: Record>(record: &R) -> Option<Self> {
+        let mut raw = Self { words: [0xFF; BUFFER], len: 0 };
+        let (first, rest) = raw.words.split_first_chunk_mut::<WORD>()?;
+        let len = postcard::to_slice(record, rest.get_mut(..MAX_LEN)?).ok()?.len();
+        // The encoder may leave things behind its end.
+        rest.get_mut(len..)?.fill(0xFF);
+        let [low, high] = u16::try_from(len).ok()?.to_le_bytes();
+        *first = [R::KEY, R::VERSION, low, high];
+        raw.len = len;
+        let crc = CRC.checksum(raw.bytes().get(..Self::size(len) - WORD)?);
+        *raw.words.get_mut(..Self::size(len))?.last_chunk_mut()? = crc.to_le_bytes();
+        Some(raw)
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.words.get(..Self::size(self.len)).unwrap_or_default()
+    }
+
+    const fn key(&self) -> u8 {
+        self.words[0]
+    }
+
+    fn is_whole(&self) -> bool {
+        let bytes = self.bytes();
+        let content = bytes.get(..bytes.len().wrapping_sub(WORD));
+        let crc = content.map(|content| CRC.checksum(content).to_le_bytes());
+        crc.is_some_and(|crc| bytes.ends_with(&crc))
+    }
+
+    fn decode<R: Record>(&self) -> Result<R, StoreError> {
+        let [_, found, ..] = self.words;
+        if found != R::VERSION {
+            return Err(StoreError::Version { found, expected: R::VERSION });
+        }
+        let content = self.words.get(WORD..WORD + self.len).ok_or(StoreError::Encoding)?;
+        let (record, rest) = postcard::take_from_bytes::<R>(content).map_err(|_| StoreError::Encoding)?;
+        if !rest.is_empty() {
+            return Err(StoreError::Encoding);
+        }
+        record.check()?;
+        Ok(record)
+    }
+}
+
+/// What stands at a place in a sector.
+enum Place {
+    /// A record; it may be torn.
+    Record,
+    /// Nothing yet.
+    Blank,
+    /// No record can begin so, or none fits any more.
+    End,
+}
+
+/// The records of two sectors.
+pub struct Store<F> {
+    flash: F,
+    start: u32,
+    /// Sector in use and its generation.
+    current: Option<(u32, u32)>,
+    /// Where the next record goes, while there is room.
+    free: Option<u32>,
+    damaged: bool,
+}
+
+impl<F: NorFlash> Store<F> {
+    /// Looks at two sectors from `start` on (an offset into `flash`). Writes nothing.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`].
+    pub fn open(flash: F, start: u32) -> Result<Self, StoreError> {
+        const { assert!(F::READ_SIZE <= WORD && WORD.is_multiple_of(F::WRITE_SIZE)) };
+        let mut store = Self { flash, start, current: None, free: None, damaged: false };
+        for sector in [0, 1] {
+            let generation = store.generation(sector)?;
+            let newest = store.current.map(|(_, generation)| generation);
+            if generation > newest {
+                store.current = generation.map(|generation| (sector, generation));
+            }
+        }
+        if store.current.is_some() {
+            // The last key that there is none of: the walk goes to the end.
+            store.find(0)?;
+        }
+        Ok(store)
+    }
+
+    /// Whether a record was found that is not whole: a power cut tore it, or the flash has lost
+    /// bits. What is read is then the one before.
+    #[must_use]
+    pub fn damaged(&self) -> bool {
+        self.damaged
+    }
+
+    /// The newest whole record; `None` before the first one.
+    ///
+    /// # Errors
+    /// [`StoreError`]: nothing that is not whole and inside its ranges is returned.
+    pub fn get<R: Record>(&mut self) -> Result<Option<R>, StoreError> {
+        self.find(R::KEY)?.map(|raw| raw.decode()).transpose()
+    }
+
+    /// Stores a record and reads it back; until it is whole the one before stays.
+    ///
+    /// # Errors
+    /// [`StoreError::Field`] for a value out of its range: nothing is written then.
+    pub fn set<R: Record>(&mut self, record: &R) -> Result<(), StoreError> {
+        record.check()?;
+        let raw = Raw::encode(record).ok_or(StoreError::Full)?;
+        let appended = match (self.current, self.free) {
+            (Some((sector, _)), Some(at)) => self.append(sector, at, &raw)?,
+            _ => None,
+        };
+        if appended.is_none() {
+            self.change_sector(&raw)?;
+        }
+        let stored = self.find(R::KEY)?;
+        if stored.is_some_and(|stored| stored.bytes() == raw.bytes()) {
+            Ok(())
+        } else {
+            Err(StoreError::Flash(FlashFault::Refused))
+        }
+    }
+
+    fn range(&self, sector: u32) -> Range<u32> {
+        let start = self.start + sector * F::ERASE_SIZE as u32;
+        start..start + F::ERASE_SIZE as u32
+    }
+
+    fn read<const N: usize>(&mut self, at: u32) -> Result<[u8; N], StoreError> {
+        let mut bytes = [0; N];
+        self.flash.read(at, &mut bytes).map_err(fault)?;
+        Ok(bytes)
+    }
+
+    fn generation(&mut self, sector: u32) -> Result<Option<u32>, StoreError> {
+        let at = self.range(sector).start;
+        let generation = u32::from_le_bytes(self.read(at)?);
+        let crc = u32::from_le_bytes(self.read(at + WORD_U32)?);
+        Ok((crc == header_crc(generation)).then_some(generation))
+    }
+
+    /// Reads a record, where there is one.
+    fn place(&mut self, sector: u32, at: u32, raw: &mut Raw) -> Result<Place, StoreError> {
+        let end = self.range(sector).end;
+        if at + WORD_U32 > end {
+            return Ok(Place::End);
+        }
+        let first = self.read::<WORD>(at)?;
+        if first == [0xFF; WORD] {
+            return Ok(Place::Blank);
+        }
+        let [_, _, low, high] = first;
+        let len = usize::from(u16::from_le_bytes([low, high]));
+        let fits = len <= MAX_LEN && at + Raw::size(len) as u32 <= end;
+        raw.len = len;
+        match raw.words.get_mut(..Raw::size(len)) {
+            Some(words) if fits => self.flash.read(at, words).map_err(fault)?,
+            _ => return Ok(Place::End),
+        }
+        Ok(Place::Record)
+    }
+
+    /// The newest whole record of a key; learns where the next one goes.
+    fn find(&mut self, key: u8) -> Result<Option<Raw>, StoreError> {
+        let Some((sector, _)) = self.current else { return Ok(None) };
+        let mut at = self.range(sector).start + HEADER;
+        let mut raw = Raw { words: [0; BUFFER], len: 0 };
+        let mut found = None;
+        self.damaged = false;
+        loop {
+            // Each turn goes on by a record's length, of two words at least.
+            match self.place(sector, at, &mut raw)? {
+                Place::Record => {
+                    at += Raw::size(raw.len) as u32;
+                    if !raw.is_whole() {
+                        self.damaged = true;
+                    } else if raw.key() == key {
+                        found = Some(raw);
+                    }
+                }
+                // Nothing is put behind what may be half a record.
+                Place::Blank => {
+                    self.free = (!self.damaged).then_some(at);
+                    return Ok(found);
+                }
+                Place::End => {
+                    self.damaged |= at + WORD_U32 <= self.range(sector).end;
+                    self.free = None;
+                    return Ok(found);
+                }
+            }
+        }
+    }
+
+    /// Where the record after it goes; `None` without room for it.
+    fn append(&mut self, sector: u32, at: u32, raw: &Raw) -> Result<Option<u32>, StoreError> {
+        let end = at + raw.bytes().len() as u32;
+        if end > self.range(sector).end {
+            return Ok(None);
+        }
+        self.flash.write(at, raw.bytes()).map_err(fault)?;
+        Ok(Some(end))
+    }
+
+    /// Starts the other sector with the newest record of each key, the given one among them.
+    fn change_sector(&mut self, newest: &Raw) -> Result<(), StoreError> {
+        let (sector, generation) = match self.current {
+            Some((sector, generation)) => (1 - sector, generation.wrapping_add(1)),
+            None => (0, 1),
+        };
+        let Range { start, end } = self.range(sector);
+        self.flash.erase(start, end).map_err(fault)?;
+        let mut at = start + HEADER;
+        for key in (1..=MAX_KEY).filter(|key| *key != newest.key()) {
+            if let Some(raw) = self.find(key)? {
+                at = self.append(sector, at, &raw)?.ok_or(StoreError::Full)?;
+            }
+        }
+        self.append(sector, at, newest)?.ok_or(StoreError::Full)?;
+        self.flash.write(start, &generation.to_le_bytes()).map_err(fault)?;
+        self.flash.write(start + WORD_U32, &header_crc(generation).to_le_bytes()).map_err(fault)?;
+        self.current = Some((sector, generation));
+        Ok(())
+    }
+}
+
+fn header_crc(generation: u32) -> u32 {
+    CRC.checksum(&(generation ^ FORMAT).to_le_bytes())
+}
+
+fn fault(error: impl NorFlashError) -> StoreError {
+    StoreError::Flash(FlashFault::from(error.kind()))
+}
+
+impl From<NorFlashErrorKind> for FlashFault {
+    fn from(kind: NorFlashErrorKind) -> Self {
+        match kind {
+            NorFlashErrorKind::NotAligned => Self::NotAligned,
+            NorFlashErrorKind::OutOfBounds => Self::OutOfBounds,
+            _ => Self::Refused,
+        }
+    }
+}

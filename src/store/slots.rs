@@ -1,0 +1,273 @@
+//! Two slots for weight files, and which file the network runs on.
+//!
+//! A file is uploaded to the slot that is not in use, checked there, and then accepted: a record
+//! names the slot and the file's checksum. At the next start [`select`] takes the first file
+//! that passes all checks: the accepted slot, the other slot if its file was once accepted, the
+//! built-in weights. An upload that breaks off has touched the unused slot only.
+
+use super::error::{FieldError, FlashFault};
+use super::layout::SLOT_SIZE;
+use super::record::Record;
+use crate::model::{Blob, BlobError};
+use embedded_storage::nor_flash::{NorFlash, NorFlashError};
+use serde::{Deserialize, Serialize};
+
+/// One of the two slots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Slot {
+    /// Sector 10.
+    A,
+    /// Sector 11.
+    B,
+}
+
+impl Slot {
+    /// Both, in order.
+    pub const ALL: [Self; 2] = [Self::A, Self::B];
+
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+
+    /// Its first byte, as an offset into the slots.
+    #[must_use]
+    pub const fn offset(self) -> u32 {
+        match self {
+            Self::A => 0,
+            Self::B => SLOT_SIZE as u32,
+        }
+    }
+
+    /// Its place in a pair.
+    pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
+        match self {
+            Self::A => a,
+            Self::B => b,
+        }
+    }
+}
+
+/// Which files were accepted, and which of them is to be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Accepted {
+    /// The slot to use; `None`: the built-in weights.
+    pub active: Option<Slot>,
+    /// Checksum of the file that was accepted in each slot.
+    pub files: [Option<u32>; 2],
+}
+
+impl Accepted {
+    /// Nothing accepted yet.
+    pub const NONE: Self = Self { active: None, files: [None; 2] };
+
+    /// With a checked file in a slot, to be used.
+    #[must_use]
+    pub const fn with(mut self, slot: Slot, file: u32) -> Self {
+        let [a, b] = self.files;
+        self.files = match slot {
+            Slot::A => [Some(file), b],
+            Slot::B => [a, Some(file)],
+        };
+        self.active = Some(slot);
+        self
+    }
+}
+
+impl Record for Accepted {
+    const KEY: u8 = 3;
+    const VERSION: u8 = 1;
+
+    fn check(&self) -> Result<(), FieldError> {
+        Ok(())
+    }
+}
+
+/// Why a slot, or what is uploaded to it, is not used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SlotError {
+    /// There is no flash controller (the emulator).
+    NoFlash,
+    /// The flash reports an error.
+    Flash(FlashFault),
+    /// Nothing was written to it since it was erased.
+    Empty,
+    /// A file that is longer than a slot, or no whole number of words.
+    Length(u32),
+    /// A block that does not continue the upload.
+    Offset {
+        /// Where the next block must begin; what is before it is written.
+        expected: u32,
+    },
+    /// No upload is under way.
+    NotBegun,
+    /// The upload has not reached its end.
+    Incomplete {
+        /// Bytes written.
+        written: u32,
+    },
+    /// Not the checksum under which the file was announced or accepted.
+    NotAccepted(u32),
+    /// The file is refused.
+    Blob(BlobError),
+}
+
+impl core::fmt::Display for SlotError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NoFlash => f.write_str("there is no flash controller: nothing can be stored"),
+            Self::Flash(_) => f.write_str("the flash did not take the operation"),
+            Self::Empty => f.write_str("the slot is empty"),
+            Self::Length(length) => {
+                write!(f, "{length} bytes are no whole number of words up to {SLOT_SIZE}")
+            }
+            Self::Offset { expected } => write!(f, "the next block must begin at {expected}"),
+            Self::NotBegun => f.write_str("no upload is under way"),
+            Self::Incomplete { written } => write!(f, "only {written} bytes have come"),
+            Self::NotAccepted(file) => write!(f, "file {file:08x} is not the one that was accepted"),
+            Self::Blob(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for SlotError {}
+
+/// The file in a slot, checked. Slots begin on a word.
+///
+/// # Errors
+/// [`SlotError::Empty`], [`SlotError::Length`], [`SlotError::Blob`].
+pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
+    let header = slot.first_chunk::<12>().ok_or(SlotError::Empty)?;
+    if *header == [0xFF; 12] {
+        return Err(SlotError::Empty);
+    }
+    let [.., a, b, c, d] = *header;
+    let length = u32::from_le_bytes([a, b, c, d]);
+    let bytes = slot.get(..length as usize).ok_or(SlotError::Length(length))?;
+    Blob::new_checked(bytes).map_err(SlotError::Blob)
+}
+
+/// Where the weights in use come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum WeightSource {
+    /// A slot.
+    Slot(Slot),
+    /// The image itself.
+    BuiltIn,
+    /// Nowhere: all are damaged, and the rate is the gyro's less its bias.
+    None,
+}
+
+/// What [`select`] has found.
+#[derive(Debug, Clone, Copy)]
+pub struct Selection<'w> {
+    /// The weights to run on.
+    pub weights: Option<Blob<'w>>,
+    /// Where they come from.
+    pub source: WeightSource,
+    /// Why each slot that was asked for is not used.
+    pub refused: [Option<SlotError>; 2],
+}
+
+/// The first weights that pass all checks.
+#[must_use]
+pub fn select<'w>(accepted: &Accepted, slots: [&'w [u8]; 2], built_in: &'w [u8]) -> Selection<'w> {
+    let mut refused = [None; 2];
+    let order = accepted.active.map(|active| [active, active.other()]);
+    for slot in order.into_iter().flatten() {
+        let Some(accepted) = slot.of(accepted.files) else { continue };
+        match file(slot.of(slots)) {
+            Ok(blob) if blob.crc == accepted => {
+                return Selection { weights: Some(blob), source: WeightSource::Slot(slot), refused };
+            }
+            Ok(blob) => refuse(&mut refused, slot, SlotError::NotAccepted(blob.crc)),
+            Err(error) => refuse(&mut refused, slot, error),
+        }
+    }
+    let weights = Blob::new_checked(built_in).ok();
+    let source = if weights.is_some() { WeightSource::BuiltIn } else { WeightSource::None };
+    Selection { weights, source, refused }
+}
+
+fn refuse(refused: &mut [Option<SlotError>; 2], slot: Slot, error: SlotError) {
+    let [a, b] = refused;
+    *match slot {
+        Slot::A => a,
+        Slot::B => b,
+    } = Some(error);
+}
+
+/// A file on its way into a slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Upload {
+    slot: Slot,
+    length: u32,
+    written: u32,
+}
+
+impl Upload {
+    /// Erases the slot. The processor stands still meanwhile: one to two seconds on an F405
+    /// (its datasheet, 128 KiB sector).
+    ///
+    /// # Errors
+    /// [`SlotError::Length`], [`SlotError::Flash`].
+    pub fn begin<F: NorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<Self, SlotError> {
+        if length as usize > SLOT_SIZE || length == 0 || !length.is_multiple_of(4) {
+            return Err(SlotError::Length(length));
+        }
+        let end = slot.offset() + SLOT_SIZE as u32;
+        flash.erase(slot.offset(), end).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
+        Ok(Self { slot, length, written: 0 })
+    }
+
+    /// Writes the next block, a whole number of words.
+    ///
+    /// # Errors
+    /// [`SlotError::Offset`] when it does not continue what is written, [`SlotError::Length`]
+    /// when it is no whole number of words or goes beyond the announced end,
+    /// [`SlotError::Flash`]; after the last one the upload must begin anew.
+    pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
+        if offset != self.written {
+            return Err(SlotError::Offset { expected: self.written });
+        }
+        let len = bytes.len() as u32;
+        if !len.is_multiple_of(4) || len > self.length - self.written {
+            return Err(SlotError::Length(len));
+        }
+        let at = self.slot.offset() + self.written;
+        flash.write(at, bytes).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
+        self.written += len;
+        Ok(())
+    }
+
+    /// Checks the whole file where it now lies; its checksum.
+    ///
+    /// # Errors
+    /// [`SlotError::Incomplete`], and whatever [`file`] finds.
+    pub fn verify(&self, slots: [&[u8]; 2]) -> Result<u32, SlotError> {
+        if self.written != self.length {
+            return Err(SlotError::Incomplete { written: self.written });
+        }
+        file(self.slot.of(slots)).map(|blob| blob.crc)
+    }
+
+    /// The slot.
+    #[must_use]
+    pub const fn slot(&self) -> Slot {
+        self.slot
+    }
+
+    /// Bytes written.
+    #[must_use]
+    pub const fn written(&self) -> u32 {
+        self.written
+    }
+}

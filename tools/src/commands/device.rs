@@ -1,0 +1,249 @@
+//! `gyronet device`: what the board is, does and remembers, over its service line.
+
+mod settings;
+
+use super::Common;
+use clap::{Subcommand, ValueEnum};
+use gyronet::service::calibrate::{State, Task};
+use gyronet::service::message::{Calibrate, Info};
+use gyronet::service::{Reply, Request};
+use gyronet_tools::device::line::Line;
+use gyronet_tools::device::upload::upload;
+use gyronet_tools::device::{Device, DeviceError};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Asks and configures a board over its service line.
+///
+/// A new configuration and new weights hold from the next start on (`device restart`).
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Serial port, or host:port (the emulator, a serial server).
+    #[arg(long, global = true)]
+    port: Option<String>,
+    /// Print as JSON.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Versions, reset, clock, flash, weights, status.
+    Info,
+    /// Prints the configuration.
+    Get,
+    /// Changes the configuration: NAME=VALUE as `get` prints them, or a whole file.
+    Set {
+        /// For example `latitude_deg=48.1 mounting.roll_deg=1.5`; values as in JSON.
+        settings: Vec<String>,
+        /// A whole configuration, as `get --json` prints it.
+        #[arg(long)]
+        file: Option<PathBuf>,
+    },
+    /// Calibrates the sensor while the vehicle stands, and prints what was found.
+    Calibrate {
+        /// What to find, or `show` what is known.
+        #[arg(value_enum)]
+        task: CalibrateTask,
+        /// Keep what was found over the next start.
+        #[arg(long)]
+        store: bool,
+    },
+    /// Prints what has happened since the start.
+    Log,
+    /// Prints everything that is counted.
+    Counters,
+    /// Uploads a weight file, has it checked, and used from the next start on.
+    Weights {
+        /// As `gyronet quantize` writes it.
+        file: PathBuf,
+    },
+    /// Starts the board anew.
+    Restart,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum CalibrateTask {
+    /// The gyro's bias, at rest.
+    Static,
+    /// Roll and pitch of the sensor, at rest on level ground.
+    Mounting,
+    /// What is known.
+    Show,
+    /// Stop without a result.
+    Cancel,
+}
+
+/// Three seconds at rest, and as many again for a slow line.
+const CALIBRATION: Duration = Duration::from_secs(10);
+const POLL: Duration = Duration::from_millis(200);
+
+type Board = Device<Line>;
+
+/// Runs the command.
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let port = args.port.as_deref().ok_or("which board? Name its service line with --port")?;
+    let mut device = Device::new(Line::open(port)?, port);
+    let json = args.json;
+    match &args.action {
+        Action::Info => {
+            let Reply::Info(info) = device.ask(&Request::Info)? else { return mismatch() };
+            if json { print_json(&info)? } else { print_info(&info) }
+        }
+        Action::Get => settings::print(&settings::get(&mut device)?, json)?,
+        Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
+        Action::Calibrate { task, store } => calibrate(&mut device, *task, *store, json)?,
+        Action::Log => log(&mut device, json)?,
+        Action::Counters => {
+            let Reply::Counters(counters) = device.ask(&Request::Counters)? else { return mismatch() };
+            print_value(&counters, json)?;
+        }
+        Action::Weights { file } => weights(&mut device, file, json, common)?,
+        Action::Restart => {
+            device.ask(&Request::Restart)?;
+            done(json, "the board restarts");
+        }
+    }
+    Ok(())
+}
+
+fn mismatch<T>() -> Result<T, Box<dyn std::error::Error>> {
+    Err(DeviceError::Mismatch.into())
+}
+
+fn done(json: bool, what: &str) {
+    if json {
+        println!("{}", serde_json::json!({ "done": what }));
+    } else {
+        println!("{what}");
+    }
+}
+
+fn print_json(value: &impl Serialize) -> super::Result {
+    println!("{}", serde_json::to_string_pretty(value)?);
+    Ok(())
+}
+
+/// JSON, or a line for each value.
+fn print_value(value: &impl Serialize, json: bool) -> super::Result {
+    if json {
+        return print_json(value);
+    }
+    for (name, value) in settings::flat(&settings::value(value)?) {
+        println!("{name} = {value}");
+    }
+    Ok(())
+}
+
+fn print_info(info: &Info) {
+    let identity = &info.identity;
+    let [major, minor, patch] = identity.firmware;
+    println!("firmware      {major}.{minor}.{patch}, protocol {}", info.protocol);
+    match identity.device_id {
+        Some(id) => println!("part          {:#05x} revision {:#06x}", id & 0xFFF, id >> 16),
+        None => println!("part          does not say (the emulator)"),
+    }
+    println!("clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6);
+    println!("started by    {:?}", identity.reset);
+    if let Some(crash) = identity.crash {
+        println!(
+            "crashed       {:?} at {:#010x}, {} since power came on",
+            crash.kind, crash.place, crash.count
+        );
+    }
+    println!("status        {:?}", info.status);
+    println!("flash         {:?}", info.flash);
+    println!("configuration {:?}, layout {}", info.configuration, info.record_versions[0]);
+    println!("calibration   {:?}, layout {}", info.calibration, info.record_versions[1]);
+    let crc = info.weights_crc.map(|crc| format!(", checksum {crc:08x}")).unwrap_or_default();
+    println!("weights       {:?}{crc}", info.weights);
+    for (slot, refused) in ["A", "B"].into_iter().zip(info.refused_slots) {
+        if let Some(error) = refused {
+            println!("slot {slot}        not used: {error}");
+        }
+    }
+}
+
+fn calibrate(device: &mut Board, task: CalibrateTask, store: bool, json: bool) -> super::Result {
+    let task = match task {
+        CalibrateTask::Show => None,
+        CalibrateTask::Cancel => {
+            device.ask(&Request::Calibrate(Calibrate::Cancel))?;
+            None
+        }
+        CalibrateTask::Static => Some(Task::Static),
+        CalibrateTask::Mounting => Some(Task::Mounting),
+    };
+    if let Some(task) = task {
+        device.ask(&Request::Calibrate(Calibrate::Start(task)))?;
+    }
+    let until = Instant::now() + CALIBRATION;
+    loop {
+        let Reply::Calibration { state, calibration, .. } = device.ask(&Request::GetCalibration)? else {
+            return mismatch();
+        };
+        match state {
+            State::Running(_) if task.is_some() => {
+                if Instant::now() > until {
+                    device.ask(&Request::Calibrate(Calibrate::Cancel))?;
+                    return Err("no three seconds of samples have come from the sensor".into());
+                }
+                std::thread::sleep(POLL);
+            }
+            State::Failed(_, fault) if task.is_some() => {
+                return Err(format!("nothing was found: {fault:?}").into());
+            }
+            _ => {
+                if store {
+                    device.ask(&Request::Calibrate(Calibrate::Store))?;
+                }
+                return print_value(&calibration, json);
+            }
+        }
+    }
+}
+
+fn log(device: &mut Board, json: bool) -> super::Result {
+    let (mut after, mut events, mut lost) = (0, Vec::new(), 0);
+    loop {
+        let Reply::Log(page) = device.ask(&Request::Log { after })? else { return mismatch() };
+        lost += page.lost;
+        // A page that brings nothing new is the end.
+        let Some(last) = page.events.last().filter(|last| last.number > after) else { break };
+        after = last.number;
+        events.extend(page.events);
+    }
+    if json {
+        return print_json(&serde_json::json!({ "events": events, "lost": lost }));
+    }
+    if lost > 0 {
+        println!("{lost} older events are lost");
+    }
+    for event in events {
+        println!("{:6} {:9.2} s  {:?}", event.number, f64::from(event.tick) / 100.0, event.kind);
+    }
+    Ok(())
+}
+
+fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Common) -> super::Result {
+    let file = std::fs::read(path).map_err(super::WriteError::to(path))?;
+    // The same check as the board's, before its slot is erased.
+    let words: Vec<u32> = file.chunks(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes)).collect();
+    gyronet::model::Blob::new_checked(bytemuck::cast_slice(&words))
+        .map_err(|error| format!("{}: {error}", path.display()))?;
+    let bar = super::progress::bar(common, file.len(), "upload");
+    let uploaded = upload(device, &file, |written| bar.set_position(written as u64))?;
+    bar.finish_and_clear();
+    if json {
+        print_json(&serde_json::json!({ "slot": uploaded.slot, "crc": uploaded.crc }))
+    } else {
+        println!(
+            "slot {:?} holds file {:08x}; it is used from the next start on",
+            uploaded.slot, uploaded.crc
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,64 @@
+//! `gyronet size`: what the firmware image takes, against its budgets.
+
+use super::Common;
+use gyronet_tools::image_size::ImageSize;
+use gyronet_tools::image_stack::ImageStack;
+use gyronet_tools::target_bench;
+use std::path::PathBuf;
+
+/// Measures flash, static RAM and the worst stack of the firmware image against their budgets.
+///
+/// The stack is an upper bound from the machine code: every handler interrupting every other
+/// one. Exit status 1 when a budget is exceeded.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Measure this ELF file; else the image is built.
+    #[arg(long)]
+    elf: Option<PathBuf>,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Both networks and everything else, as designed: flash, static RAM, stack.
+const BUDGETS: [u64; 3] = [640 << 10, 48 << 10, 8 << 10];
+
+/// Runs the command.
+pub fn run(args: &Args, _common: Common) -> super::Result {
+    let workspace = target_bench::workspace();
+    let elf = match &args.elf {
+        Some(elf) => elf.clone(),
+        None => target_bench::build(&workspace, "coprocessor", &workspace.join("target/images"))?,
+    };
+    let size = ImageSize::read(&elf)?;
+    let stack = ImageStack::read(&std::fs::read(&elf)?)?;
+    let measured = [size.flash, size.static_ram, stack.worst().into()];
+    let names = ["flash", "static_ram", "stack"];
+    let rows = || names.into_iter().zip(measured).zip(BUDGETS);
+    if args.json {
+        let rows = rows().map(|((name, bytes), budget)| {
+            (name.to_owned(), serde_json::json!({ "bytes": bytes, "budget": budget }))
+        });
+        let deepest: Vec<_> =
+            stack.deepest.iter().map(|(name, own)| serde_json::json!([name, own])).collect();
+        let mut json = serde_json::Value::Object(rows.collect());
+        json["stack_main"] = stack.main.into();
+        json["stack_handlers"] = stack.handlers.into();
+        json["indirect_calls"] = stack.indirect_calls.into();
+        json["deepest"] = deepest.into();
+        println!("{json:#}");
+    } else {
+        for ((name, bytes), budget) in rows() {
+            println!("{name} bytes={bytes} budget={budget}");
+        }
+        println!("stack/main bytes={}", stack.main);
+        println!("stack/handlers bytes={}", stack.handlers);
+        for (name, own) in &stack.deepest {
+            println!("  {own:5} {name}");
+        }
+        println!("calls through a register: {}", stack.indirect_calls);
+    }
+    let over: Vec<_> =
+        rows().filter(|((_, bytes), budget)| bytes > budget).map(|((name, _), _)| name).collect();
+    if over.is_empty() { Ok(()) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
+}
