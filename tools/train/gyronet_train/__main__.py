@@ -2,7 +2,8 @@
 
 Trains once for each seed, prints what each is worth on the validation drive with mean and spread,
 and keeps the best of them there. Test drives are never read here. training.py says how it is
-trained and in what that departs from the paper.
+trained and in what that departs from the paper. With --scale-of CHECKPOINT nothing is trained but
+that network's scale of its expected error (scale.py).
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from .export import export
-from .recordings import load_drive, mean_1s_error
-from .training import Settings, Trained, train
-from .validation import Validation
+from .export import export, load_gyronet
+from .model import GyroNet
+from .recordings import Drive, load_drive, mean_1s_error
+from .scale import fit_scale
+from .training import Settings, Trained, calibrate, train
+from .validation import Validation, validate
 
 
 def arguments() -> argparse.Namespace:
@@ -37,6 +40,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--no-turns", dest="turns", action="store_false", help="add no turns")
     parser.add_argument("--units", action="store_true", help="add other units of the part")
     parser.add_argument("--windows", type=int, default=1, help="windows of a span")
+    parser.add_argument("--scale-of", type=Path, metavar="CHECKPOINT", help="fit only this network's scale")
+    parser.add_argument("--note", help="a sentence for the provenance")
     return parser.parse_args()
 
 
@@ -44,7 +49,8 @@ def line(what: str, validation: Validation) -> str:
     """The errors of one network, for people."""
     return (
         f"{what}: 1 s error {validation.mean_1s_rad:.6f} rad, over any 1 s {validation.any_1s_rad:.6f}, "
-        f"window mean {validation.window_rad_per_sec:.6f} rad/s at {validation.scale_ratio:.2f} of its scale"
+        f"window mean {validation.window_rad_per_sec:.6f} rad/s at {validation.scale_ratio:.2f} of its scale, "
+        f"log loss {validation.log_loss:.4f}"
     )
 
 
@@ -53,6 +59,19 @@ def main() -> None:
     torch.set_num_threads(args.threads)
     drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in tqdm(args.train, "reading")]
     validation_drive = load_drive(args.data / f"trial{args.validate}_100hz.csv")
+    make = with_scale if args.scale_of else best_of_seeds
+    model, provenance = make(args, drives, validation_drive)
+    if args.note:
+        provenance["note"] = args.note
+    args.out.mkdir(parents=True, exist_ok=True)
+    for path in export(model, provenance, args.out, args.stem):
+        print(path)
+
+
+def best_of_seeds(
+    args: argparse.Namespace, drives: list[Drive], validation_drive: Drive
+) -> tuple[GyroNet, dict]:
+    """Trains with each seed: the best network on the validation drive, and where it comes from."""
     static = mean_1s_error(validation_drive.gyro_error)
     print(f"static initialisation: 1 s error {static:.6f} rad")
     settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units, args.windows)
@@ -90,9 +109,22 @@ def main() -> None:
         "torch": torch.__version__.split("+")[0],
         "date": datetime.date.today().isoformat(),
     }
-    args.out.mkdir(parents=True, exist_ok=True)
-    for path in export(chosen.model, provenance, args.out, args.stem):
-        print(path)
+    return chosen.model, provenance
+
+
+def with_scale(
+    args: argparse.Namespace, drives: list[Drive], validation_drive: Drive
+) -> tuple[GyroNet, dict]:
+    """The checkpoint's network, its scale fitted anew to the drives that it was trained on."""
+    model, provenance = load_gyronet(args.scale_of)
+    if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, validation_drive]}:
+        raise ValueError(f"{args.scale_of}: trained or validated on other drives than these")
+    print(line("before", validate(model, validation_drive)))
+    fit_scale(model, drives)
+    calibrate(model, validate(model, validation_drive).scale_ratio)
+    print(line("after", validate(model, validation_drive)))
+    provenance["scale"] = f"fitted alone on {datetime.date.today()}"
+    return model, provenance
 
 
 if __name__ == "__main__":

@@ -9,10 +9,10 @@ braking or accelerating, are added too.
 Another unit: its gyro is off by a gain and by what static initialisation leaves of its bias, it is
 mounted a little turned, and it adds noise of its own. What that does to the yaw rate cannot be told
 from a window of 0.1 s (1 % of gain is 1 % of the yaw rate, whatever the network sees), but the
-correction learnt must not move by it. The changes are small: a good part of what is learnt is how
-the training car's sensor is mounted (its yaw axis sees 3 % of the pitch rate), and that is lost when
-the rates that tell it are drowned. With 0.5 deg/s and 2 deg, the validation drive's 1 s error was a
-fifth larger.
+correction learnt must not move by it. The changes are small, for part of what is learnt is how the
+training car's sensor is mounted (its yaw axis sees 3 % of the pitch rate), and the rates that tell it
+could be drowned. A run with 0.5 deg/s and 2 deg had a 1 s error on the validation drive that was a
+fifth larger, but more than this was different in it: it does not say which change did that.
 """
 
 from __future__ import annotations

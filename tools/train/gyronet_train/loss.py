@@ -20,8 +20,8 @@ def span_loss(
 
     `correction` (S, k, N) and `scale` (S, k) are the network's, `gyro_error` (S, L) is the label.
     Absolute errors count: each window's, sample by sample; in spans of more than one window also
-    that of the overlap's mean, and that of its integral over the span, times the root of its samples so that it is as large where
-    the errors are independent. The integral weighs little: its label is mostly the drift of gyro
+    that of the overlap's mean, and that of its integral over the span, times the root of its samples
+    so that it is as large where the errors are independent. The integral weighs little: its label is mostly the drift of gyro
     and reference, which no window can tell, and with a weight of one the validation drive's 1 s
     error was larger. The scale is trained by the likelihood of the windows' mean
     errors, which are not trained by it: a window may not get away with being unsure.
