@@ -66,7 +66,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for folder in &folders {
         let sequence = import::read(folder, common)?;
-        let bar = progress::bar(common, 3 * sequence.steps.len(), &sequence.name);
+        let bar = progress::bar(common, 4 * sequence.steps.len(), &sequence.name);
         let mut estimates = methods::run(&sequence, &mut network, || bar.inc(1));
         estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
         bar.finish_and_clear();

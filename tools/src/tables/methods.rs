@@ -14,6 +14,7 @@ use crate::metrics::DT;
 use crate::recording::Recording;
 use crate::sequence::Sequence;
 use crate::simulate::world::EARTH_RATE;
+use crate::wheel_rates::WheelRates;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
 use gyronet::fog::FogConfig;
 use gyronet::model::WindowNetwork;
@@ -68,6 +69,8 @@ pub const VENDOR: Method = mems("vendor", "vendor's filter");
 pub const GYRONET: Method = mems("gyronet", "GyroNet");
 /// GyroNet, what goes out at once.
 pub const GYRONET_ONLINE: Method = mems("gyronet_online", "GyroNet, sent at once");
+/// GyroNet with zero-rate updates behind it: what goes out for navigation.
+pub const GYRONET_LOOP: Method = mems("gyronet_loop", "GyroNet with the bias loop");
 /// The fibre-optic gyro as it is.
 pub const FOG: Method = fog("fog", "FoG");
 /// Less the Earth's rate at the place's latitude.
@@ -99,12 +102,13 @@ pub struct Estimates {
     pub refused: Option<String>,
 }
 
-/// Runs every method; `tick` is called for each sample that the network's pipeline takes.
-pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, tick: impl FnMut()) -> Estimates {
+/// Runs every method; `tick` is called twice for each sample: for the network alone, and with the
+/// bias loop.
+pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl FnMut()) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
     let mut estimates = Estimates { start, methods: Vec::new(), refused: None };
     match sequence.recording() {
-        Ok(recording) => estimates.inertial(sequence, &recording, network, tick),
+        Ok(recording) => estimates.inertial(sequence, &recording, network, &mut tick),
         Err(error) => estimates.refused = Some(error.to_string()),
     }
     if sequence.has_vendor {
@@ -145,23 +149,32 @@ impl Estimates {
         sequence: &Sequence,
         recording: &Recording,
         network: &mut impl WindowNetwork,
-        tick: impl FnMut(),
+        mut tick: impl FnMut(),
     ) {
         let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
         let started = Instant::now();
         // The paper's network alone: no zero-rate updates behind it.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let drive = Drive::run(recording, &config, None, network, tick);
+        let drive = Drive::run(recording, &config, None, network, &mut tick);
         let run_time = started.elapsed().as_secs_f64();
+        let wheels = WheelRates::new(recording);
+        let looped = Drive::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
         self.add(RAW, || constant(0.0));
-        match drive {
-            Ok(drive) => {
+        match drive.and_then(|drive| Ok((drive, looped?))) {
+            Ok((drive, looped)) => {
                 let still = &gyro[..self.start];
                 self.add(STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
                 for (method, rates) in [
                     (GYRONET, corrected(&drive, &gyro, |step| step.settled)),
                     (GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.prompt.rate)),
+                    // The last steps of the drive have not gone out yet.
+                    (
+                        GYRONET_LOOP,
+                        corrected(&looped, &gyro, |step| {
+                            step.navigation.map_or(step.settled, |sent| sent.rate)
+                        }),
+                    ),
                 ] {
                     self.add(method, || rates);
                     if let Some(estimate) = self.methods.last_mut() {

@@ -97,10 +97,13 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
         .into_iter()
         .map(|method| Row { name: method.label.to_owned(), figures: figures(means.get(method.key), &of) });
     let mut notes = vec![String::from("The paper's figures are for KAIST Urban.")];
-    if let Some((network, still)) = means.get("gyronet").zip(means.get("static")) {
+    let [still, network, looped] = ["static", "gyronet", "gyronet_loop"].map(|key| means.get(key));
+    if let (Some(still), Some(network), Some(looped)) = (still, network, looped) {
         notes.push(format!(
-            "GyroNet's error in 1 s is {:.3} of that of static initialisation; in the paper {:.3}.",
+            "GyroNet's error in 1 s is {:.3} of that of static initialisation, {:.3} with the bias loop; \
+             in the paper {:.3}.",
             network.mean_1s_rad / still.mean_1s_rad,
+            looped.mean_1s_rad / still.mean_1s_rad,
             paper::GYRONET_TO_STATIC
         ));
     }

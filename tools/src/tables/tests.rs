@@ -88,6 +88,7 @@ fn each_method_does_what_it_says() {
     // A network that says nothing leaves static initialisation.
     assert!((final_rad("gyronet") - final_rad("static")).abs() < 1e-5);
     assert!((final_rad("gyronet_online") - final_rad("static")).abs() < 1e-5);
+    assert!((final_rad("gyronet_loop") - final_rad("static")).abs() < 1e-5);
     assert!(final_rad("fog") < 1e-9 && final_rad("vendor") < 1e-9);
     let earth = 7.292_115e-5 * 36.37f64.to_radians().sin() * seconds;
     assert!((final_rad("fog_earth") - earth).abs() < 1e-9, "nothing to take off here");
