@@ -2,14 +2,22 @@
 
 use serde::{Deserialize, Serialize};
 
-/// State of the corrected yaw rate.
+#[cfg(target_has_atomic = "8")]
+pub mod supervisor;
+
+/// State of the corrected yaw rate: one state machine. No state needs a restart to leave it, but
+/// damaged weights, which leave `Degraded` at best.
 ///
-/// | status | when | yaw rate on CAN |
-/// |---|---|---|
-/// | `Init` | until static initialisation has succeeded | raw gyro, marked initialising |
-/// | `Degraded` | bias known, no believable window yet, or a gap or clipping broke it | gyro less bias |
-/// | `Ready` | a believable window covers the recent samples | gyro less bias and correction |
-/// | `Clipped` | the part says that it is saturated | marked failed |
+/// | state | status | entered when | yaw rate on CAN | left when | counter |
+/// |---|---|---|---|---|---|
+/// | init | `Init` | start; the clock jumped before the bias was known | raw gyro, marked initialising | 3 s at rest | `moving` |
+/// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is believed | `missing`, `late`, `implausible` |
+/// | ready | `Ready` | a believable window covers the recent samples | gyro less bias and correction | as above | `windows` |
+/// | fault | `Clipped` | the part says that it is saturated | marked failed | 50 ms after the last such sample | `clipped`, `held` |
+/// | fault | `Stuck` | ten samples equal in all axes | marked failed, fault bit `STUCK` | a sample that differs | `stuck` |
+/// | fault | `Silent` | 29 ms without a sample, by the board's clock | not available, every 10 ms | the next sample | `silences` |
+///
+/// From a fault it goes back to init where no bias is known, else to degraded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {
@@ -20,8 +28,12 @@ pub enum Status {
     Ready,
     /// Corrected by static bias only.
     Degraded,
-    /// The part is saturated: the rate is wrong.
+    /// The part is saturated, or was less than 50 ms ago: the rate is wrong.
     Clipped,
+    /// The part's readings stand still: the rate is wrong.
+    Stuck,
+    /// The part says nothing: there is no rate.
+    Silent,
 }
 
 /// Where a rate comes from.
@@ -83,6 +95,12 @@ impl Faults {
     /// Frames were dropped because the bus did not take them.
     pub const BUS: Self = Self(1 << 7);
 
+    /// These less others.
+    #[must_use]
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
     /// Both together.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
@@ -97,7 +115,7 @@ pub const fn judge(status: Status) -> (Source, Quality) {
         Status::Init => (Source::Raw, Quality::Initialising),
         Status::Ready => (Source::GyroNet, Quality::Good),
         Status::Degraded => (Source::Static, Quality::Degraded),
-        Status::Clipped => (Source::Raw, Quality::Unusable),
+        Status::Clipped | Status::Stuck | Status::Silent => (Source::Raw, Quality::Unusable),
     }
 }
 
@@ -129,6 +147,18 @@ pub struct Counters {
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
+}
+
+/// How often the sensor was found at fault ([`crate::guard`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WatchCounters {
+    /// Times that it fell silent.
+    pub silences: u32,
+    /// Times that its readings stood still.
+    pub stuck: u32,
+    /// Samples not trusted because it had just been saturated.
+    pub held: u32,
 }
 
 /// Adds to a counter without wrapping.

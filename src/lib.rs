@@ -6,6 +6,7 @@ pub mod bias;
 pub mod can;
 pub mod compensate;
 pub mod fog;
+pub mod guard;
 pub mod health;
 pub mod model;
 pub mod mounting;

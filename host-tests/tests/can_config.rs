@@ -158,6 +158,7 @@ fn every_feed_says_that_the_rate_is_not_to_be_used() {
     {
         let mut unusable = sample(0);
         unusable.yaw.quality = quality;
+        unusable.prompt.quality = quality;
         let frames = feeds.process::<DataFrame>(&unusable);
         assert_eq!(frames[0].data()[2] >> 4, nibble);
         assert_eq!(frames[3].data()[3..7], i32::to_le_bytes(rate));

@@ -47,15 +47,18 @@ impl Feeds {
             Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
             Quality::Unusable => (SignalStatus::FAILURE, Validity::Error),
         };
+        // What is wrong with the rate is wrong with the part.
+        let unusable = sample.prompt.quality == Quality::Unusable;
+        let force_status = if unusable { SignalStatus::FAILURE } else { SignalStatus::OK };
         let settings = *self.config.settings();
         let mut frames = Vec::new();
         // MAX_MESSAGES is what a configuration can have at most.
         let mut send = |frame: Option<F>| frame.map(|frame| frames.push(frame).is_ok());
         if let Some(BoschSettings { tx1_only }) = settings.bosch {
-            let messages = self.bosch.encode(&motion(sample, status));
+            let messages = self.bosch.encode(&motion(sample, status, force_status));
             let sent = if tx1_only { 1 } else { LAYOUTS.len() };
             for (message, layout) in messages.iter().zip(&LAYOUTS).take(sent) {
-                let fits = message.rate_status == status && message.acceleration_status == SignalStatus::OK;
+                let fits = message.rate_status == status && message.acceleration_status == force_status;
                 count(&mut self.out_of_range, u32::from(!fits));
                 send(message.frame(layout));
             }
@@ -77,13 +80,13 @@ impl Feeds {
 }
 
 /// The grid step is the counter, so that a receiver sees what is missing.
-fn motion(sample: &VehicleSample, rate_status: SignalStatus) -> Motion {
+fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
     Motion {
         angular_rate: [sample.roll_rate, sample.pitch_rate, sample.prompt.rate],
         specific_force: sample.specific_force,
         temperature: sample.temperature,
         rate_status,
-        force_status: SignalStatus::OK,
+        force_status,
         counter: (sample.tick & 0x0F) as u8,
     }
 }

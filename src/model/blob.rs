@@ -42,6 +42,8 @@ pub struct Blob<'w> {
     pub scale_unit: u32,
     /// The file's own checksum: the name of this set of weights.
     pub crc: u32,
+    /// The bytes that it is of.
+    pub content: &'w [u8],
 }
 
 /// Bytes of a GyroNet file with `provenance` bytes of padded text.
@@ -66,6 +68,18 @@ impl<'w> Blob<'w> {
         check_rows(&layers, input_clamp.into(), 0)?;
         check_dense(&gyro_error)?;
         check_dense(&log_scale)?;
-        Ok(Self { provenance, normalisation, input_clamp, layers, gyro_error, log_scale, scale_unit, crc })
+        // The header has been read: the checksum is there.
+        let content = bytes.get(..bytes.len().saturating_sub(4)).unwrap_or_default();
+        Ok(Self {
+            provenance,
+            normalisation,
+            input_clamp,
+            layers,
+            gyro_error,
+            log_scale,
+            scale_unit,
+            crc,
+            content,
+        })
     }
 }

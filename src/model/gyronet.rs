@@ -46,6 +46,7 @@ pub struct GyroNet<'w> {
 impl<'w> GyroNet<'w> {
     /// A network over checked weights.
     #[must_use]
+    #[inline]
     pub fn new(blob: Blob<'w>) -> Self {
         Self { blob, state: GyroNetState::ZERO }
     }

@@ -1,5 +1,6 @@
 //! The networks of the paper, with their topology, on top of [`crate::nn`].
 
+pub mod background;
 pub mod blob;
 pub mod file;
 pub mod fognet;

@@ -1,0 +1,150 @@
+//! The pipeline behind a watch over its sensor: what host and board run.
+//!
+//! [`Pipeline`] knows samples only. Here is what a sensor does wrong beyond single samples: it
+//! says nothing, it says the same again and again, it has just been saturated. Time comes in as
+//! an argument, by the board's own clock: the part's stands still with the part.
+//!
+//! | fault | found when | then | over when |
+//! |---|---|---|---|
+//! | silent | no sample for [`TIMEOUT_US`] | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
+//! | stuck | [`STUCK_AFTER`] samples equal in all axes | [`Status::Stuck`], no window, no initialisation | a sample that differs |
+//! | saturated | the part says so | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
+
+use crate::align::AlignError;
+use crate::health::{Faults, Quality, Source, Status, WatchCounters, count};
+use crate::pipeline::{Output, Pipeline, PipelineConfig};
+use crate::sample::{ImuSample, PERIOD_US, WheelSample};
+use crate::units::{AngularRate, Micros, SpecificForce};
+use crate::vehicle::{PromptSample, VehicleSample, YawSample};
+
+/// Without a sample for so long the sensor is silent: two samples missing, and told before the
+/// third one would come.
+pub const TIMEOUT_US: u64 = 29_000;
+/// After a start an MTi needs about a second before it speaks.
+pub const START_US: u64 = 2_000_000;
+/// Samples that are equal to the one before in all axes. The least bit of a MEMS part always
+/// moves: a tenth of a second is far beyond chance.
+pub const STUCK_AFTER: u32 = 10;
+/// Samples after saturation that are not trusted: 50 ms, in which the part's filter recovers.
+pub const HOLD: u32 = 5;
+
+type Axes = ([SpecificForce; 3], [AngularRate; 3]);
+
+/// A pipeline and the watch over its sensor.
+#[derive(Debug, Clone)]
+pub struct Guard {
+    pipeline: Pipeline,
+    last: Option<Axes>,
+    equal: u32,
+    hold: u32,
+    /// When the sensor was heard of, by the board's clock.
+    heard: Option<Micros>,
+    /// When the next message set without a sample is due.
+    due: Option<u64>,
+    newest: Option<VehicleSample>,
+    counters: WatchCounters,
+}
+
+impl Guard {
+    /// Before the first sample.
+    #[must_use]
+    pub fn new(config: PipelineConfig) -> Self {
+        Self {
+            pipeline: Pipeline::new(config),
+            last: None,
+            equal: 0,
+            hold: 0,
+            heard: None,
+            due: None,
+            newest: None,
+            counters: WatchCounters::default(),
+        }
+    }
+
+    /// The pipeline, for its counters and to deliver estimates.
+    pub fn pipeline(&mut self) -> &mut Pipeline {
+        &mut self.pipeline
+    }
+
+    /// What the watch has counted.
+    #[must_use]
+    pub fn counters(&self) -> &WatchCounters {
+        &self.counters
+    }
+
+    /// Hands on what is known of the wheels.
+    pub fn wheels(&mut self, wheels: WheelSample) {
+        self.pipeline.wheels(wheels);
+    }
+
+    /// Takes a sample that was received at `now`.
+    ///
+    /// # Errors
+    /// [`AlignError`] when its time stamp has no place; it is counted and not used.
+    pub fn process(&mut self, mut sample: ImuSample, now: Micros) -> Result<Output, AlignError> {
+        let axes = (sample.specific_force, sample.angular_rate);
+        self.equal = if self.last.replace(axes) == Some(axes) { self.equal.saturating_add(1) } else { 0 };
+        let stuck = self.equal >= STUCK_AFTER;
+        count(&mut self.counters.stuck, u32::from(self.equal == STUCK_AFTER));
+        let saturated = sample.clipped;
+        self.hold = if saturated { HOLD + 1 } else { self.hold.saturating_sub(1) };
+        count(&mut self.counters.held, u32::from(!saturated && self.hold > 0));
+        sample.clipped = saturated || self.hold > 0 || stuck;
+        let mut output = self.pipeline.process(sample)?;
+        self.heard = Some(now);
+        self.due = None;
+        if stuck {
+            let faults = &mut output.vehicle.yaw.faults;
+            *faults =
+                faults.without(if saturated { Faults::NONE } else { Faults::CLIPPED }).with(Faults::STUCK);
+            output.prompt.status = Status::Stuck;
+        }
+        self.newest = Some(output.vehicle);
+        Ok(output)
+    }
+
+    /// Samples wait and could not be looked at: the sensor is not silent.
+    pub fn wait(&mut self, now: Micros) {
+        self.heard = self.heard.and(Some(now));
+    }
+
+    /// What is to be sent without a sample, when that is due. Call it every millisecond or so.
+    pub fn poll(&mut self, now: Micros) -> Option<VehicleSample> {
+        let due = match (self.due, self.heard) {
+            (Some(due), _) => due,
+            (None, Some(heard)) => heard.0 + TIMEOUT_US,
+            (None, None) => START_US,
+        };
+        if now.0 < due {
+            return None;
+        }
+        let first = self.due.is_none();
+        count(&mut self.counters.silences, u32::from(first));
+        // Without catching up: a set that nobody had time for is of no use later.
+        self.due = Some(now.0.max(due) + PERIOD_US);
+        let missing = if first { TIMEOUT_US.div_ceil(PERIOD_US) as u32 } else { 1 };
+        let silent = silent(self.newest.as_ref(), missing);
+        self.newest = Some(silent);
+        Some(silent)
+    }
+}
+
+/// No rate, no force, and the yaw that was known; so many steps on.
+fn silent(newest: Option<&VehicleSample>, steps: u32) -> VehicleSample {
+    let (yaw, tick) = newest.map_or_else(Default::default, |newest| (newest.yaw.yaw, newest.tick));
+    VehicleSample {
+        prompt: PromptSample { rate: AngularRate::ZERO, quality: Quality::Unusable },
+        yaw: YawSample {
+            yaw,
+            source: Source::Raw,
+            quality: Quality::Unusable,
+            faults: Faults::GAP,
+            ..YawSample::default()
+        },
+        roll_rate: AngularRate::ZERO,
+        pitch_rate: AngularRate::ZERO,
+        specific_force: [SpecificForce(0); 3],
+        temperature: None,
+        tick: tick.wrapping_add(steps),
+    }
+}

@@ -1,0 +1,49 @@
+//! Weights in use against their own checksum, a piece at a time.
+
+use super::blob::{Blob, BlobError, CRC};
+
+/// A check that goes round and round.
+pub struct BackgroundCheck<'w> {
+    content: &'w [u8],
+    stored: u32,
+    digest: crc::Digest<'static, u32>,
+    at: usize,
+}
+
+impl<'w> BackgroundCheck<'w> {
+    /// At the first byte.
+    #[must_use]
+    pub fn new(blob: &Blob<'w>) -> Self {
+        Self { content: blob.content, stored: blob.crc, digest: CRC.digest(), at: 0 }
+    }
+
+    /// Bytes of one round.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.content.len()
+    }
+
+    /// Whether there is nothing to check; weights are never empty.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.content.is_empty()
+    }
+
+    /// Checks up to `count` bytes more; with the last ones says how the round went, and begins
+    /// the next.
+    ///
+    /// # Errors
+    /// [`BlobError::Crc`] inside: the weights have changed since they were checked whole.
+    pub fn advance(&mut self, count: usize) -> Option<Result<(), BlobError>> {
+        let end = self.at.saturating_add(count).min(self.content.len());
+        self.digest.update(self.content.get(self.at..end).unwrap_or_default());
+        self.at = end;
+        if end < self.content.len() {
+            return None;
+        }
+        self.at = 0;
+        let computed = core::mem::replace(&mut self.digest, CRC.digest()).finalize();
+        let stored = self.stored;
+        Some(if computed == stored { Ok(()) } else { Err(BlobError::Crc { computed, stored }) })
+    }
+}
