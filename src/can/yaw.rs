@@ -176,6 +176,12 @@ impl DetailMessage {
         };
         Ok(Self { correction: i16::from_le_bytes([a, b]), sigma: u16::from_le_bytes([c, d]), latency })
     }
+
+    /// The latency in ms; `None` when unknown.
+    #[must_use]
+    pub fn latency_ms(&self) -> Option<f64> {
+        (self.latency != LATENCY_UNKNOWN).then(|| f64::from(self.latency) * 0.5)
+    }
 }
 
 /// Code of an accumulated yaw: nearest, turns left out.

@@ -12,7 +12,7 @@ use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
 use gyronet::can::e2e::{Checker, Fault, Sequence, Verdict};
 use gyronet::can::j1939::{VDC2_PGN, Vdc2};
-use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, LATENCY_UNKNOWN, Quality, RateMessage};
+use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, Quality, RateMessage};
 use gyronet::can::yaw::{SIGMA_UNKNOWN, Source};
 
 /// Loss of up to this many messages in a row is counted message by message.
@@ -208,10 +208,11 @@ impl Monitor {
     }
 
     fn take_detail(&mut self, data: &[u8]) {
-        if let Ok(DetailMessage { correction, sigma, latency }) = DetailMessage::parse(data) {
+        if let Ok(message) = DetailMessage::parse(data) {
+            let DetailMessage { correction, sigma, .. } = message;
             self.state.correction = Some(f64::from(correction) * 2e-4);
             self.state.sigma = (sigma != SIGMA_UNKNOWN).then(|| f64::from(sigma) * 1e-5);
-            self.state.latency = (latency != LATENCY_UNKNOWN).then(|| f64::from(latency) * 0.1);
+            self.state.latency = message.latency_ms();
         }
     }
 }
