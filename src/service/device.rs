@@ -7,7 +7,7 @@ use super::message::{
     AllCounters, BLOCK, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal,
     Reply, Request,
 };
-use crate::health::{Counters, Status, count};
+use crate::health::{Status, count};
 use crate::model::Blob;
 use crate::sample::ImuSample;
 use crate::store::slots::{Selection, SlotError, Upload, WeightSource, select};
@@ -54,8 +54,7 @@ pub struct Device<R: NorFlash, W> {
     tick: u32,
     log: EventLog,
     deframer: Deframer,
-    /// What went wrong on the lines; the wiring adds its own.
-    pub lines: LineCounters,
+    service_errors: u32,
     restart: bool,
 }
 
@@ -84,7 +83,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             tick: 0,
             log: EventLog::new(),
             deframer: Deframer::new(),
-            lines: LineCounters::NONE,
+            service_errors: 0,
             restart: false,
         }
     }
@@ -165,6 +164,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         weights
     }
 
+    /// The weights in use no longer fit their checksum; they are used no more until the next
+    /// start, which checks all files anew.
+    pub fn weights_damaged(&mut self) {
+        self.weights = WeightSource::None;
+        self.weights_crc = None;
+        self.note(EventKind::WeightsDamaged);
+    }
+
     /// What the image is to run with.
     #[must_use]
     pub fn configuration(&self) -> &Configuration {
@@ -183,14 +190,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.restart
     }
 
-    /// Takes every sample of the sensor, with the status of what was made of it.
-    pub fn observe(&mut self, sample: &ImuSample, tick: u32, status: Status) {
+    /// Takes every sample of the sensor (`None` while it is silent), with the status of what was made of it.
+    pub fn observe(&mut self, sample: Option<&ImuSample>, tick: u32, status: Status) {
         self.tick = tick;
         if status != self.status {
             self.status = status;
             self.note(EventKind::Status(status));
         }
-        let Some(calibrator) = self.calibrator.as_mut() else { return };
+        let (Some(calibrator), Some(sample)) = (self.calibrator.as_mut(), sample) else { return };
         let task = calibrator.task();
         if let Some(result) = calibrator.process(sample, &self.configuration.mounting, &mut self.calibration)
         {
@@ -204,11 +211,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Takes a byte of the service line; with the last one of a request returns the answer.
-    pub fn push(&mut self, byte: u8, counters: &Counters) -> Option<Frame> {
+    pub fn push(&mut self, byte: u8, counters: &AllCounters) -> Option<Frame> {
         let (number, reply) = match self.deframer.push(byte)? {
             Ok((number, request)) => (number, self.handle(request, counters)),
             Err(error) => {
-                count(&mut self.lines.service_errors, 1);
+                count(&mut self.service_errors, 1);
                 let FrameError::Message { number } = error else { return None };
                 (number, Reply::Refused(Refusal::Unknown))
             }
@@ -217,7 +224,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Answers a request.
-    pub fn handle(&mut self, request: Request, counters: &Counters) -> Reply {
+    pub fn handle(&mut self, request: Request, counters: &AllCounters) -> Reply {
         let answer = match request {
             Request::Info => Ok(Reply::Info(self.info())),
             Request::GetConfiguration => Ok(Reply::Configuration {
@@ -236,7 +243,10 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             }),
             Request::Calibrate(what) => self.calibrate(what),
             Request::Log { after } => Ok(Reply::Log(self.log.page(after))),
-            Request::Counters => Ok(Reply::Counters(AllCounters { pipeline: *counters, lines: self.lines })),
+            Request::Counters => {
+                let lines = LineCounters { service_errors: self.service_errors, ..counters.lines };
+                Ok(Reply::Counters(AllCounters { lines, ..*counters }))
+            }
             Request::WeightsBegin { length } => self.weights_begin(length),
             Request::WeightsBlock { offset, bytes } => self.weights_block(offset, &bytes),
             Request::WeightsVerify => self.weights_verify(),

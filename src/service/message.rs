@@ -2,7 +2,7 @@
 
 use super::calibrate::{State, Task};
 use super::event::{Crash, LogPage, ResetCause};
-use crate::health::{Counters, Status};
+use crate::health::{Counters, Status, WatchCounters};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Calibration, Configuration, Slot, StoreError};
 use heapless::Vec;
@@ -184,6 +184,8 @@ pub struct Identity {
     pub device_id: Option<u32>,
     /// Of the processor, Hz.
     pub clock_hz: u32,
+    /// Whether the CAN controller is up; else frames go out as SLCAN alone.
+    pub can: bool,
     /// Why it has started.
     pub reset: ResetCause,
     /// Its last crash since power came on.
@@ -192,8 +194,14 @@ pub struct Identity {
 
 impl Identity {
     /// Before anything is known.
-    pub const UNKNOWN: Self =
-        Self { firmware: [0; 3], device_id: None, clock_hz: 0, reset: ResetCause::Unknown, crash: None };
+    pub const UNKNOWN: Self = Self {
+        firmware: [0; 3],
+        device_id: None,
+        clock_hz: 0,
+        can: false,
+        reset: ResetCause::Unknown,
+        crash: None,
+    };
 }
 
 /// State of the flash.
@@ -239,6 +247,8 @@ pub struct Info {
 pub struct AllCounters {
     /// Of the pipeline.
     pub pipeline: Counters,
+    /// Of the watch over the sensor.
+    pub watch: WatchCounters,
     /// Of the lines.
     pub lines: LineCounters,
 }
@@ -250,11 +260,16 @@ pub struct LineCounters {
     pub sensor_errors: u32,
     /// Frames that the SLCAN line did not take.
     pub unsent: u32,
+    /// Bytes of the sensor and SLCAN lines that came damaged, or too fast.
+    pub line_errors: u32,
+    /// Windows and notes for which a task of lower priority had no time.
+    pub overruns: u32,
     /// Service frames that were none.
     pub service_errors: u32,
 }
 
 impl LineCounters {
     /// Nothing yet.
-    pub const NONE: Self = Self { sensor_errors: 0, unsent: 0, service_errors: 0 };
+    pub const NONE: Self =
+        Self { sensor_errors: 0, unsent: 0, line_errors: 0, overruns: 0, service_errors: 0 };
 }
