@@ -4,7 +4,8 @@
 //! to; what it calls is read from its branches. A call through a register may go to any
 //! function whose address stands anywhere in the image. Recursion, and a stack pointer moved by
 //! a register, have no bound and are errors. Interrupts: every handler of the vector table may
-//! interrupt every other one once, each behind the largest frame that the processor pushes.
+//! interrupt every other one once, each behind the largest frame that the processor pushes. Not
+//! so while an RTIC image initialises: that runs with interrupts off, until its own frame is left.
 //!
 //! The result is an upper bound. It trusts the symbol table: code that no symbol covers, or
 //! addresses computed at run time, would escape it; the images have neither.
@@ -20,6 +21,8 @@ use thumb::Effect;
 const EXCEPTION_FRAME: u32 = 32 + 72 + 4;
 /// Where the image starts, and the handlers that end it.
 const RESET: &str = "Reset";
+/// What RTIC runs with interrupts off; it switches them on as its last step.
+const MASKED: &str = "__rtic_init_resources";
 
 /// Why there is no bound.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -51,8 +54,10 @@ pub enum StackError {
 /// The deepest stack of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageStack {
-    /// Of the main program.
+    /// Of the main program, when handlers can come.
     pub main: u32,
+    /// Of the main program, before they can.
+    pub start: u32,
     /// Of all interrupt and exception handlers, one inside the other, frames included.
     pub handlers: u32,
     /// Calls through a register.
@@ -65,7 +70,7 @@ impl ImageStack {
     /// At worst.
     #[must_use]
     pub fn worst(&self) -> u32 {
-        self.main + self.handlers
+        self.start.max(self.main + self.handlers)
     }
 
     /// Reads an image.
@@ -76,13 +81,15 @@ impl ImageStack {
         let code = Code::read(elf)?;
         let mut depths = HashMap::new();
         let reset = code.named(RESET).ok_or_else(|| StackError::Format(format!("no {RESET}")))?;
-        let main = code.depth(reset, &mut Vec::new(), &mut depths)?;
+        let start = code.depth(reset, &mut Vec::new(), &mut depths)?;
+        let mut unmasked = code.masked();
+        let main = code.depth(reset, &mut Vec::new(), &mut unmasked)?;
         let mut handlers = 0;
         for handler in code.handlers.iter().filter(|handler| **handler != reset) {
             handlers += EXCEPTION_FRAME + code.depth(*handler, &mut Vec::new(), &mut depths)?;
         }
         let indirect_calls = code.functions.values().map(|function| function.indirect).sum();
-        Ok(Self { main, handlers, indirect_calls, deepest: code.deepest(reset, &depths) })
+        Ok(Self { main, start, handlers, indirect_calls, deepest: code.deepest(reset, &depths) })
     }
 }
 
@@ -200,6 +207,12 @@ impl Code {
 
     fn named(&self, name: &str) -> Option<u32> {
         self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
+    }
+
+    /// What is left of a function that runs with interrupts off when they come on: its frame.
+    fn masked(&self) -> HashMap<u32, u32> {
+        let masked = |function: &Function| function.name.ends_with(MASKED);
+        self.functions.iter().filter(|(_, f)| masked(f)).map(|(address, f)| (*address, f.own)).collect()
     }
 
     /// Where a function's calls can go.

@@ -43,6 +43,7 @@ pub fn run(args: &Args, _common: Common) -> super::Result {
             stack.deepest.iter().map(|(name, own)| serde_json::json!([name, own])).collect();
         let mut json = serde_json::Value::Object(rows.collect());
         json["stack_main"] = stack.main.into();
+        json["stack_start"] = stack.start.into();
         json["stack_handlers"] = stack.handlers.into();
         json["indirect_calls"] = stack.indirect_calls.into();
         json["deepest"] = deepest.into();
@@ -51,6 +52,7 @@ pub fn run(args: &Args, _common: Common) -> super::Result {
         for ((name, bytes), budget) in rows() {
             println!("{name} bytes={bytes} budget={budget}");
         }
+        println!("stack/start bytes={}", stack.start);
         println!("stack/main bytes={}", stack.main);
         println!("stack/handlers bytes={}", stack.handlers);
         for (name, own) in &stack.deepest {
