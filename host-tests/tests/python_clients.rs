@@ -10,6 +10,7 @@ use gyronet::can::feeds::Feeds;
 use gyronet::can::slcan::assembler::LineAssembler;
 use gyronet::can::slcan::host::{Session, StatusFlags};
 use gyronet::can::{DataFrame, slcan};
+use gyronet::compensate::Lag;
 use gyronet::units::{AngularRate, Yaw};
 use gyronet::vehicle::VehicleSample;
 use gyronet_host_tests::require::{self, Need};
@@ -129,7 +130,8 @@ fn board(test: &str, samples: u32) {
     let sums = Sums::read(&python, address, all);
     drop(feeder.join().expect("the board takes every byte"));
     sums.check(all, PROMPT_APART);
-    assert_eq!(sums.good, samples, "all that come after static initialisation");
+    let waiting = samples - sums.good;
+    assert!(waiting as usize <= Lag::MAX.samples(), "after static initialisation all but the lag: {waiting}");
 }
 
 /// What the board's drop-in messages, which go out at once, have turned beyond its own, which follow
