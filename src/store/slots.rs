@@ -251,7 +251,7 @@ impl Upload {
     /// Checks the whole file where it now lies; its checksum.
     ///
     /// # Errors
-    /// [`SlotError::Incomplete`], and whatever [`file`] finds.
+    /// [`SlotError::Incomplete`], and whatever [`file()`] finds.
     pub fn verify(&self, slots: [&[u8]; 2]) -> Result<u32, SlotError> {
         if self.written != self.length {
             return Err(SlotError::Incomplete { written: self.written });
