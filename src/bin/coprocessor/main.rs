@@ -49,6 +49,27 @@ mod start;
 #[cfg(target_os = "none")]
 mod watchdog;
 
+/// Vector and priority of each task below: RTIC has them in instructions alone, the bound of the
+/// stack wants them as data. A test holds them against the running image.
+#[cfg(target_os = "none")]
+#[allow(unsafe_code, reason = "a section that is not loaded")]
+#[used]
+#[unsafe(link_section = ".priorities")]
+static PRIORITIES: [[u8; 2]; 7] = {
+    use stm32f4::stm32f405::Interrupt;
+    const SYSTICK: u8 = 15;
+    const FIRST: u8 = 16;
+    [
+        [FIRST + Interrupt::USART1 as u8, 4],
+        [SYSTICK, 4],
+        [FIRST + Interrupt::USART2 as u8, 3],
+        [FIRST + Interrupt::USART6 as u8, 3],
+        [FIRST + Interrupt::CAN1_RX0 as u8, 3],
+        [FIRST + Interrupt::UART4 as u8, 2],
+        [FIRST + Interrupt::UART5 as u8, 1],
+    ]
+};
+
 // The vectors of UART4 and UART5, which this board does not use, are pended by hand.
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
