@@ -9,7 +9,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Of the messages; raised when one changes.
-pub const PROTOCOL: u8 = 1;
+pub const PROTOCOL: u8 = 2;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -57,6 +57,14 @@ pub enum Request {
     WeightsActivate,
     /// Reset.
     Restart,
+}
+
+impl Request {
+    /// Whether it brings a weight file, and is answered by how much of it is there.
+    #[must_use]
+    pub const fn uploads(&self) -> bool {
+        matches!(self, Self::WeightsBegin { .. } | Self::WeightsBlock { .. } | Self::WeightsVerify)
+    }
 }
 
 /// What to do about the calibration.
@@ -262,6 +270,9 @@ pub struct LineCounters {
     pub unsent: u32,
     /// Bytes of the sensor and SLCAN lines that came damaged, or too fast.
     pub line_errors: u32,
+    /// Bytes that had to wait because a line's queue was full: what comes meanwhile is lost, where
+    /// the line cannot be made to wait.
+    pub held: u32,
     /// Windows and notes for which a task of lower priority had no time.
     pub overruns: u32,
     /// Service frames that were none.
@@ -271,5 +282,5 @@ pub struct LineCounters {
 impl LineCounters {
     /// Nothing yet.
     pub const NONE: Self =
-        Self { sensor_errors: 0, unsent: 0, line_errors: 0, overruns: 0, service_errors: 0 };
+        Self { sensor_errors: 0, unsent: 0, line_errors: 0, held: 0, overruns: 0, service_errors: 0 };
 }

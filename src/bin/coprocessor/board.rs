@@ -8,7 +8,6 @@ use crate::queue::Queue;
 use crate::serial::{self, Usart};
 use crate::start::WHEELS;
 use crate::watchdog::Watchdog;
-use core::sync::atomic::AtomicU32;
 use cortex_m::peripheral::SYST;
 use gyronet::health::supervisor::Supervisor;
 use gyronet::service::event::ResetCause;
@@ -27,7 +26,7 @@ pub const SENDING: usize = 128;
 /// Which tasks have run.
 pub static SUPERVISOR: Supervisor = Supervisor::new();
 
-static LOST: [AtomicU32; 3] = [const { AtomicU32::new(0) }; 3];
+static FAULTS: [serial::Faults; 3] = [const { serial::Faults::new() }; 3];
 
 static IMU: Queue<u8, IMU_QUEUE> = Queue::new();
 static SLCAN: Queue<u8, SLCAN_QUEUE> = Queue::new();
@@ -69,13 +68,13 @@ impl Board {
         let (can, receiver) = can.unzip();
         let identity = identity(&p.RCC, &p.DBGMCU, clocks.core_hz, can.is_some());
         let [to_imu, to_slcan, to_service] = &TO_LINES;
-        let [imu_lost, slcan_lost, service_lost] = &LOST;
+        let [imu_faults, slcan_faults, service_faults] = &FAULTS;
         let usart1 = Usart { registers: pac::USART1::ptr(), interrupt: Interrupt::USART1 };
         let usart2 = Usart { registers: pac::USART2::ptr(), interrupt: Interrupt::USART2 };
         let usart6 = Usart { registers: pac::USART6::ptr(), interrupt: Interrupt::USART6 };
-        let (imu_handler, imu) = serial::line(usart1, &IMU, to_imu, imu_lost);
-        let (slcan_handler, slcan) = serial::line(usart2, &SLCAN, to_slcan, slcan_lost);
-        let (service_handler, service) = serial::line(usart6, &SERVICE, to_service, service_lost);
+        let (imu_handler, imu) = serial::line(usart1, &IMU, to_imu, imu_faults);
+        let (slcan_handler, slcan) = serial::line(usart2, &SLCAN, to_slcan, slcan_faults);
+        let (service_handler, service) = serial::line(usart6, &SERVICE, to_service, service_faults);
         usart1.start(clocks.apb2_hz, 115_200);
         usart2.start(clocks.apb1_hz, 921_600);
         usart6.start(clocks.apb2_hz, 115_200);

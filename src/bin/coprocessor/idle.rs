@@ -33,7 +33,8 @@ pub struct Idle {
     check: Option<BackgroundCheck<'static>>,
     service: serial::Port<{ board::SERVICE_QUEUE }>,
     /// An answer on its way out, and how much of it is.
-    answer: Option<(Frame, usize)>,
+    answer: Frame,
+    sent: usize,
     milliseconds: u32,
 }
 
@@ -43,7 +44,7 @@ pub type Stored = (&'static mut Device<Records, Slots>, Option<BackgroundCheck<'
 impl Idle {
     #[inline(never)]
     pub fn new((device, check): Stored, service: serial::Port<{ board::SERVICE_QUEUE }>) -> Self {
-        Self { device, check, service, answer: None, milliseconds: 0 }
+        Self { device, check, service, answer: Frame::new(), sent: 0, milliseconds: 0 }
     }
 
     /// A bounded piece of work; whether the weights were found to be damaged.
@@ -72,13 +73,14 @@ impl Idle {
     /// The service line's turn: the answer on its way, then the next question.
     #[inline(never)]
     fn answer(&mut self, counters: &AllCounters) {
-        if let Some((frame, sent)) = self.answer.as_mut() {
-            while let Some(rest) = frame.get(*sent..).filter(|rest| !rest.is_empty()) {
+        if !self.answer.is_empty() {
+            while let Some(rest) = self.answer.get(self.sent..).filter(|rest| !rest.is_empty()) {
                 let Ok(true) = self.service.write_ready() else { return };
                 let Ok(len) = self.service.write(rest) else { return };
-                *sent += len;
+                self.sent += len;
             }
-            self.answer = None;
+            self.answer.clear();
+            self.sent = 0;
             if self.device.restart_wanted() {
                 // Bounded; an answer that does not get out keeps nobody from starting anew.
                 let _ = self.service.flush();
@@ -87,8 +89,8 @@ impl Idle {
         }
         for _ in 0..SERVICE_TURN {
             let Some(byte) = self.service.receive() else { return };
-            self.answer = self.device.push(byte, counters).map(|frame| (frame, 0));
-            if self.answer.is_some() {
+            if let Some(answer) = self.device.push(byte, counters) {
+                self.answer = answer;
                 return;
             }
         }

@@ -194,11 +194,11 @@ impl Output {
             self.guard.wheels(wheels.poll(sample.time));
         }
         // What has no place in time is counted and gives no frame.
-        let Ok(output) = self.guard.process(sample, now) else { return };
+        let Ok(output) = &self.guard.process(sample, now) else { return };
         self.heard = now;
         self.tick = output.prompt.tick;
         self.send(output.vehicle, sample.time);
-        self.hand_out(output.window, now);
+        self.hand_out(output.window.as_ref(), now);
         self.note(Some(sample), self.tick, output.prompt.status);
     }
 
@@ -209,12 +209,14 @@ impl Output {
         self.note(None, vehicle.tick, Status::Silent);
     }
 
+    #[inline(never)]
     fn note(&mut self, sample: Option<ImuSample>, tick: u32, status: Status) {
         if !OBSERVATIONS.push(Observation { sample, tick, status }) {
             count(&mut self.lines.overruns, 1);
         }
     }
 
+    #[inline(never)]
     fn send(&mut self, mut vehicle: VehicleSample, time: Micros) {
         vehicle.yaw.faults = vehicle.yaw.faults.with(self.faults());
         for frame in &self.feeds.process::<DataFrame>(&vehicle) {
@@ -225,10 +227,11 @@ impl Output {
         }
     }
 
-    fn hand_out(&mut self, due: Option<DueWindow>, now: Micros) {
+    #[inline(never)]
+    fn hand_out(&mut self, due: Option<&DueWindow>, now: Micros) {
         let Some(due) = due.filter(|_| self.has_network) else { return };
         let end = due.end;
-        if WINDOWS.push(due) {
+        if WINDOWS.push(*due) {
             self.out = Some(Out { end, until: now.0 + u64::from(self.delay) * PERIOD_US });
         } else {
             // The one before is not done: this one's turn passes, and is counted as late.
@@ -262,6 +265,7 @@ impl Output {
             self.queue.service(can);
         }
         self.lines.line_errors = self.imu.lost().saturating_add(self.slcan.lost());
+        self.lines.held = self.imu.held().saturating_add(self.slcan.held());
     }
 }
 

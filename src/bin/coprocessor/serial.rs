@@ -3,14 +3,14 @@
 
 use crate::board::SENDING;
 use crate::queue::Queue;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 use stm32f4::stm32f405::{Interrupt, NVIC, usart1::RegisterBlock};
 
 /// Polls before a flush gives up: about ten byte times at 115200.
 const FLUSH_POLLS: u32 = 100_000;
-/// Bytes that a handler gives the line in one turn. A real one takes two at most and asks for more;
-/// the emulated one takes all and never asks.
+/// Bytes that a handler takes from or gives the line in one turn. A real one has one and takes two
+/// at most; the emulated one has what the host has sent, takes all and never asks for more.
 const BURST: usize = SENDING;
 
 /// Where a line's registers are, and its interrupt.
@@ -41,34 +41,69 @@ impl Usart {
     }
 }
 
+/// What a line has done wrong since the start. The handler alone counts.
+pub struct Faults {
+    lost: AtomicU32,
+    held: AtomicU32,
+    /// A byte waits in the register, and the handler has been switched off.
+    holding: AtomicBool,
+}
+
+impl Faults {
+    /// Nothing yet.
+    pub const fn new() -> Self {
+        Self { lost: AtomicU32::new(0), held: AtomicU32::new(0), holding: AtomicBool::new(false) }
+    }
+}
+
+fn count(counter: &AtomicU32) {
+    counter.store(counter.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
+}
+
 /// What the handler has of a line.
 pub struct Handler<const N: usize> {
     usart: Usart,
     received: &'static Queue<u8, N>,
     sending: &'static Queue<u8, SENDING>,
-    lost: &'static AtomicU32,
+    faults: &'static Faults,
 }
 
 impl<const N: usize> Handler<N> {
     /// Moves bytes both ways; waits for nothing.
     pub fn serve(&mut self) {
+        self.take();
+        self.give();
+    }
+
+    fn take(&mut self) {
         let registers = self.usart.registers();
-        let status = registers.sr().read();
-        if status.rxne().bit_is_set() || status.ore().bit_is_set() {
-            if !self.received.is_full() {
-                if status.ore().bit_is_set() || status.fe().bit_is_set() || status.nf().bit_is_set() {
-                    let lost = self.lost.load(Ordering::Relaxed);
-                    self.lost.store(lost.saturating_add(1), Ordering::Relaxed);
-                }
-                // Status before data: that clears the errors (RM0090 30.6.1).
-                let _ = self.received.push(registers.dr().read().dr().bits() as u8);
-            } else {
+        for _ in 0..BURST {
+            let status = registers.sr().read();
+            if status.rxne().bit_is_clear() && status.ore().bit_is_clear() {
+                return;
+            }
+            if self.received.is_full() {
                 // It stays in the register until there is room: the line is held up, or reports
                 // an overrun. Masked in the NVIC: the emulated USART keeps its interrupt raised
                 // whatever its own enable bit says.
                 NVIC::mask(self.usart.interrupt);
+                if !self.faults.holding.swap(true, Ordering::Relaxed) {
+                    count(&self.faults.held);
+                }
+                return;
             }
+            if status.ore().bit_is_set() || status.fe().bit_is_set() || status.nf().bit_is_set() {
+                count(&self.faults.lost);
+            }
+            // Status before data: that clears the errors (RM0090 30.6.1).
+            let _ = self.received.push(registers.dr().read().dr().bits() as u8);
         }
+        // More may wait. A real line would interrupt again by itself.
+        NVIC::pend(self.usart.interrupt);
+    }
+
+    fn give(&mut self) {
+        let registers = self.usart.registers();
         for _ in 0..BURST {
             if registers.sr().read().txe().bit_is_clear() {
                 return;
@@ -88,7 +123,7 @@ pub struct Port<const N: usize> {
     usart: Usart,
     received: &'static Queue<u8, N>,
     sending: &'static Queue<u8, SENDING>,
-    lost: &'static AtomicU32,
+    faults: &'static Faults,
 }
 
 /// Both ends of a line.
@@ -96,9 +131,9 @@ pub fn line<const N: usize>(
     usart: Usart,
     received: &'static Queue<u8, N>,
     sending: &'static Queue<u8, SENDING>,
-    lost: &'static AtomicU32,
+    faults: &'static Faults,
 ) -> (Handler<N>, Port<N>) {
-    (Handler { usart, received, sending, lost }, Port { usart, received, sending, lost })
+    (Handler { usart, received, sending, faults }, Port { usart, received, sending, faults })
 }
 
 impl<const N: usize> Port<N> {
@@ -106,22 +141,36 @@ impl<const N: usize> Port<N> {
     pub fn receive(&mut self) -> Option<u8> {
         let byte = self.received.pop()?;
         // There is room again: let the line go on.
-        // SAFETY: the handler shares nothing but the queue, and nobody masks an interrupt to
-        // keep it from that.
-        unsafe { NVIC::unmask(self.usart.interrupt) };
+        if self.faults.holding.swap(false, Ordering::Relaxed) {
+            self.wake();
+        }
         Some(byte)
     }
 
     /// Bytes that came damaged, or when there was no room for them.
     pub fn lost(&self) -> u32 {
-        self.lost.load(Ordering::Relaxed)
+        self.faults.lost.load(Ordering::Relaxed)
     }
 
-    /// Has the handler send what waits. Pended by hand, since the emulated line raises no
-    /// interrupt when it can send.
+    /// Bytes that had to wait in the line's register because there was no room for them.
+    pub fn held(&self) -> u32 {
+        self.faults.held.load(Ordering::Relaxed)
+    }
+
+    /// Has the handler run. Pended by hand: the emulated line raises no interrupt when it can send, nor
+    /// a second time for a byte that has come while the one before was read.
+    fn wake(&self) {
+        // SAFETY: the handler shares nothing but the queues, and nobody masks an interrupt to
+        // keep it from them.
+        unsafe { NVIC::unmask(self.usart.interrupt) };
+        NVIC::pend(self.usart.interrupt);
+    }
+
+    /// Has the handler send what waits. Also where the line is held: what a flooded line has to say
+    /// must get out, or nobody takes what waits.
     fn kick(&self) {
         self.usart.registers().cr1().modify(|_, w| w.txeie().enabled());
-        NVIC::pend(self.usart.interrupt);
+        self.wake();
     }
 }
 
