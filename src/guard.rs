@@ -90,7 +90,9 @@ impl Guard {
         self.hold = if saturated { HOLD + 1 } else { self.hold.saturating_sub(1) };
         count(&mut self.counters.held, u32::from(!saturated && self.hold > 0));
         sample.clipped = saturated || self.hold > 0 || stuck;
-        let mut output = self.pipeline.process(sample)?;
+        // Worked on where it is returned: it is too large to be copied about on a small stack.
+        let mut result = self.pipeline.process(sample);
+        let Ok(output) = &mut result else { return result };
         self.heard = Some(now);
         self.due = None;
         if stuck {
@@ -100,7 +102,7 @@ impl Guard {
             output.prompt.status = Status::Stuck;
         }
         self.newest = Some(output.vehicle);
-        Ok(output)
+        result
     }
 
     /// Samples wait and could not be looked at: the sensor is not silent.

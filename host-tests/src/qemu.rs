@@ -193,20 +193,31 @@ impl Board {
     #[must_use]
     pub fn boot(image: &Path, usarts: usize, arguments: &[&str]) -> Self {
         let listen = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port on the loopback");
-        let address = |listener: &TcpListener| {
-            let port = listener.local_addr().expect("it is bound").port();
-            format!("tcp:127.0.0.1:{port},nodelay=on")
-        };
+        let port = |listener: &TcpListener| listener.local_addr().expect("it is bound").port();
         let registers = listen();
         let listeners: Vec<TcpListener> = (0..usarts).map(|_| listen()).collect();
         let mut command = Command::new(PROGRAM);
         command
             .args(["-machine", "netduinoplus2", "-nographic"])
+            // An instruction takes a nanosecond: the board's time does not depend on how busy the host is.
+            .args(["-icount", "shift=0"])
             .args(["-semihosting-config", "enable=on,target=native"])
-            .args(["-monitor", "none", "-qtest", &address(&registers), "-qtest-log", "/dev/null"])
+            .args([
+                "-monitor",
+                "none",
+                "-qtest",
+                &format!("tcp:127.0.0.1:{}", port(&registers)),
+                "-qtest-log",
+                "/dev/null",
+            ])
             .args(arguments);
-        for listener in &listeners {
-            command.args(["-serial", &address(listener)]);
+        // A multiplexer of one: it keeps up to 32 bytes, so that QEMU need not be woken for each of
+        // them, which takes longer the busier the host is. Its escape character is none of a byte.
+        command.args(["-echr", "256"]);
+        for (n, listener) in listeners.iter().enumerate() {
+            let socket =
+                format!("socket,id=line{n},host=127.0.0.1,port={},nodelay=on,mux=on", port(listener));
+            command.args(["-chardev", &socket, "-serial", &format!("chardev:line{n}")]);
         }
         if usarts == 0 {
             command.args(["-serial", "none"]);

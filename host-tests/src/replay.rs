@@ -1,12 +1,16 @@
-//! The board's main loop on the host: bytes of an Xsens MTi in, SLCAN lines out.
+//! The board's output task on the host: bytes of an Xsens MTi in, SLCAN lines out.
 
 use crate::recordings::Row;
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::can::{DataFrame, slcan};
+use gyronet::guard::{Guard, TIMEOUT_US};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
-use gyronet::pipeline::{Pipeline, PipelineConfig};
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::PERIOD_US;
 use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::units::Micros;
+use gyronet::vehicle::VehicleSample;
 
 /// What the image sends.
 pub const CONFIG: Config = Config::DEFAULT;
@@ -29,7 +33,8 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
 pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
     let row = Row {
         time: number as f64 * 0.01,
-        acceleration: [0.0, 0.0, 9.81],
+        // The least bit of a real part always moves.
+        acceleration: [0.0, 0.0, if number.is_multiple_of(2) { 9.81 } else { 9.811 }],
         rate_of_turn: [0.0, 0.0, yaw_rate],
         reference: 0.0,
     };
@@ -42,24 +47,81 @@ pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
 /// When the library's own weights are refused.
 #[must_use]
 pub fn lines(bytes: &[u8]) -> Vec<Vec<u8>> {
-    let mut network =
-        GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-    let mut mti = Mti::new();
-    let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
-    let mut feeds = Feeds::new(CONFIG);
-    let mut lines = Vec::new();
-    for byte in bytes {
-        mti.push(*byte);
-        while let Some(sample) = mti.next_sample() {
-            let Ok(Ok(output)) = sample.map(|sample| pipeline.process(sample)) else { continue };
-            if let Some(due) = output.window {
-                pipeline.deliver(due.end, network.estimate(&due.features));
-            }
-            for frame in feeds.process::<DataFrame>(&output.vehicle) {
-                let line = slcan::emit(&frame).expect("a data frame");
-                lines.push(line.strip_suffix(b"\r").expect("a CR").to_vec());
+    let mut board = Board::new();
+    board.push(bytes);
+    board.lines
+}
+
+/// The board's output task on the host.
+pub struct Board {
+    network: GyroNet<'static>,
+    mti: Mti,
+    guard: Guard,
+    feeds: Feeds,
+    /// Silent for so many message sets.
+    silent: u64,
+    /// What it has sent.
+    pub lines: Vec<Vec<u8>>,
+}
+
+impl Default for Board {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Board {
+    /// Nothing received yet.
+    ///
+    /// # Panics
+    /// When the library's own weights are refused.
+    #[must_use]
+    pub fn new() -> Self {
+        let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+        Self {
+            network: GyroNet::new(blob),
+            mti: Mti::new(),
+            guard: Guard::new(PipelineConfig::DEFAULT),
+            feeds: Feeds::new(CONFIG),
+            silent: 0,
+            lines: Vec::new(),
+        }
+    }
+
+    /// The sensor sends.
+    pub fn push(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.mti.push(*byte);
+            while let Some(sample) = self.mti.next_sample() {
+                let Ok(Ok(output)) = sample.map(|sample| self.guard.process(sample, Micros(0))) else {
+                    continue;
+                };
+                self.silent = 0;
+                if let Some(due) = output.window {
+                    self.guard.pipeline().deliver(due.end, self.network.estimate(&due.features));
+                }
+                self.send(&output.vehicle);
             }
         }
     }
-    lines
+
+    /// The sensor is silent for so many message sets.
+    ///
+    /// # Panics
+    /// When the guard does not say so.
+    pub fn silence(&mut self, sets: u64) {
+        for set in self.silent..self.silent + sets {
+            let now = Micros(TIMEOUT_US + set * PERIOD_US);
+            let vehicle = self.guard.poll(now).expect("the sensor is silent");
+            self.send(&vehicle);
+        }
+        self.silent += sets;
+    }
+
+    fn send(&mut self, vehicle: &VehicleSample) {
+        for frame in self.feeds.process::<DataFrame>(vehicle) {
+            let line = slcan::emit(&frame).expect("a data frame");
+            self.lines.push(line.strip_suffix(b"\r").expect("a CR").to_vec());
+        }
+    }
 }

@@ -1,13 +1,13 @@
 //! The service line against the board's own code on a mock flash: every request, every refusal,
 //! noise, and the frame format byte by byte.
 
-use gyronet::health::{Counters, Status};
+use gyronet::health::Status;
 use gyronet::model::weights;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause};
 use gyronet::service::frame::{Deframer, FrameError, MAX_FRAME, emit};
-use gyronet::service::message::{Calibrate, FlashState, Identity, Origin, Refusal};
+use gyronet::service::message::{AllCounters, Calibrate, FlashState, Identity, Origin, Refusal};
 use gyronet::service::{Device, Reply, Request};
 use gyronet::store::layout::{self, RECORD_SECTOR};
 use gyronet::store::slots::{SlotError, WeightSource};
@@ -26,6 +26,7 @@ const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
     device_id: Some(0x413),
     clock_hz: 16_000_000,
+    can: false,
     reset: ResetCause::Software,
     crash: Some(Crash { kind: CrashKind::HardFault, place: 0x0800_1234, count: 1 }),
 };
@@ -51,7 +52,8 @@ fn bare() -> Board {
 /// A request over the line; every byte of it and of the answer.
 fn ask(board: &mut Board, request: &Request) -> Reply {
     let frame = emit(7, request).expect("it fits");
-    let answers: Vec<_> = frame.iter().filter_map(|byte| board.push(*byte, &Counters::default())).collect();
+    let answers: Vec<_> =
+        frame.iter().filter_map(|byte| board.push(*byte, &AllCounters::default())).collect();
     let [answer] = &answers[..] else { panic!("{} answers", answers.len()) };
     let mut deframer = Deframer::new();
     let mut replies = answer.iter().filter_map(|byte| deframer.push::<Reply>(*byte));
@@ -154,7 +156,7 @@ fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> Sta
     assert_eq!(ask(board, &Request::Calibrate(Calibrate::Start(task))), Reply::Done);
     for k in 0..301u64 {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
-        board.observe(&sample(k, force, rate), k as u32, Status::Ready);
+        board.observe(Some(&sample(k, force, rate)), k as u32, Status::Ready);
     }
     match ask(board, &Request::GetCalibration) {
         Reply::Calibration { state, .. } => state,
@@ -267,7 +269,7 @@ fn log_is_bounded_and_says_what_is_lost() {
     assert_eq!(kinds, [EventKind::Started(ResetCause::Software), EventKind::Crashed(crash)]);
     for k in 0..100 {
         let status = if k % 2 == 0 { Status::Ready } else { Status::Degraded };
-        board.observe(&sample(k, [0.0, 0.0, 9.8], 0.0), k as u32, status);
+        board.observe(Some(&sample(k, [0.0, 0.0, 9.8], 0.0)), k as u32, status);
     }
     let (mut after, mut events, mut lost) = (2, 0, 0);
     loop {
@@ -311,10 +313,10 @@ proptest! {
             let length = noise.int(0, 2_000);
             for _ in 0..length {
                 // Noise whose frames would have a right checksum is one in 2^32.
-                prop_assert!(board.push(noise.byte(), &Counters::default()).is_none());
+                prop_assert!(board.push(noise.byte(), &AllCounters::default()).is_none());
             }
             for byte in emit(1, &Request::Info).expect("it fits") {
-                answers += usize::from(board.push(byte, &Counters::default()).is_some());
+                answers += usize::from(board.push(byte, &AllCounters::default()).is_some());
             }
         }
         prop_assert_eq!(answers, 10);
@@ -331,7 +333,7 @@ proptest! {
         let mut frame = vec![0; content.len() + 4];
         let len = cobs::encode(&content, &mut frame[1..]);
         frame.truncate(len + 2);
-        let answers: Vec<_> = frame.iter().filter_map(|b| board.push(*b, &Counters::default())).collect();
+        let answers: Vec<_> = frame.iter().filter_map(|b| board.push(*b, &AllCounters::default())).collect();
         prop_assert_eq!(answers.len(), 1);
         prop_assert!(answers[0].len() <= MAX_FRAME);
     }

@@ -11,24 +11,30 @@ use crate::units::AngularRate;
 /// Rotation of the Earth against the stars, rad/s (WGS 84).
 const EARTH_RATE: f32 = 7.292_115e-5;
 
-/// A geographic latitude.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A geographic latitude, as what the Earth turns by there: the sine is worked out once, not deep
+/// in the sample path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Latitude(f32);
+pub struct Latitude {
+    vertical_rate: AngularRate,
+}
 
 impl Latitude {
     /// In degrees, north positive; `None` when not finite or beyond a pole.
     #[must_use]
-    pub const fn from_degrees(degrees: f32) -> Option<Self> {
-        if degrees >= -90.0 && degrees <= 90.0 { Some(Self(degrees)) } else { None }
+    pub fn from_degrees(degrees: f32) -> Option<Self> {
+        if !(-90.0..=90.0).contains(&degrees) {
+            return None;
+        }
+        let rate = EARTH_RATE * libm::sinf(degrees.to_radians());
+        // 7e-5 rad/s at most.
+        Some(Self { vertical_rate: AngularRate(libm::roundf(rate * AngularRate::PER_RAD_PER_SEC) as i32) })
     }
 
     /// Earth rate about the upward vertical.
     #[must_use]
-    pub fn vertical_rate(self) -> AngularRate {
-        let rate = EARTH_RATE * libm::sinf(self.0.to_radians());
-        // 7e-5 rad/s at most.
-        AngularRate(libm::roundf(rate * AngularRate::PER_RAD_PER_SEC) as i32)
+    pub const fn vertical_rate(self) -> AngularRate {
+        self.vertical_rate
     }
 }
 
@@ -93,14 +99,16 @@ impl ZeroPoint {
 mod tests {
     use super::*;
 
-    const AT_37: EarthRate = EarthRate::Subtracted(Latitude(37.0));
+    fn at_37() -> EarthRate {
+        EarthRate::Subtracted(Latitude::from_degrees(37.0).unwrap())
+    }
 
     #[test]
     fn nine_degrees_an_hour_at_37_north() {
-        let rate = AT_37.vertical().rad_per_sec().to_degrees() * 3600.0;
+        let rate = at_37().vertical().rad_per_sec().to_degrees() * 3600.0;
         assert!((rate - 9.0519).abs() < 1e-3, "{rate}");
         let south = Latitude::from_degrees(-37.0).unwrap().vertical_rate();
-        assert_eq!(south.0, -AT_37.vertical().0);
+        assert_eq!(south.0, -at_37().vertical().0);
         assert_eq!(Latitude::from_degrees(90.1), None);
         assert_eq!(Latitude::from_degrees(f32::NAN), None);
     }
@@ -108,19 +116,19 @@ mod tests {
     #[test]
     fn a_mean_at_rest_is_the_reading_whatever_is_subtracted() {
         let mean = [AngularRate(1), AngularRate(-2), AngularRate(50_000)];
-        for earth in [EarthRate::LeftInBias, AT_37] {
+        for earth in [EarthRate::LeftInBias, at_37()] {
             assert_eq!(ZeroPoint::at_rest(mean, earth).reading(), mean);
         }
-        let [_, _, z] = ZeroPoint::at_rest(mean, AT_37).bias();
-        assert_eq!(z.0, 50_000 - AT_37.vertical().0);
+        let [_, _, z] = ZeroPoint::at_rest(mean, at_37()).bias();
+        assert_eq!(z.0, 50_000 - at_37().vertical().0);
         assert_eq!(ZeroPoint::at_rest(mean, EarthRate::LeftInBias).bias(), mean);
     }
 
     #[test]
     fn a_bias_from_elsewhere_gets_the_earth_added() {
         let bias = [AngularRate(1), AngularRate(-2), AngularRate(-50_000)];
-        let [x, y, z] = ZeroPoint::from_bias(bias, AT_37).reading();
-        assert_eq!((x.0, y.0, z.0), (1, -2, AT_37.vertical().0 - 50_000));
+        let [x, y, z] = ZeroPoint::from_bias(bias, at_37()).reading();
+        assert_eq!((x.0, y.0, z.0), (1, -2, at_37().vertical().0 - 50_000));
         assert_eq!(ZeroPoint::from_bias(bias, EarthRate::LeftInBias).reading(), bias);
     }
 }

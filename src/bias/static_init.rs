@@ -182,7 +182,7 @@ impl StaticInit {
             return None;
         }
         let result = self.judge();
-        *self = Self::new(self.config);
+        self.restart();
         Some(result)
     }
 
@@ -190,13 +190,17 @@ impl StaticInit {
     /// not with every sample of a drive.
     pub fn refuse_wheels(&mut self) -> Option<StaticError> {
         let refused = self.wheels_refused;
-        *self = Self { wheels_refused: true, ..Self::new(self.config) };
+        self.restart();
+        self.wheels_refused = true;
         (!refused).then_some(StaticError::Wheels)
     }
 
     /// Forgets what was collected.
     pub fn restart(&mut self) {
-        *self = Self::new(self.config);
+        for axis in self.gyro.iter_mut().chain(&mut self.accel) {
+            *axis = Axis::default();
+        }
+        self.wheels_refused = false;
     }
 
     fn judge(&self) -> Result<Rest, StaticError> {
@@ -224,10 +228,10 @@ impl StaticInit {
             }
         }
         Ok(Rest {
-            angular_rate: self.gyro.map(|axis| AngularRate(axis.all.mean_code())),
-            specific_force: self.accel.map(|axis| SpecificForce(axis.all.mean_code())),
-            gyro_std: self.gyro.map(|axis| axis.all.std()),
-            accel_std: self.accel.map(|axis| axis.all.std()),
+            angular_rate: self.gyro.each_ref().map(|axis| AngularRate(axis.all.mean_code())),
+            specific_force: self.accel.each_ref().map(|axis| SpecificForce(axis.all.mean_code())),
+            gyro_std: self.gyro.each_ref().map(|axis| axis.all.std()),
+            accel_std: self.accel.each_ref().map(|axis| axis.all.std()),
         })
     }
 }

@@ -41,6 +41,7 @@ impl Feeds {
     }
 
     /// The frames of one sample, in a driver's own type.
+    #[inline(never)]
     pub fn process<F: Frame>(&mut self, sample: &VehicleSample) -> Vec<F, MAX_MESSAGES> {
         let (status, validity) = match sample.prompt.quality {
             Quality::Good | Quality::Degraded => (SignalStatus::OK, Validity::Valid),

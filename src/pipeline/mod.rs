@@ -244,6 +244,7 @@ impl Pipeline {
         Some(known.zero)
     }
 
+    #[inline(never)]
     fn initialise(&mut self, frame: &Frame) -> (YawRate, Option<StaticError>) {
         let judged = if self.standstill() == Standstill::Moving {
             self.static_init.refuse_wheels().map(Err)
@@ -253,32 +254,26 @@ impl Pipeline {
         } else {
             self.static_init.process(&frame.sample)
         };
-        let refused = match judged.map(|rest| rest.and_then(|rest| self.know(&rest))) {
-            Some(Ok(known)) => {
-                self.known = Some(known);
-                None
-            }
-            Some(Err(error)) => {
-                count(&mut self.counters.moving, 1);
-                Some(error)
-            }
-            None => None,
-        };
+        let refused = judged.and_then(|rest| rest.and_then(|rest| self.know(&rest)).err());
+        count(&mut self.counters.moving, u32::from(refused.is_some()));
         let status = if frame.sample.clipped { Status::Clipped } else { Status::Init };
         (raw(frame, status, self.prompt_yaw), refused)
     }
 
-    fn know(&self, rest: &Rest) -> Result<Known, StaticError> {
+    #[inline(never)]
+    fn know(&mut self, rest: &Rest) -> Result<(), StaticError> {
         let PipelineConfig { levelling, static_init, earth_rate, zero_rate, quiet, .. } = self.config;
         let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
-        Ok(Known {
+        self.known = Some(Known {
             levelling,
             zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
             quiet: QuietDetector::new(quiet, &static_init, rest),
             zero_rate: zero_rate.map(ZeroRate::new),
-        })
+        });
+        Ok(())
     }
 
+    #[inline(never)]
     fn correct(
         &mut self,
         frame: &Frame,
@@ -360,6 +355,7 @@ impl Pipeline {
         YawRate { tick, rate, correction, yaw: *yaw, sigma, status }
     }
 
+    #[inline(never)]
     fn due_window(&mut self, tick: u32) -> Option<DueWindow> {
         if self.since_window < self.config.compensate.mode.hop() || self.out.is_some() {
             return None;
@@ -391,6 +387,7 @@ impl Pipeline {
         speeds.iter().all(Option::is_none) || speeds.iter().zip(self.wheels_seen).any(lost)
     }
 
+    #[inline(never)]
     fn vehicle(&self, prompt: &YawRate, navigation: &YawRate, frame: &Frame) -> VehicleSample {
         let (_, prompt_quality) = judge(prompt.status);
         let (source, quality) = judge(navigation.status);

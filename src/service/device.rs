@@ -1,13 +1,16 @@
 //! The board's side of the service line: what it keeps, and what it answers.
+//!
+//! Some functions are kept out of their callers: what they have on the stack, requests, replies and
+//! records, is then there only while they run.
 
-use super::calibrate::{Calibrator, State};
+use super::calibrate::{Calibrator, State, Task};
 use super::event::{EventKind, EventLog};
 use super::frame::{Deframer, Frame, FrameError, emit};
 use super::message::{
     AllCounters, BLOCK, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal,
     Reply, Request,
 };
-use crate::health::{Counters, Status, count};
+use crate::health::{Status, count};
 use crate::model::Blob;
 use crate::sample::ImuSample;
 use crate::store::slots::{Selection, SlotError, Upload, WeightSource, select};
@@ -54,8 +57,7 @@ pub struct Device<R: NorFlash, W> {
     tick: u32,
     log: EventLog,
     deframer: Deframer,
-    /// What went wrong on the lines; the wiring adds its own.
-    pub lines: LineCounters,
+    service_errors: u32,
     restart: bool,
 }
 
@@ -84,7 +86,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             tick: 0,
             log: EventLog::new(),
             deframer: Deframer::new(),
-            lines: LineCounters::NONE,
+            service_errors: 0,
             restart: false,
         }
     }
@@ -106,7 +108,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn load(&mut self, mut store: Store<R>) {
-        match store.get::<Configuration>().and_then(|found| self.drivable(found)) {
+        let found = store.get::<Configuration>();
+        match found.and_then(|found| found.map(|found| self.drivable(&found).map(|()| found)).transpose()) {
             Ok(Some(configuration)) => {
                 self.configuration = configuration;
                 self.configuration_origin = Origin::Stored;
@@ -136,14 +139,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.store = Some(store);
     }
 
-    fn drivable(&self, found: Option<Configuration>) -> Result<Option<Configuration>, StoreError> {
-        match found {
-            Some(configuration)
-                if !self.parts.contains(&configuration.imu) || configuration.fog.is_some() =>
-            {
-                Err(StoreError::Field(FieldError::PartNotInImage))
-            }
-            found => Ok(found),
+    fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
+        if self.parts.contains(&configuration.imu) && configuration.fog.is_none() {
+            Ok(())
+        } else {
+            Err(StoreError::Field(FieldError::PartNotInImage))
         }
     }
 
@@ -165,6 +165,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         weights
     }
 
+    /// The weights in use no longer fit their checksum; they are used no more until the next
+    /// start, which checks all files anew.
+    pub fn weights_damaged(&mut self) {
+        self.weights = WeightSource::None;
+        self.weights_crc = None;
+        self.note(EventKind::WeightsDamaged);
+    }
+
     /// What the image is to run with.
     #[must_use]
     pub fn configuration(&self) -> &Configuration {
@@ -183,14 +191,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.restart
     }
 
-    /// Takes every sample of the sensor, with the status of what was made of it.
-    pub fn observe(&mut self, sample: &ImuSample, tick: u32, status: Status) {
+    /// Takes every sample of the sensor (`None` while it is silent), with the status of what was made of it.
+    pub fn observe(&mut self, sample: Option<&ImuSample>, tick: u32, status: Status) {
         self.tick = tick;
         if status != self.status {
             self.status = status;
             self.note(EventKind::Status(status));
         }
-        let Some(calibrator) = self.calibrator.as_mut() else { return };
+        let (Some(calibrator), Some(sample)) = (self.calibrator.as_mut(), sample) else { return };
         let task = calibrator.task();
         if let Some(result) = calibrator.process(sample, &self.configuration.mounting, &mut self.calibration)
         {
@@ -204,11 +212,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Takes a byte of the service line; with the last one of a request returns the answer.
-    pub fn push(&mut self, byte: u8, counters: &Counters) -> Option<Frame> {
+    #[inline(never)]
+    pub fn push(&mut self, byte: u8, counters: &AllCounters) -> Option<Frame> {
         let (number, reply) = match self.deframer.push(byte)? {
-            Ok((number, request)) => (number, self.handle(request, counters)),
+            Ok((number, request)) => (number, self.handle(&request, counters)),
             Err(error) => {
-                count(&mut self.lines.service_errors, 1);
+                count(&mut self.service_errors, 1);
                 let FrameError::Message { number } = error else { return None };
                 (number, Reply::Refused(Refusal::Unknown))
             }
@@ -217,36 +226,66 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Answers a request.
-    pub fn handle(&mut self, request: Request, counters: &Counters) -> Reply {
-        let answer = match request {
-            Request::Info => Ok(Reply::Info(self.info())),
-            Request::GetConfiguration => Ok(Reply::Configuration {
+    fn handle(&mut self, request: &Request, counters: &AllCounters) -> Reply {
+        if let Some(reply) = self.tell(request, counters) {
+            return reply;
+        }
+        match (self.act(request), self.uploading) {
+            (Err(refusal), _) => Reply::Refused(refusal),
+            (Ok(()), Some(Uploading { upload, checked })) if request.uploads() => {
+                Reply::Weights { slot: upload.slot(), written: upload.written(), checked }
+            }
+            (Ok(()), _) => Reply::Done,
+        }
+    }
+
+    /// Answers a question.
+    #[inline(never)]
+    fn tell(&self, request: &Request, counters: &AllCounters) -> Option<Reply> {
+        Some(match request {
+            Request::Info => Reply::Info(self.info()),
+            Request::GetConfiguration => Reply::Configuration {
                 version: Configuration::VERSION,
                 origin: self.configuration_origin,
                 configuration: self.configuration,
-            }),
-            Request::SetConfiguration { version, configuration } => {
-                self.set_configuration(version, configuration)
-            }
-            Request::GetCalibration => Ok(Reply::Calibration {
+            },
+            Request::GetCalibration => Reply::Calibration {
                 version: Calibration::VERSION,
                 origin: self.calibration_origin,
                 state: self.calibration_state,
                 calibration: self.calibration.clone(),
-            }),
-            Request::Calibrate(what) => self.calibrate(what),
-            Request::Log { after } => Ok(Reply::Log(self.log.page(after))),
-            Request::Counters => Ok(Reply::Counters(AllCounters { pipeline: *counters, lines: self.lines })),
-            Request::WeightsBegin { length } => self.weights_begin(length),
-            Request::WeightsBlock { offset, bytes } => self.weights_block(offset, &bytes),
+            },
+            Request::Log { after } => Reply::Log(self.log.page(*after)),
+            Request::Counters => {
+                let lines = LineCounters { service_errors: self.service_errors, ..counters.lines };
+                Reply::Counters(AllCounters { lines, ..*counters })
+            }
+            _ => return None,
+        })
+    }
+
+    /// Does what is asked.
+    #[inline(never)]
+    fn act(&mut self, request: &Request) -> Result<(), Refusal> {
+        match request {
+            Request::SetConfiguration { version, configuration } => {
+                self.set_configuration(*version, configuration)
+            }
+            Request::Calibrate(what) => self.calibrate(*what),
+            Request::WeightsBegin { length } => self.weights_begin(*length),
+            Request::WeightsBlock { offset, bytes } => self.weights_block(*offset, bytes),
             Request::WeightsVerify => self.weights_verify(),
             Request::WeightsActivate => self.weights_activate(),
             Request::Restart => {
                 self.restart = true;
-                Ok(Reply::Done)
+                Ok(())
             }
-        };
-        answer.unwrap_or_else(Reply::Refused)
+            Request::Info
+            | Request::GetConfiguration
+            | Request::GetCalibration
+            | Request::Log { .. }
+            | Request::Counters => Ok(()),
+        }
     }
 
     fn note(&mut self, kind: EventKind) {
@@ -272,25 +311,22 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.store.as_mut().ok_or(StoreError::NoFlash)
     }
 
-    fn set_configuration(&mut self, found: u8, configuration: Configuration) -> Result<Reply, Refusal> {
+    fn set_configuration(&mut self, found: u8, configuration: &Configuration) -> Result<(), Refusal> {
         let expected = Configuration::VERSION;
         if found != expected {
             return Err(Refusal::Version { found, expected });
         }
         // Where nothing can be stored, a bad value is named all the same.
         configuration.check().map_err(StoreError::from)?;
-        self.drivable(Some(configuration))?;
-        self.store()?.set(&configuration)?;
+        self.drivable(configuration)?;
+        self.store()?.set(configuration)?;
         self.note(EventKind::ConfigurationStored);
-        Ok(Reply::Done)
+        Ok(())
     }
 
-    fn calibrate(&mut self, what: Calibrate) -> Result<Reply, Refusal> {
+    fn calibrate(&mut self, what: Calibrate) -> Result<(), Refusal> {
         match what {
-            Calibrate::Start(task) => {
-                self.calibrator = Some(Calibrator::new(task, self.configuration.static_init));
-                self.calibration_state = State::Running(task);
-            }
+            Calibrate::Start(task) => self.start_calibration(task),
             Calibrate::Cancel => {
                 self.calibrator = None;
                 self.calibration_state = State::Idle;
@@ -299,14 +335,20 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 if !matches!(self.calibration_state, State::Found(_)) {
                     return Err(Refusal::NothingFound);
                 }
-                let calibration = self.calibration.clone();
-                self.store()?.set(&calibration)?;
+                let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
+                store.set(&self.calibration)?;
                 self.calibration_origin = Origin::Stored;
                 self.calibration_state = State::Idle;
                 self.note(EventKind::CalibrationStored);
             }
         }
-        Ok(Reply::Done)
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn start_calibration(&mut self, task: Task) {
+        self.calibrator = Some(Calibrator::new(task, self.configuration.static_init));
+        self.calibration_state = State::Running(task);
     }
 
     /// The slot that the network does not run on.
@@ -318,16 +360,16 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    fn weights_begin(&mut self, length: u32) -> Result<Reply, Refusal> {
+    fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
         let slot = self.unused_slot();
         self.uploading = None;
         let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
         let upload = Upload::begin(flash, slot, length)?;
         self.uploading = Some(Uploading { upload, checked: None });
-        self.progress()
+        Ok(())
     }
 
-    fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<Reply, Refusal> {
+    fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
         let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
         // Every block but the last one is full, so a block that is there already ends where the
@@ -335,27 +377,25 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let written = uploading.upload.written();
         let repeated = bytes.len() <= BLOCK && offset.checked_add(bytes.len() as u32) == Some(written);
         if repeated {
-            return self.progress();
+            return Ok(());
         }
-        match uploading.upload.block(flash, offset, bytes) {
-            Ok(()) => self.progress(),
-            Err(error) => {
-                if let SlotError::Flash(_) = error {
-                    self.uploading = None;
-                }
-                Err(error.into())
+        uploading.upload.block(flash, offset, bytes).map_err(|error| {
+            if let SlotError::Flash(_) = error {
+                self.uploading = None;
             }
-        }
+            error.into()
+        })
     }
 
-    fn weights_verify(&mut self) -> Result<Reply, Refusal> {
+    #[inline(never)]
+    fn weights_verify(&mut self) -> Result<(), Refusal> {
         let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
         uploading.checked = Some(uploading.upload.verify(flash.slots())?);
-        self.progress()
+        Ok(())
     }
 
-    fn weights_activate(&mut self) -> Result<Reply, Refusal> {
+    fn weights_activate(&mut self) -> Result<(), Refusal> {
         let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
         let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
         let accepted = self.accepted.with(upload.slot(), file);
@@ -363,11 +403,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.accepted = accepted;
         self.uploading = None;
         self.note(EventKind::WeightsAccepted(upload.slot()));
-        Ok(Reply::Done)
-    }
-
-    fn progress(&self) -> Result<Reply, Refusal> {
-        let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
-        Ok(Reply::Weights { slot: upload.slot(), written: upload.written(), checked })
+        Ok(())
     }
 }

@@ -86,6 +86,8 @@ pub enum EventKind {
     Calibrated(Option<CalibrationFault>),
     /// The file in a slot was accepted.
     WeightsAccepted(Slot),
+    /// The weights in use no longer fit their checksum: the network is off.
+    WeightsDamaged,
 }
 
 /// Something that happened.

@@ -88,6 +88,7 @@ impl Deframer {
         }
     }
 
+    #[inline(never)]
     fn finish<M: DeserializeOwned>(&mut self, byte: u8) -> Result<(u8, M), FrameError> {
         if let Some(error) = self.failed {
             return Err(error);
@@ -114,6 +115,7 @@ impl Default for Deframer {
 }
 
 /// A message as a frame; `None` when it is longer than [`MAX_MESSAGE`].
+#[inline(never)]
 pub fn emit<M: Serialize>(number: u8, message: &M) -> Option<Frame> {
     let mut content = [0; MAX_CONTENT];
     let (first, rest) = content.split_first_mut()?;

@@ -2,14 +2,14 @@
 
 use super::calibrate::{State, Task};
 use super::event::{Crash, LogPage, ResetCause};
-use crate::health::{Counters, Status};
+use crate::health::{Counters, Status, WatchCounters};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Calibration, Configuration, Slot, StoreError};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Of the messages; raised when one changes.
-pub const PROTOCOL: u8 = 1;
+pub const PROTOCOL: u8 = 2;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -57,6 +57,14 @@ pub enum Request {
     WeightsActivate,
     /// Reset.
     Restart,
+}
+
+impl Request {
+    /// Whether it brings a weight file, and is answered by how much of it is there.
+    #[must_use]
+    pub const fn uploads(&self) -> bool {
+        matches!(self, Self::WeightsBegin { .. } | Self::WeightsBlock { .. } | Self::WeightsVerify)
+    }
 }
 
 /// What to do about the calibration.
@@ -184,6 +192,8 @@ pub struct Identity {
     pub device_id: Option<u32>,
     /// Of the processor, Hz.
     pub clock_hz: u32,
+    /// Whether the CAN controller is up; else frames go out as SLCAN alone.
+    pub can: bool,
     /// Why it has started.
     pub reset: ResetCause,
     /// Its last crash since power came on.
@@ -192,8 +202,14 @@ pub struct Identity {
 
 impl Identity {
     /// Before anything is known.
-    pub const UNKNOWN: Self =
-        Self { firmware: [0; 3], device_id: None, clock_hz: 0, reset: ResetCause::Unknown, crash: None };
+    pub const UNKNOWN: Self = Self {
+        firmware: [0; 3],
+        device_id: None,
+        clock_hz: 0,
+        can: false,
+        reset: ResetCause::Unknown,
+        crash: None,
+    };
 }
 
 /// State of the flash.
@@ -239,6 +255,8 @@ pub struct Info {
 pub struct AllCounters {
     /// Of the pipeline.
     pub pipeline: Counters,
+    /// Of the watch over the sensor.
+    pub watch: WatchCounters,
     /// Of the lines.
     pub lines: LineCounters,
 }
@@ -250,11 +268,19 @@ pub struct LineCounters {
     pub sensor_errors: u32,
     /// Frames that the SLCAN line did not take.
     pub unsent: u32,
+    /// Bytes of the sensor and SLCAN lines that came damaged, or too fast.
+    pub line_errors: u32,
+    /// Bytes that had to wait because a line's queue was full: what comes meanwhile is lost, where
+    /// the line cannot be made to wait.
+    pub held: u32,
+    /// Windows and notes for which a task of lower priority had no time.
+    pub overruns: u32,
     /// Service frames that were none.
     pub service_errors: u32,
 }
 
 impl LineCounters {
     /// Nothing yet.
-    pub const NONE: Self = Self { sensor_errors: 0, unsent: 0, service_errors: 0 };
+    pub const NONE: Self =
+        Self { sensor_errors: 0, unsent: 0, line_errors: 0, held: 0, overruns: 0, service_errors: 0 };
 }

@@ -55,22 +55,24 @@ struct Raw {
 }
 
 impl Raw {
+    const EMPTY: Self = Self { words: [0; BUFFER], len: 0 };
+
     const fn size(len: usize) -> usize {
         2 * WORD + len.next_multiple_of(WORD)
     }
 
-    fn encode<R: Record>(record: &R) -> Option<Self> {
-        let mut raw = Self { words: [0xFF; BUFFER], len: 0 };
-        let (first, rest) = raw.words.split_first_chunk_mut::<WORD>()?;
+    /// `None` when it does not fit.
+    fn encode<R: Record>(&mut self, record: &R) -> Option<()> {
+        let (first, rest) = self.words.split_first_chunk_mut::<WORD>()?;
         let len = postcard::to_slice(record, rest.get_mut(..MAX_LEN)?).ok()?.len();
         // The encoder may leave things behind its end.
         rest.get_mut(len..)?.fill(0xFF);
         let [low, high] = u16::try_from(len).ok()?.to_le_bytes();
         *first = [R::KEY, R::VERSION, low, high];
-        raw.len = len;
-        let crc = CRC.checksum(raw.bytes().get(..Self::size(len) - WORD)?);
-        *raw.words.get_mut(..Self::size(len))?.last_chunk_mut()? = crc.to_le_bytes();
-        Some(raw)
+        self.len = len;
+        let crc = CRC.checksum(self.bytes().get(..Self::size(len) - WORD)?);
+        *self.words.get_mut(..Self::size(len))?.last_chunk_mut()? = crc.to_le_bytes();
+        Some(())
     }
 
     fn bytes(&self) -> &[u8] {
@@ -141,7 +143,8 @@ impl<F: NorFlash> Store<F> {
         }
         if store.current.is_some() {
             // The last key that there is none of: the walk goes to the end.
-            store.find(0)?;
+            let mut nothing = Raw::EMPTY;
+            store.find(0, &mut nothing)?;
         }
         Ok(store)
     }
@@ -158,25 +161,34 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// [`StoreError`]: nothing that is not whole and inside its ranges is returned.
     pub fn get<R: Record>(&mut self) -> Result<Option<R>, StoreError> {
-        self.find(R::KEY)?.map(|raw| raw.decode()).transpose()
+        let mut raw = Raw::EMPTY;
+        if self.find(R::KEY, &mut raw)? { raw.decode().map(Some) } else { Ok(None) }
     }
 
     /// Stores a record and reads it back; until it is whole the one before stays.
     ///
     /// # Errors
     /// [`StoreError::Field`] for a value out of its range: nothing is written then.
+    #[inline(never)]
     pub fn set<R: Record>(&mut self, record: &R) -> Result<(), StoreError> {
         record.check()?;
-        let raw = Raw::encode(record).ok_or(StoreError::Full)?;
+        let mut raw = Raw::EMPTY;
+        raw.encode(record).ok_or(StoreError::Full)?;
+        self.write(&raw)
+    }
+
+    /// Apart from [`Store::set`], which there is one of for each kind of record.
+    #[inline(never)]
+    fn write(&mut self, raw: &Raw) -> Result<(), StoreError> {
         let appended = match (self.current, self.free) {
-            (Some((sector, _)), Some(at)) => self.append(sector, at, &raw)?,
+            (Some((sector, _)), Some(at)) => self.append(sector, at, raw)?,
             _ => None,
         };
         if appended.is_none() {
-            self.change_sector(&raw)?;
+            self.change_sector(raw)?;
         }
-        let stored = self.find(R::KEY)?;
-        if stored.is_some_and(|stored| stored.bytes() == raw.bytes()) {
+        let mut stored = Raw::EMPTY;
+        if self.find(raw.key(), &mut stored)? && stored.bytes() == raw.bytes() {
             Ok(())
         } else {
             Err(StoreError::Flash(FlashFault::Refused))
@@ -222,12 +234,14 @@ impl<F: NorFlash> Store<F> {
         Ok(Place::Record)
     }
 
-    /// The newest whole record of a key; learns where the next one goes.
-    fn find(&mut self, key: u8) -> Result<Option<Raw>, StoreError> {
-        let Some((sector, _)) = self.current else { return Ok(None) };
+    /// Puts the newest whole record of a key into `newest`; whether there is one. Learns where the
+    /// next one goes.
+    #[inline(never)]
+    fn find(&mut self, key: u8, newest: &mut Raw) -> Result<bool, StoreError> {
+        let Some((sector, _)) = self.current else { return Ok(false) };
         let mut at = self.range(sector).start + HEADER;
-        let mut raw = Raw { words: [0; BUFFER], len: 0 };
-        let mut found = None;
+        let mut raw = Raw::EMPTY;
+        let mut found = false;
         self.damaged = false;
         loop {
             // Each turn goes on by a record's length, of two words at least.
@@ -237,7 +251,8 @@ impl<F: NorFlash> Store<F> {
                     if !raw.is_whole() {
                         self.damaged = true;
                     } else if raw.key() == key {
-                        found = Some(raw);
+                        *newest = raw;
+                        found = true;
                     }
                 }
                 // Nothing is put behind what may be half a record.
@@ -265,6 +280,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Starts the other sector with the newest record of each key, the given one among them.
+    #[inline(never)]
     fn change_sector(&mut self, newest: &Raw) -> Result<(), StoreError> {
         let (sector, generation) = match self.current {
             Some((sector, generation)) => (1 - sector, generation.wrapping_add(1)),
@@ -273,8 +289,9 @@ impl<F: NorFlash> Store<F> {
         let Range { start, end } = self.range(sector);
         self.flash.erase(start, end).map_err(fault)?;
         let mut at = start + HEADER;
+        let mut raw = Raw::EMPTY;
         for key in (1..=MAX_KEY).filter(|key| *key != newest.key()) {
-            if let Some(raw) = self.find(key)? {
+            if self.find(key, &mut raw)? {
                 at = self.append(sector, at, &raw)?.ok_or(StoreError::Full)?;
             }
         }

@@ -31,7 +31,9 @@ pub struct Flash {
 impl Flash {
     /// The controller, if there is one: after a reset it is locked, and the emulator's nothing
     /// reads as not locked.
-    pub fn probe(registers: pac::FLASH) -> Option<Self> {
+    pub fn probe() -> Option<Self> {
+        // SAFETY: the clock tree is done with it, and this is called once.
+        let registers = unsafe { pac::FLASH::steal() };
         let locked = registers.cr().read().lock().bit_is_set();
         locked.then(|| Self { registers: RefCell::new(registers) })
     }

@@ -1,16 +1,24 @@
-//! The coprocessor's firmware, first form: MTData2 bytes on USART1, SLCAN on USART2.
-//!
-//! It runs the library's pipeline on the reset clock (16 MHz) with its own wiring only: clock
-//! tree, CAN peripheral, watchdog and priorities are not in it yet. Both lines receive by
-//! interrupt into queues; the main loop does everything else in turn, and waits for nothing.
+//! The coprocessor's firmware for the STM32F405: sensor bytes in, CAN frames out.
 //!
 //! | pin | function |
 //! |---|---|
-//! | PA10 | USART1 RX, 115200 8N1, Xsens MTi |
+//! | PA10 (PA9) | USART1 RX (TX), 115200 8N1, Xsens MTi |
 //! | PA2, PA3 | USART2 TX, RX, 921600 8N1, SLCAN |
 //! | PC6, PC7 | USART6 TX, RX, 115200 8N1, service line |
+//! | PB8, PB9 | CAN1 RX, TX, 500 kbit/s |
 //!
-//! A crash leaves its reason in RAM and resets.
+//! # What runs when
+//! | priority | task | when | what |
+//! |---|---|---|---|
+//! | 4 | `imu_line`, `tick` | a byte, 1 ms | a byte into its queue; board time |
+//! | 3 | `slcan_line`, `service_line`, `can_frames` | a byte, a frame | into and out of their queues |
+//! | 2 | `output` | pended by both | samples, pipeline, frames, watchdog |
+//! | 1 | `window` | pended by `output` | GyroNet |
+//! | 0 | `idle` | the rest | service line, weights against their checksum |
+//!
+//! Tasks hand things over in queues of fixed length; what does not fit is counted. An estimate is
+//! used two samples after its window, so when it was ready changes no frame; see `output.rs` for
+//! one that is late. A crash leaves its reason in RAM and resets.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -21,204 +29,156 @@ fn main() {
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
+mod bus;
+#[cfg(target_os = "none")]
+mod clock;
+#[cfg(target_os = "none")]
 mod crash;
 #[cfg(target_os = "none")]
 mod flash;
-
 #[cfg(target_os = "none")]
-mod firmware {
-    use crate::board::Board;
-    use crate::flash::{Flash, Records, Slots};
-    use embedded_io::{Write, WriteReady};
-    use gyronet::can::config::Config;
-    use gyronet::can::feeds::Feeds;
-    use gyronet::can::slcan::port::Port;
-    use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-    use gyronet::health::{Faults, count};
-    use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
-    use gyronet::pipeline::Pipeline;
-    use gyronet::sample::ImuSample;
-    use gyronet::sensor::xsens::Mti;
-    use gyronet::service::Device;
-    use gyronet::service::frame::Frame;
-    use gyronet::service::message::Identity;
-    use gyronet::store::ImuPart;
-    use gyronet::units::Micros;
+mod idle;
+#[cfg(target_os = "none")]
+mod output;
+#[cfg(target_os = "none")]
+mod queue;
+#[cfg(target_os = "none")]
+mod serial;
+#[cfg(target_os = "none")]
+mod start;
+#[cfg(target_os = "none")]
+mod watchdog;
 
-    /// What the image drives.
-    const PARTS: &[ImuPart] = &[ImuPart::XsensMti];
-    /// Bytes of the service line that are looked at before the sensor has its turn again.
-    const SERVICE_TURN: usize = 16;
-    /// Frames that may wait for the line: what older ones say is of no use to anybody.
-    const QUEUE: usize = 32;
+/// Vector and priority of each task below: RTIC has them in instructions alone, the bound of the
+/// stack wants them as data. A test holds them against the running image.
+#[cfg(target_os = "none")]
+#[allow(unsafe_code, reason = "a section that is not loaded")]
+#[used]
+#[unsafe(link_section = ".priorities")]
+static PRIORITIES: [[u8; 2]; 7] = {
+    use stm32f4::stm32f405::Interrupt;
+    const SYSTICK: u8 = 15;
+    const FIRST: u8 = 16;
+    [
+        [FIRST + Interrupt::USART1 as u8, 4],
+        [SYSTICK, 4],
+        [FIRST + Interrupt::USART2 as u8, 3],
+        [FIRST + Interrupt::USART6 as u8, 3],
+        [FIRST + Interrupt::CAN1_RX0 as u8, 3],
+        [FIRST + Interrupt::UART4 as u8, 2],
+        [FIRST + Interrupt::UART5 as u8, 1],
+    ]
+};
 
-    /// Its methods are not inlined: what each needs of the stack is given back when it ends.
-    struct Coprocessor {
-        device: &'static mut Device<Records, Slots>,
-        /// An answer on its way out, and how much of it is.
-        answer: Option<(Frame, usize)>,
-        network: &'static mut Option<GyroNet<'static>>,
-        pipeline: &'static mut Pipeline,
-        feeds: Feeds,
-        port: Port<QUEUE>,
-        /// Frames dropped when the last sample was sent.
-        dropped: u32,
-        wheels: Option<WheelReceiver>,
-        /// A wheel frame has come; a vehicle that sends none is not at fault.
-        wheels_heard: bool,
-        /// Time stamp of the newest sample: the only clock there is.
-        now: Micros,
+// The vectors of UART4 and UART5, which this board does not use, are pended by hand.
+#[cfg(target_os = "none")]
+#[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
+#[rtic::app(device = stm32f4::stm32f405, peripherals = true)]
+mod app {
+    use crate::idle::Idle;
+    use crate::output::{FRAMES, Output, WindowTask};
+    use crate::{board, bus, clock, serial, start};
+    use core::mem::MaybeUninit;
+    use gyronet::health::supervisor::Task;
+    use gyronet::model::GyroNet;
+    use gyronet::service::message::AllCounters;
+    use stm32f4::stm32f405::Interrupt;
+
+    /// What idle tells of, and what it has found out.
+    #[shared]
+    struct Shared {
+        counters: AllCounters,
+        weights_damaged: bool,
     }
 
-    impl Coprocessor {
-        #[inline(never)]
-        fn process(&mut self, sample: ImuSample) {
-            self.now = sample.time;
-            if let (true, Some(wheels)) = (self.wheels_heard, self.wheels.as_mut()) {
-                self.pipeline.wheels(wheels.poll(sample.time));
-            }
-            // What has no place in time is counted and gives no frame.
-            let Ok(output) = self.pipeline.process(sample) else { return };
-            self.device.observe(&sample, output.prompt.tick, output.prompt.status);
-            let mut vehicle = output.vehicle;
-            vehicle.yaw.faults = vehicle.yaw.faults.with(self.faults());
-            for frame in &self.feeds.process(&vehicle) {
-                self.port.push(*frame, sample.time);
-            }
-            if let (Some(due), Some(network)) = (output.window, self.network.as_mut()) {
-                self.pipeline.deliver(due.end, network.estimate(&due.features));
-            }
-        }
-
-        /// What the pipeline cannot know.
-        fn faults(&mut self) -> Faults {
-            let dropped = self.port.dropped();
-            self.device.lines.unsent = dropped;
-            let bus = core::mem::replace(&mut self.dropped, dropped) < dropped;
-            let bus = if bus { Faults::BUS } else { Faults::NONE };
-            if self.network.is_none() { bus.with(Faults::WEIGHTS) } else { bus }
-        }
-
-        #[inline(never)]
-        fn service(&mut self, board: &mut Board) {
-            let Self { port, wheels, wheels_heard, now, .. } = self;
-            // A byte that the line lost is answered as a bad line, or missing in it.
-            let _ = port.service(&mut board.slcan, |frame| {
-                if let Some(Some(Ok(_))) = wheels.as_mut().map(|wheels| wheels.process(&frame, *now)) {
-                    *wheels_heard = true;
-                }
-            });
-        }
+    #[local]
+    struct Local {
+        imu: serial::Handler<{ board::IMU_QUEUE }>,
+        slcan: serial::Handler<{ board::SLCAN_QUEUE }>,
+        service: serial::Handler<{ board::SERVICE_QUEUE }>,
+        can: Option<bus::Receiver>,
+        sender: &'static mut Output,
+        network: WindowTask,
+        rest: &'static mut Idle,
     }
 
-    impl Coprocessor {
-        #[inline(never)]
-        fn new(
-            device: &'static mut Device<Records, Slots>,
-            network: &'static mut Option<GyroNet<'static>>,
-            pipeline: &'static mut Pipeline,
-        ) -> Self {
-            // What is stored has been checked.
-            let config = Config::new(device.configuration().can).unwrap_or(Config::DEFAULT);
-            Self {
-                device,
-                answer: None,
-                network,
-                pipeline,
-                feeds: Feeds::new(config),
-                port: Port::new(config.settings().bits_per_second),
-                dropped: 0,
-                wheels: WheelReceiver::new(WheelSettings::TOYOTA).ok(),
-                wheels_heard: false,
-                now: Micros(0),
-            }
-        }
+    #[init(local = [
+        network_place: MaybeUninit<GyroNet<'static>> = MaybeUninit::uninit(),
+        sender_place: MaybeUninit<Output> = MaybeUninit::uninit(),
+        rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
+        let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
+        let start::Parts { output, weights, device } = parts;
+        let network = weights.map(|blob| start::place(cx.local.network_place, || GyroNet::new(blob)));
+        let network = WindowTask { network };
+        let service = board.service;
+        let ports = (board.imu, board.slcan, board.can);
+        let sender =
+            start::place(cx.local.sender_place, || output.connect(ports, board.time, board.watchdog));
+        let rest = start::place(cx.local.rest_place, || Idle::new(device, service));
+        let board::Handlers { imu, slcan, service, can } = handlers;
+        let shared = Shared { counters: AllCounters::default(), weights_damaged: false };
+        (shared, Local { imu, slcan, service, can, sender, network, rest })
+    }
 
-        /// The service line's turn: the answer on its way, then the next question.
-        #[inline(never)]
-        fn answer(&mut self, board: &mut Board) {
-            if let Some((frame, sent)) = self.answer.as_mut() {
-                while let Some(rest) = frame.get(*sent..).filter(|rest| !rest.is_empty()) {
-                    let Ok(true) = board.service.write_ready() else { return };
-                    let Ok(len) = board.service.write(rest) else { return };
-                    *sent += len;
-                }
-                self.answer = None;
-                if self.device.restart_wanted() {
-                    // Bounded; an answer that does not get out keeps nobody from starting anew.
-                    let _ = board.service.flush();
-                    cortex_m::peripheral::SCB::sys_reset();
-                }
-            }
-            for _ in 0..SERVICE_TURN {
-                let Some(byte) = board.service.receive() else { return };
-                self.answer = self.device.push(byte, self.pipeline.counters()).map(|frame| (frame, 0));
-                if self.answer.is_some() {
-                    return;
-                }
-            }
+    #[task(binds = USART1, priority = 4, local = [imu])]
+    fn imu_line(cx: imu_line::Context) {
+        cx.local.imu.serve();
+        rtic::pend(Interrupt::UART4);
+    }
+
+    #[task(binds = SysTick, priority = 4)]
+    fn tick(_: tick::Context) {
+        clock::tick();
+        board::SUPERVISOR.report(Task::Tick);
+        rtic::pend(Interrupt::UART4);
+    }
+
+    #[task(binds = USART2, priority = 3, local = [slcan])]
+    fn slcan_line(cx: slcan_line::Context) {
+        cx.local.slcan.serve();
+    }
+
+    #[task(binds = USART6, priority = 3, local = [service])]
+    fn service_line(cx: service_line::Context) {
+        cx.local.service.serve();
+    }
+
+    #[task(binds = CAN1_RX0, priority = 3, local = [can])]
+    fn can_frames(cx: can_frames::Context) {
+        let Some(receiver) = cx.local.can else { return };
+        while let Some((frame, _lost)) = receiver.receive() {
+            // A wheel's speed that finds no room is followed by a newer one.
+            let _ = frame.map(|frame| FRAMES.push(frame));
         }
     }
 
-    /// What is stored, and the weights that are good. Without any the pipeline still runs: every
-    /// window is late, the status says degraded, and the rate is the gyro's less its static bias.
-    #[inline(never)]
-    fn device(identity: Identity, flash: Option<Flash>) -> Option<Loaded> {
-        let flash = match flash {
-            Some(flash) => Some(&*cortex_m::singleton!(: Flash = flash)?),
-            None => None,
-        };
-        let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(PARTS) })?;
-        device.begin(flash.map(Records), flash.map(Slots), identity);
-        let blob = device.weights(flash.map(Flash::slots_at_start), &weights::DEFAULT.0);
-        Some((device, blob))
+    #[task(binds = UART4, priority = 2, local = [sender], shared = [counters, weights_damaged])]
+    fn output(cx: output::Context) {
+        (cx.shared.counters, cx.shared.weights_damaged)
+            .lock(|counters, damaged| cx.local.sender.turn(counters, *damaged));
+        rtic::pend(Interrupt::UART5);
     }
 
-    type Loaded = (&'static mut Device<Records, Slots>, Option<Blob<'static>>);
-
-    /// Everything that the image keeps, outside the stack; `None` when it has been made before.
-    #[inline(never)]
-    fn coprocessor(identity: Identity, flash: Option<Flash>) -> Option<&'static mut Coprocessor> {
-        let (device, blob) = device(identity, flash)?;
-        let network = cortex_m::singleton!(: Option<GyroNet<'static>> = None)?;
-        if let Some(blob) = blob {
-            place(network, || GyroNet::new(blob));
+    #[task(binds = UART5, priority = 1, local = [network])]
+    fn window(cx: window::Context) {
+        if cx.local.network.run() {
+            rtic::pend(Interrupt::UART4);
         }
-        let config = device.configuration().pipeline(device.calibration());
-        let pipeline = cortex_m::singleton!(: Option<Pipeline> = None)?;
-        let pipeline = place(pipeline, || Pipeline::new(config));
-        let coprocessor = cortex_m::singleton!(: Option<Coprocessor> = None)?;
-        Some(place(coprocessor, || Coprocessor::new(device, network, pipeline)))
+        board::SUPERVISOR.report(Task::Window);
     }
 
-    /// Makes a value where it stays; what that takes of the stack is given back.
-    #[inline(never)]
-    fn place<T>(slot: &mut Option<T>, make: impl FnOnce() -> T) -> &mut T {
-        slot.insert(make())
-    }
-
-    #[cortex_m_rt::entry]
-    fn main() -> ! {
-        let mut board = loop {
-            // The peripherals are there after a reset; a second entry cannot happen.
-            if let Some(board) = Board::new() {
-                break board;
-            }
-        };
-        let (identity, flash) = (board.identity, board.flash.take());
-        let Some(coprocessor) = coprocessor(identity, flash) else { cortex_m::peripheral::SCB::sys_reset() };
-        let mut mti = Mti::new();
+    #[idle(local = [rest], shared = [counters, weights_damaged])]
+    fn idle(mut cx: idle::Context) -> ! {
         loop {
-            coprocessor.service(&mut board);
-            coprocessor.answer(&mut board);
-            let Some(byte) = board.imu.receive() else { continue };
-            mti.push(byte);
-            while let Some(sample) = mti.next_sample() {
-                match sample {
-                    Ok(sample) => coprocessor.process(sample),
-                    Err(_) => count(&mut coprocessor.device.lines.sensor_errors, 1),
-                }
+            let counters = cx.shared.counters.lock(|counters| *counters);
+            let damaged = cx.local.rest.turn(&counters);
+            if damaged {
+                cx.shared.weights_damaged.lock(|known| *known = true);
             }
+            board::SUPERVISOR.report(Task::Idle);
         }
     }
 }

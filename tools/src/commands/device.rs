@@ -147,6 +147,7 @@ fn print_info(info: &Info) {
         None => println!("part          does not say (the emulator)"),
     }
     println!("clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6);
+    println!("bus           {}", if identity.can { "CAN, SLCAN" } else { "SLCAN alone" });
     println!("started by    {:?}", identity.reset);
     if let Some(crash) = identity.crash {
         println!(

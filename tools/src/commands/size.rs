@@ -2,14 +2,14 @@
 
 use super::Common;
 use gyronet_tools::image_size::ImageSize;
-use gyronet_tools::image_stack::ImageStack;
+use gyronet_tools::image_stack::{Handler, ImageStack, Way};
 use gyronet_tools::target_bench;
 use std::path::PathBuf;
 
 /// Measures flash, static RAM and the worst stack of the firmware image against their budgets.
 ///
-/// The stack is an upper bound from the machine code: every handler interrupting every other
-/// one. Exit status 1 when a budget is exceeded.
+/// The stack is an upper bound from the machine code: handlers of all priorities, one inside the
+/// other. Exit status 1 when a budget is exceeded.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Measure this ELF file; else the image is built.
@@ -39,26 +39,36 @@ pub fn run(args: &Args, _common: Common) -> super::Result {
         let rows = rows().map(|((name, bytes), budget)| {
             (name.to_owned(), serde_json::json!({ "bytes": bytes, "budget": budget }))
         });
-        let deepest: Vec<_> =
-            stack.deepest.iter().map(|(name, own)| serde_json::json!([name, own])).collect();
+        let handlers = stack.handlers.iter().map(|handler| {
+            serde_json::json!({ "priority": handler.priority, "bytes": handler.bytes, "deepest": handler.deepest })
+        });
         let mut json = serde_json::Value::Object(rows.collect());
-        json["stack_main"] = stack.main.into();
-        json["stack_handlers"] = stack.handlers.into();
+        json["stack_start"] = serde_json::json!({ "bytes": stack.start, "deepest": stack.deepest });
+        json["stack_main"] = serde_json::json!({ "bytes": stack.main, "deepest": stack.deepest_main });
+        json["stack_handlers"] = handlers.collect();
         json["indirect_calls"] = stack.indirect_calls.into();
-        json["deepest"] = deepest.into();
         println!("{json:#}");
     } else {
         for ((name, bytes), budget) in rows() {
             println!("{name} bytes={bytes} budget={budget}");
         }
-        println!("stack/main bytes={}", stack.main);
-        println!("stack/handlers bytes={}", stack.handlers);
-        for (name, own) in &stack.deepest {
-            println!("  {own:5} {name}");
+        print("start", stack.start, &stack.deepest);
+        print("main", stack.main, &stack.deepest_main);
+        println!("stack/handlers bytes={}", stack.handlers());
+        for Handler { priority, bytes, deepest } in &stack.handlers {
+            let name = priority.map_or(String::from("fault"), |priority| format!("priority {priority}"));
+            print(&name, *bytes, deepest);
         }
         println!("calls through a register: {}", stack.indirect_calls);
     }
     let over: Vec<_> =
         rows().filter(|((_, bytes), budget)| bytes > budget).map(|((name, _), _)| name).collect();
     if over.is_empty() { Ok(()) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
+}
+
+fn print(name: &str, bytes: u32, deepest: &Way) {
+    println!("stack/{name} bytes={bytes}");
+    for (name, own) in deepest {
+        println!("  {own:5} {name}");
+    }
 }

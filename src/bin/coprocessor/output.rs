@@ -1,0 +1,275 @@
+//! The output task: samples, pipeline, frames. Nothing in it waits.
+//!
+//! An estimate has as many sample periods of board time as the pipeline uses it later, from when its window was handed out. Until
+//! then the next sample's bytes stay in their queue, should they come faster than 100 times a
+//! second (an emulated part sends at the host's pace); after that it is late, which the pipeline
+//! counts and flags.
+
+use crate::board::SUPERVISOR;
+use crate::bus::Bus;
+use crate::clock::BoardTime;
+use crate::idle::{OBSERVATIONS, Observation};
+use crate::queue::Queue;
+use crate::watchdog::Watchdog;
+use crate::{board, serial};
+use gyronet::can::DataFrame;
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
+use gyronet::can::queue::TransmitQueue;
+use gyronet::can::slcan::port::Port;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::guard::Guard;
+use gyronet::health::{Faults, Status, count};
+use gyronet::model::{Estimate, GyroNet, WindowNetwork};
+use gyronet::pipeline::DueWindow;
+use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sensor::xsens::Mti;
+use gyronet::service::message::{AllCounters, LineCounters};
+use gyronet::units::Micros;
+use gyronet::vehicle::VehicleSample;
+
+/// Frames that may wait for a line: what older ones say is of no use to anybody.
+const QUEUE: usize = 32;
+/// Bytes of the sensor in one turn: all that can wait.
+const TURN: usize = board::IMU_QUEUE;
+
+/// Frames that the bus has brought.
+pub static FRAMES: Queue<DataFrame, 16> = Queue::new();
+/// The window that is due, until it has been run.
+static WINDOWS: Queue<DueWindow, 1> = Queue::new();
+/// Its estimate.
+static ESTIMATES: Queue<(u32, Estimate), 1> = Queue::new();
+
+/// The network's task.
+pub struct WindowTask {
+    pub network: Option<&'static mut GyroNet<'static>>,
+}
+
+impl WindowTask {
+    /// Runs the window that is due; whether there was one. It stays in its queue while it runs,
+    /// so that no second one is handed over; but not when its estimate is out, since the output
+    /// task may come in between and have the next one.
+    pub fn run(&mut self) -> bool {
+        let Some(due) = WINDOWS.peek() else { return false };
+        let (end, network) = (due.end, self.network.as_mut());
+        let estimate = network.map(|network| network.estimate(&due.features));
+        let _ = WINDOWS.pop();
+        // There is room: the estimate before was taken.
+        estimate.is_some_and(|estimate| ESTIMATES.push((end, estimate)))
+    }
+}
+
+/// A window that was handed out.
+struct Out {
+    end: u32,
+    until: u64,
+}
+
+/// Everything that the output task owns, but its lines.
+pub struct Unconnected {
+    pub guard: &'static mut Guard,
+    pub config: Config,
+    pub wheels: Option<WheelSettings>,
+    pub has_network: bool,
+    /// Samples from a window's newest one to the one that its estimate is used with.
+    pub delay: u32,
+}
+
+/// The output task.
+pub struct Output {
+    imu: ImuPort,
+    mti: Mti,
+    guard: &'static mut Guard,
+    has_network: bool,
+    delay: u32,
+    out: Option<Out>,
+    tick: u32,
+    wheels: Option<WheelReceiver>,
+    /// A wheel frame has come; a vehicle that sends none is not at fault.
+    wheels_heard: bool,
+    feeds: Feeds,
+    slcan: SlcanPort,
+    port: Port<QUEUE>,
+    can: Option<Bus>,
+    queue: TransmitQueue<DataFrame, QUEUE>,
+    /// Time stamp of the newest sample.
+    sample_time: Micros,
+    /// When it came, by the board's clock.
+    heard: Micros,
+    time: BoardTime,
+    lines: LineCounters,
+    /// Frames dropped when the last sample was sent.
+    dropped: u32,
+    watchdog: Watchdog,
+}
+
+type ImuPort = serial::Port<{ board::IMU_QUEUE }>;
+type SlcanPort = serial::Port<{ board::SLCAN_QUEUE }>;
+type Ports = (ImuPort, SlcanPort, Option<Bus>);
+
+impl Unconnected {
+    #[inline]
+    pub fn connect(self, (imu, slcan, can): Ports, time: BoardTime, watchdog: Watchdog) -> Output {
+        let Self { guard, config, wheels, has_network, delay } = self;
+        Output {
+            imu,
+            mti: Mti::new(),
+            guard,
+            has_network,
+            delay,
+            out: None,
+            tick: 0,
+            wheels: wheels.and_then(|wheels| WheelReceiver::new(wheels).ok()),
+            wheels_heard: false,
+            feeds: Feeds::new(config),
+            slcan,
+            port: Port::new(config.settings().bits_per_second),
+            can,
+            queue: TransmitQueue::new(),
+            sample_time: Micros(0),
+            heard: Micros(0),
+            time,
+            lines: LineCounters::NONE,
+            dropped: 0,
+            watchdog,
+        }
+    }
+}
+
+impl Output {
+    /// Does what there is to do. `weights_damaged`: what idle has found out.
+    #[inline(never)]
+    pub fn turn(&mut self, counters: &mut AllCounters, weights_damaged: bool) {
+        self.has_network &= !weights_damaged;
+        let now = self.time.now();
+        self.frames_in();
+        for _ in 0..TURN {
+            self.take_estimate();
+            if self.must_wait(now) {
+                self.guard.wait(now);
+                break;
+            }
+            let Some(byte) = self.imu.receive() else { break };
+            self.mti.push(byte);
+            while let Some(sample) = self.mti.next_sample() {
+                match sample {
+                    Ok(sample) => {
+                        self.process(sample, now);
+                        self.frames_out();
+                    }
+                    Err(_) => count(&mut self.lines.sensor_errors, 1),
+                }
+            }
+        }
+        if let Some(vehicle) = self.guard.poll(now) {
+            self.silence(vehicle, now);
+        }
+        self.frames_out();
+        let watch = *self.guard.counters();
+        *counters = AllCounters { pipeline: *self.guard.pipeline().counters(), watch, lines: self.lines };
+        if SUPERVISOR.complete() {
+            self.watchdog.feed();
+        }
+    }
+
+    fn take_estimate(&mut self) {
+        while let Some((end, estimate)) = ESTIMATES.pop() {
+            if self.has_network {
+                self.guard.pipeline().deliver(end, estimate);
+            }
+            self.out.take_if(|out| out.end == end);
+        }
+    }
+
+    /// Whether the next sample is the one that wants the estimate, which is not late yet.
+    fn must_wait(&self, now: Micros) -> bool {
+        let wanted = |out: &Out| self.tick.wrapping_sub(out.end) + 1 >= self.delay && now.0 < out.until;
+        self.out.as_ref().is_some_and(wanted)
+    }
+
+    #[inline(never)]
+    fn process(&mut self, sample: ImuSample, now: Micros) {
+        self.sample_time = sample.time;
+        if let (true, Some(wheels)) = (self.wheels_heard, self.wheels.as_mut()) {
+            self.guard.wheels(wheels.poll(sample.time));
+        }
+        // What has no place in time is counted and gives no frame.
+        let Ok(output) = &self.guard.process(sample, now) else { return };
+        self.heard = now;
+        self.tick = output.prompt.tick;
+        self.send(output.vehicle, sample.time);
+        self.hand_out(output.window.as_ref(), now);
+        self.note(Some(sample), self.tick, output.prompt.status);
+    }
+
+    /// The sensor says nothing: that is told by its own time, as far as it is known.
+    fn silence(&mut self, vehicle: VehicleSample, now: Micros) {
+        let time = Micros(self.sample_time.0 + now.0.saturating_sub(self.heard.0));
+        self.send(vehicle, time);
+        self.note(None, vehicle.tick, Status::Silent);
+    }
+
+    #[inline(never)]
+    fn note(&mut self, sample: Option<ImuSample>, tick: u32, status: Status) {
+        if !OBSERVATIONS.push(Observation { sample, tick, status }) {
+            count(&mut self.lines.overruns, 1);
+        }
+    }
+
+    #[inline(never)]
+    fn send(&mut self, mut vehicle: VehicleSample, time: Micros) {
+        vehicle.yaw.faults = vehicle.yaw.faults.with(self.faults());
+        for frame in &self.feeds.process::<DataFrame>(&vehicle) {
+            self.port.push(*frame, time);
+            if self.can.is_some() {
+                self.queue.push(*frame);
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn hand_out(&mut self, due: Option<&DueWindow>, now: Micros) {
+        let Some(due) = due.filter(|_| self.has_network) else { return };
+        let end = due.end;
+        if WINDOWS.push(*due) {
+            self.out = Some(Out { end, until: now.0 + u64::from(self.delay) * PERIOD_US });
+        } else {
+            // The one before is not done: this one's turn passes, and is counted as late.
+            count(&mut self.lines.overruns, 1);
+        }
+    }
+
+    /// What the pipeline cannot know.
+    fn faults(&mut self) -> Faults {
+        let dropped = self.port.dropped().saturating_add(self.queue.dropped());
+        self.lines.unsent = dropped;
+        let lost = core::mem::replace(&mut self.dropped, dropped) < dropped;
+        let off = self.can.as_ref().is_some_and(Bus::off);
+        let bus = if lost || off { Faults::BUS } else { Faults::NONE };
+        if self.has_network { bus } else { bus.with(Faults::WEIGHTS) }
+    }
+
+    fn frames_in(&mut self) {
+        while let Some(frame) = FRAMES.pop() {
+            let Self { wheels, wheels_heard, sample_time, .. } = self;
+            wheel(wheels, wheels_heard, &frame, *sample_time);
+        }
+    }
+
+    #[inline(never)]
+    fn frames_out(&mut self) {
+        let Self { port, wheels, wheels_heard, sample_time, .. } = self;
+        // A byte that the line lost is answered as a bad line, or missing in it.
+        let _ = port.service(&mut self.slcan, |frame| wheel(wheels, wheels_heard, &frame, *sample_time));
+        if let Some(can) = self.can.as_mut() {
+            self.queue.service(can);
+        }
+        self.lines.line_errors = self.imu.lost().saturating_add(self.slcan.lost());
+        self.lines.held = self.imu.held().saturating_add(self.slcan.held());
+    }
+}
+
+fn wheel(wheels: &mut Option<WheelReceiver>, heard: &mut bool, frame: &DataFrame, now: Micros) {
+    let taken = wheels.as_mut().and_then(|wheels| wheels.process(frame, now));
+    *heard |= matches!(taken, Some(Ok(_)));
+}

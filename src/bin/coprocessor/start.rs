@@ -1,0 +1,61 @@
+//! Makes what the tasks own, where it stays.
+
+use crate::board::Board;
+use crate::flash::{Flash, Records, Slots};
+use crate::idle::Stored;
+use crate::output::Unconnected;
+use core::mem::MaybeUninit;
+use gyronet::can::config::Config;
+use gyronet::can::wheel::WheelSettings;
+use gyronet::guard::Guard;
+use gyronet::model::background::BackgroundCheck;
+use gyronet::model::{Blob, weights};
+use gyronet::service::Device;
+use gyronet::store::ImuPart;
+
+/// What the image drives.
+const PARTS: &[ImuPart] = &[ImuPart::XsensMti];
+/// Whose wheel frames are understood.
+pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
+
+/// What each task gets.
+pub struct Parts {
+    pub output: Unconnected,
+    /// To be put under the network.
+    pub weights: Option<Blob<'static>>,
+    pub device: Stored,
+}
+
+/// `None` when they have been made before.
+#[inline(never)]
+pub fn parts(board: &Board) -> Option<Parts> {
+    let flash = match Flash::probe() {
+        Some(flash) => Some(&*cortex_m::singleton!(: Flash = flash)?),
+        None => None,
+    };
+    let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(PARTS) })?;
+    device.begin(flash.map(Records), flash.map(Slots), board.identity);
+    // Without good weights the pipeline still runs: the status says degraded, and the rate is
+    // the gyro's less its static bias.
+    let blob = device.weights(flash.map(Flash::slots_at_start), &weights::DEFAULT.0);
+    let check = blob.as_ref().map(BackgroundCheck::new);
+    let has_network = blob.is_some();
+    let configuration = device.configuration();
+    let pipeline = configuration.pipeline(device.calibration());
+    let delay = pipeline.compensate.mode.delay();
+    // What is stored has been checked.
+    let config = Config::new(configuration.can).unwrap_or(Config::DEFAULT);
+    let guard = cortex_m::singleton!(: MaybeUninit<Guard> = MaybeUninit::uninit())?;
+    let guard = place(guard, || Guard::new(pipeline));
+    Some(Parts {
+        output: Unconnected { guard, config, wheels: Some(WHEELS), has_network, delay },
+        weights: blob,
+        device: (device, check),
+    })
+}
+
+/// Makes a value where it stays; what that takes of the stack is given back.
+#[inline(never)]
+pub fn place<T>(slot: &mut MaybeUninit<T>, make: impl FnOnce() -> T) -> &mut T {
+    slot.write(make())
+}

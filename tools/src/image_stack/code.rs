@@ -1,0 +1,186 @@
+//! An image's functions: what each needs of the stack, and what it calls.
+
+use super::priority::{self, Vectors};
+use super::thumb::{self, Effect};
+use super::{MASKED, StackError};
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+#[derive(Debug)]
+pub struct Function {
+    pub name: String,
+    own: u32,
+    calls: BTreeSet<u32>,
+    pub indirect: usize,
+}
+
+#[derive(Debug, Default)]
+pub struct Code {
+    /// By address.
+    pub functions: BTreeMap<u32, Function>,
+    /// Functions whose address is a value somewhere.
+    taken: BTreeSet<u32>,
+    pub vectors: Vectors,
+}
+
+impl Code {
+    pub fn read(elf: &[u8]) -> Result<Self, StackError> {
+        let format = |error: object::Error| StackError::Format(error.to_string());
+        let file = object::File::parse(elf).map_err(format)?;
+        let mut ranges = BTreeMap::new();
+        // Where code and data begin inside a section (AAELF32 5.5.5).
+        let mut mapping = BTreeMap::new();
+        for symbol in file.symbols() {
+            let (name, address) = (symbol.name().map_err(format)?, symbol.address() as u32);
+            if name.starts_with("$t") || name.starts_with("$d") {
+                mapping.insert(address, name.starts_with("$d"));
+            } else if symbol.kind() == SymbolKind::Text && symbol.size() > 0 {
+                ranges.entry(address & !1).or_insert((symbol.size() as u32, demangle(name)));
+            }
+        }
+        let mut code = Self::default();
+        let is_data = |at: u32| mapping.range(..=at).next_back().is_some_and(|(_, data)| *data);
+        for section in file.sections() {
+            let (start, bytes) = (section.address() as u32, section.data().map_err(format)?);
+            let words = || bytes.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word));
+            let begins =
+                |value: u32| (value & 1 == 1 && ranges.contains_key(&(value - 1))).then(|| value - 1);
+            match section.name() {
+                Ok(".vector_table") => code.vectors.handlers = words().map(begins).collect(),
+                Ok(priority::SECTION) => code.vectors.prioritise(bytes)?,
+                Ok(".rodata" | ".data") => code.taken.extend(words().filter_map(begins)),
+                Ok(".text") => {
+                    let data = (start..).step_by(4).zip(words()).filter(|(at, _)| is_data(*at));
+                    code.taken.extend(data.filter_map(|(_, value)| begins(value)));
+                    for (address, (size, name)) in &ranges {
+                        let Some(body) = address
+                            .checked_sub(start)
+                            .and_then(|offset| bytes.get(offset as usize..(offset + size) as usize))
+                        else {
+                            continue;
+                        };
+                        let function = code.function(name, *address, body, is_data, begins)?;
+                        code.functions.insert(*address, function);
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(code)
+    }
+
+    /// Reads one function's instructions, one after the other.
+    fn function(
+        &mut self,
+        name: &str,
+        address: u32,
+        body: &[u8],
+        is_data: impl Fn(u32) -> bool,
+        begins: impl Fn(u32) -> Option<u32>,
+    ) -> Result<Function, StackError> {
+        let mut function = Function { name: name.to_owned(), own: 0, calls: BTreeSet::new(), indirect: 0 };
+        let end = address + body.len() as u32;
+        let halfword = |at: u32| {
+            let bytes = body.get((at - address) as usize..)?.first_chunk::<2>()?;
+            Some(u16::from_le_bytes(*bytes))
+        };
+        let (mut at, mut low) = (address, [0u32; 16]);
+        while let Some(first) = halfword(at) {
+            if is_data(at) {
+                at += 2;
+                continue;
+            }
+            let second = thumb::is_wide(first).then(|| halfword(at + 2)).flatten();
+            match thumb::effect(first, second, at) {
+                Effect::None => {}
+                Effect::Push(bytes) => function.own += bytes,
+                Effect::Dynamic => return Err(StackError::Dynamic { function: function.name, address: at }),
+                Effect::Indirect => function.indirect += 1,
+                // Inside, a branch is a loop or a condition; to the outside, a call at the end.
+                Effect::Branch(target) if (address..end).contains(&target) => {}
+                Effect::Call(target) | Effect::Branch(target) => {
+                    function.calls.insert(target);
+                }
+                Effect::MoveLow { register, value } => low[usize::from(register)] = value,
+                Effect::MoveHigh { register, value } => {
+                    self.taken.extend(begins(low[usize::from(register)] | value << 16));
+                }
+            }
+            at += if second.is_some() { 4 } else { 2 };
+        }
+        Ok(function)
+    }
+
+    pub fn named(&self, name: &str) -> Option<u32> {
+        self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
+    }
+
+    /// What is left of a function that runs with interrupts off when they come on: its frame.
+    pub fn masked(&self) -> HashMap<u32, u32> {
+        let masked = |function: &Function| function.name.ends_with(MASKED);
+        self.functions.iter().filter(|(_, f)| masked(f)).map(|(address, f)| (*address, f.own)).collect()
+    }
+
+    /// Where a function's calls can go.
+    fn targets<'a>(&'a self, function: &'a Function) -> impl Iterator<Item = u32> + 'a {
+        let indirect = if function.indirect > 0 { Some(&self.taken) } else { None };
+        function.calls.iter().chain(indirect.into_iter().flatten()).copied()
+    }
+
+    pub fn depth(
+        &self,
+        address: u32,
+        way: &mut Vec<u32>,
+        depths: &mut HashMap<u32, u32>,
+    ) -> Result<u32, StackError> {
+        if let Some(depth) = depths.get(&address) {
+            return Ok(*depth);
+        }
+        let name =
+            |address: &u32| self.functions.get(address).map_or("?", |function| &function.name).to_owned();
+        if let Some(first) = way.iter().position(|earlier| *earlier == address) {
+            return Err(StackError::Recursion(way[first..].iter().chain([&address]).map(name).collect()));
+        }
+        let Some(function) = self.functions.get(&address) else {
+            let function = way.last().map(name).unwrap_or_default();
+            return Err(StackError::Target { function, target: address });
+        };
+        way.push(address);
+        let mut deepest = 0;
+        for target in self.targets(function) {
+            deepest = deepest.max(self.depth(target, way, depths)?);
+        }
+        way.pop();
+        let depth = function.own + deepest;
+        depths.insert(address, depth);
+        Ok(depth)
+    }
+
+    pub fn deepest(&self, from: u32, depths: &HashMap<u32, u32>) -> Vec<(String, u32)> {
+        let mut way = Vec::new();
+        let mut next = self.functions.get(&from);
+        while let Some(function) = next {
+            way.push((function.name.clone(), function.own));
+            let deepest = self.targets(function).max_by_key(|target| depths.get(target).copied());
+            next = deepest.and_then(|target| self.functions.get(&target));
+        }
+        way
+    }
+}
+
+/// The path of a Rust name in the legacy mangling (`_ZN`, then each part behind its length),
+/// without the hash at its end; any other name as it is.
+fn demangle(name: &str) -> String {
+    let Some(mut rest) = name.strip_prefix("_ZN") else { return name.to_owned() };
+    let mut parts = Vec::new();
+    while let Some(digits) = rest.find(|c: char| !c.is_ascii_digit()).filter(|digits| *digits > 0) {
+        let (len, tail) = rest.split_at(digits);
+        let Some((part, tail)) = len.parse().ok().and_then(|len: usize| tail.split_at_checked(len)) else {
+            return name.to_owned();
+        };
+        parts.push(part);
+        rest = tail;
+    }
+    parts.pop_if(|part| part.len() == 17 && part.starts_with('h'));
+    parts.join("::")
+}
