@@ -6,6 +6,7 @@ pub mod candump;
 pub mod checkpoint;
 pub mod device;
 pub mod drive;
+pub mod emulator;
 pub mod evaluate;
 pub mod figures;
 pub mod fir;
