@@ -7,6 +7,8 @@ pub mod line;
 pub mod source;
 mod view;
 
+pub use view::fault_names;
+
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
@@ -185,7 +187,7 @@ impl Monitor {
         let verdict = self.bosch[index].process(message.counter);
         if self.account(Ok(verdict)) && index == 0 {
             let good = message.rate_status == bosch::SignalStatus::OK;
-            self.state.drop_in = good.then(|| f64::from(message.rate) * 0.005 - 163.84);
+            self.state.drop_in = good.then(|| message.rate_deg_per_sec());
         }
     }
 
