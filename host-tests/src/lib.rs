@@ -2,6 +2,7 @@
 //! the emulated board and its image, bytes, samples, streams and weights made for the purpose.
 
 pub mod flash;
+pub mod golden;
 pub mod image;
 pub mod noise;
 pub mod packing;
