@@ -1,5 +1,6 @@
 //! Curves as SVG: yaw over time, paths seen from above, times between stamps.
 
+use crate::curve::{range, thinned};
 use crate::plot::PlotError;
 use crate::sequence::Sequence;
 use plotters::coord::Shift;
@@ -11,6 +12,8 @@ const TITLE_HEIGHT: u32 = 46;
 const LEGEND_ROW: u32 = 26;
 /// Points of a curve, about one for each pixel.
 const POINTS: usize = 1_000;
+/// Around the curves.
+const AIR: f64 = 0.05;
 const FONT: &str = "sans-serif";
 const GREY: RGBColor = RGBColor(90, 90, 90);
 /// Colours that the colour-blind can tell apart (Okabe and Ito, 2008); black is the truth.
@@ -118,8 +121,8 @@ fn draw(svg: &mut String, labels: Labels<'_>, curves: &[Curve]) -> Result<(), Fa
         }
         legend.draw(&Text::new(curve.label.clone(), (x + 38, y), (FONT, 16).into_font()))?;
     }
-    let mut x = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.0)));
-    let mut y = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.1)));
+    let mut x = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.0)), AIR);
+    let mut y = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.1)), AIR);
     if labels.same_scale {
         (x, y) = square(x, y, body.dim_in_pixel());
     }
@@ -144,9 +147,7 @@ fn draw(svg: &mut String, labels: Labels<'_>, curves: &[Curve]) -> Result<(), Fa
         .y_label_formatter(&number)
         .draw()?;
     for (curve, Line { style, dash }) in curves.iter().zip(lines) {
-        let step = curve.points.len().div_ceil(POINTS).max(1);
-        let last = curve.points.last().copied();
-        let points = curve.points.iter().copied().step_by(step).chain(last);
+        let points = thinned(curve.points.iter().copied(), POINTS);
         match dash {
             None => chart.draw_series(LineSeries::new(points, style))?,
             Some((dash, gap)) => chart.draw_series(DashedLineSeries::new(points, dash, gap, style))?,
@@ -205,16 +206,6 @@ fn panel(
 fn number(value: &f64) -> String {
     let text = format!("{:.2}", value + 0.0);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
-/// From the least to the most, with some air.
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
-    if low > high {
-        return (0.0, 1.0);
-    }
-    let air = 0.05 * (high - low).max(1e-6);
-    (low - air, high + air)
 }
 
 /// The wider of two ranges, so that both have the same length for a pixel.

@@ -4,6 +4,7 @@ pub mod ablation;
 pub mod bundled;
 pub mod candump;
 pub mod checkpoint;
+mod curve;
 pub mod demo;
 pub mod device;
 pub mod drive;

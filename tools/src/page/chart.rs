@@ -5,6 +5,7 @@
 //! moving the SVG's window.
 
 use super::escaped;
+use crate::curve::{range, thinned};
 use std::fmt::Write;
 
 /// The SVG's own width and height; coordinates are whole numbers.
@@ -95,7 +96,7 @@ impl Chart<'_> {
         for curve in &self.curves {
             let free = if curve.in_scale { "" } else { " free" };
             let _ = write!(html, "<polyline class=\"{}{free}\" points=\"", curve.class);
-            for (k, point) in thinned(&curve.points).enumerate() {
+            for (k, point) in thinned(curve.points.iter().copied(), POINTS).enumerate() {
                 let gap = if k == 0 { "" } else { " " };
                 let across = SIDE * part(point.0, x);
                 // Far beyond the edge is as good as farther.
@@ -108,25 +109,9 @@ impl Chart<'_> {
     }
 }
 
-/// Every n-th point, and the last one.
-fn thinned(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
-    let step = points.len().div_ceil(POINTS).max(1);
-    points.iter().copied().step_by(step).chain(points.last().copied())
-}
-
 /// Where a value lies between the ends of its axis.
 fn part(value: f64, (from, to): (f64, f64)) -> f64 {
     (value - from) / (to - from)
-}
-
-/// From the least to the most, with some air.
-fn range(values: impl Iterator<Item = f64>, air: f64) -> (f64, f64) {
-    let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
-    if low > high {
-        return (0.0, 1.0);
-    }
-    let air = air * (high - low) + 1e-9;
-    (low - air, high + air)
 }
 
 /// Both ranges widened so that a metre is as long either way, and width over height.
