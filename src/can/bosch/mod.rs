@@ -57,7 +57,7 @@ impl SignalStatus {
     pub const INITIALISING: Self = Self(4);
 }
 
-/// TX1 as values.
+/// TX1, the yaw message, as codes: 0.005 deg/s and 0.127465e-3 g each, zero at 0x8000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tx1 {

@@ -50,7 +50,7 @@ pub const LAYOUTS: [Layout; 3] = [
     },
 ];
 
-/// One message of the set as codes.
+/// One message of the set as codes: 0.005 deg/s and 0.127465e-3 g each, zero at 0x8000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
