@@ -50,6 +50,7 @@ enum Command {
     Device(commands::device::Args),
     Size(commands::size::Args),
     Completions(commands::completions::Args),
+    Soak(commands::soak::Args),
 }
 
 fn main() -> ExitCode {
@@ -68,6 +69,7 @@ fn main() -> ExitCode {
         Command::Device(args) => commands::device::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),
+        Command::Soak(args) => commands::soak::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
     // Who reads our output has seen enough: `gyronet replay FILE | head`.

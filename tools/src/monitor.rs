@@ -23,7 +23,7 @@ const MAX_DELTA: u8 = 10;
 const PACE_SECONDS: f64 = 1.0;
 
 /// What happened to the messages so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Counts {
     /// Frames that are ours.
     pub frames: u64,
