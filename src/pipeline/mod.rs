@@ -18,15 +18,14 @@ pub use output::{DueWindow, Output, Owed, YawRate};
 use known::{Known, raw};
 
 use crate::align::{AlignError, Aligner};
-use crate::bias::{Proof, QuietDetector, Rest, Second, StaticError, StaticInit, ZeroPoint, ZeroRate};
+use crate::bias::{Proof, Second, StaticInit, ZeroPoint, ZeroRate};
 use crate::compensate::{Compensator, Emitted, Implausible, Settled};
-use crate::health::{Counters, Faults, Status, count, judge};
+use crate::health::{Counters, Faults, Status, count};
 use crate::model::Estimate;
 use crate::mounting::Rotation;
-use crate::sample::{Frame, ImuSample, PERIOD_US, Standstill, WHEELS, WheelSample};
+use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
 use crate::uncertainty::Uncertainty;
 use crate::units::{AngularRate, Yaw};
-use crate::vehicle::{PromptSample, VehicleSample, YawSample};
 use crate::window::{self, WINDOW, Window};
 
 /// The whole way of the data for one vehicle.
