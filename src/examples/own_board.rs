@@ -22,9 +22,14 @@ pub struct Coprocessor<UART, CAN> {
 impl<UART: Read + ReadReady, CAN: Can> Coprocessor<UART, CAN> {
     /// With the weights that come with the library.
     pub fn new(uart: UART, can: CAN) -> Result<Self, BlobError> {
-        let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
-        let (guard, feeds) = (Guard::new(PipelineConfig::DEFAULT), Feeds::new(Config::DEFAULT));
-        Ok(Self { imu: Serial::new(uart, Mti::new()), can, guard, network, feeds, lost: [0; 2] })
+        Ok(Self {
+            imu: Serial::new(uart, Mti::new()),
+            can,
+            guard: Guard::new(PipelineConfig::DEFAULT),
+            network: GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?),
+            feeds: Feeds::new(Config::DEFAULT),
+            lost: [0; 2],
+        })
     }
 
     /// Takes what the sensor has sent; call it every few milliseconds. `now` is the board's clock.

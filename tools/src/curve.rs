@@ -4,7 +4,7 @@
 pub(crate) fn thinned(
     points: impl ExactSizeIterator<Item = (f64, f64)> + DoubleEndedIterator + Clone,
     most: usize,
-) -> impl Iterator<Item = (f64, f64)> {
+) -> impl Iterator<Item = (f64, f64)> + Clone {
     let step = points.len().div_ceil(most).max(1);
     let last = points.clone().next_back();
     points.step_by(step).chain(last)
