@@ -8,21 +8,16 @@ use gyronet_tools::target_bench::{self, Count, Counts};
 use gyronet_tools::task_bench::{self, Tasks};
 use std::path::Path;
 
-/// Counts instructions and modelled Cortex-M4 cycles of every kernel, network and sensor parser,
-/// in QEMU.
+/// Count instructions and modelled cycles on the target, in QEMU.
 ///
-/// Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
+/// Of every kernel, network and sensor parser, on a Cortex-M4F. Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
 /// `name instructions=N cycles=N stack=BYTES`, then sizes, then what the parsers cost for a byte
 /// and of the processor's time. Cycles are modelled (zero wait states), not
 /// measured on silicon. Then every task and interrupt of the flashed image, counted while it runs, and
 /// whether each meets its deadline at 168 MHz. Exit status 1 when the count of a window depends on
 /// its input, or a deadline can be missed.
 #[derive(Debug, clap::Args)]
-pub struct Args {
-    /// Print as JSON.
-    #[arg(long)]
-    json: bool,
-}
+pub struct Args {}
 
 /// CMSIS-NN s8 on the same networks: instructions and modelled cycles (gcc 12.2 -O3).
 const CMSIS_NN_S8: [(&str, u64, u64); 3] = [
@@ -32,9 +27,9 @@ const CMSIS_NN_S8: [(&str, u64, u64); 3] = [
 ];
 
 /// Runs the command.
-pub fn run(args: &Args, _common: Common) -> super::Result {
+pub fn run(_: &Args, common: Common) -> super::Result {
     let workspace = target_bench::workspace();
-    let folder = workspace.join("target/images");
+    let folder = target_bench::target_folder();
     let mut counts = Counts::default();
     for image in target_bench::IMAGES {
         let image = target_bench::build(&workspace, image, &folder)?;
@@ -43,7 +38,7 @@ pub fn run(args: &Args, _common: Common) -> super::Result {
     let image = target_bench::build(&workspace, "coprocessor", &folder)?;
     let coprocessor = ImageSize::read(&image)?;
     let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
-    if args.json {
+    if common.json {
         println!("{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)));
     } else {
         print(&counts, &coprocessor);
