@@ -3,11 +3,14 @@
 
 use std::{env, fs, path::PathBuf};
 
+/// The memory of the STM32H743; that of the STM32F405, and of what is emulated, is `memory.x`.
+const STM32H743: &str = "src/bin/coprocessor/stm32h743/memory.x";
 /// What only the image that is flashed must keep to.
 const SLOTS: &str = "src/bin/coprocessor/slots.x";
 
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");
+    println!("cargo:rerun-if-changed={STM32H743}");
     println!("cargo:rerun-if-changed=src/build.rs");
     println!("cargo:rerun-if-changed={SLOTS}");
     println!("cargo:rustc-check-cfg=cfg(gyronet_dsp, gyronet_armv8m)");
@@ -20,9 +23,13 @@ fn main() {
     if env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
         // cortex-m-rt's link.x includes memory.x from the search path.
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-        fs::copy("memory.x", out.join("memory.x")).expect("memory.x stands in the package root");
+        let memory = if env::var_os("CARGO_FEATURE_STM32H743").is_some() { STM32H743 } else { "memory.x" };
+        fs::copy(memory, out.join("memory.x")).expect("the memory's map stands in the package");
         println!("cargo:rustc-link-search={}", out.display());
         println!("cargo:rustc-link-arg-bin=coprocessor=-T{SLOTS}");
+        if env::var_os("CARGO_FEATURE_RTT").is_some() {
+            println!("cargo:rustc-link-arg-bin=coprocessor=-Tdefmt.x");
+        }
     }
 }
 
