@@ -1,4 +1,4 @@
-//! The coprocessor's firmware for the STM32F405: sensor bytes in, CAN frames out.
+//! The coprocessor's firmware, for the STM32F405 or the part in `chip`: sensor bytes in, CAN frames out.
 //!
 //! | pin | function |
 //! |---|---|
@@ -27,7 +27,6 @@ fn main() {
 }
 
 #[cfg(all(target_os = "none", feature = "rtt"))]
-#[expect(unused_imports, reason = "brings the logger to the linker")]
 use defmt_rtt as _;
 
 #[cfg(target_os = "none")]

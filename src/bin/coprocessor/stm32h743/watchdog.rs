@@ -18,7 +18,7 @@ impl Watchdog {
         // Taken over a few of its cycles later; it counts with the longest time until then.
         iwdg.pr().write(|w| w.pr().divide_by256());
         // SAFETY: a value of 12 bits.
-        iwdg.rlr().write(|w| unsafe { w.bits(RELOAD.into()) });
+        iwdg.rlr().write(|w| unsafe { w.bits(RELOAD) });
         let mut watchdog = Self(iwdg);
         watchdog.feed();
         watchdog
