@@ -75,9 +75,7 @@ pub struct Handler {
     pub activations: [Option<Activation>; KINDS],
     /// Modelled cycles of the cheapest activation.
     pub least: u64,
-    /// Modelled cycles of all activations from one sample to the next, at worst.
-    pub each_sample: u64,
-    /// Halfwords of its own code.
+    /// Halfwords of its code, what it calls left out.
     pub code: u64,
 }
 
@@ -104,8 +102,8 @@ impl std::fmt::Display for Handler {
                 write!(f, " [{kind}{more}: runs={runs} instructions={instructions} cycles={cycles}]")?;
             }
         }
-        if self.each_sample > 0 {
-            write!(f, " least={} each_sample={}", self.least, self.each_sample)?;
+        if self.least > 0 {
+            write!(f, " least={}", self.least)?;
         }
         Ok(())
     }
@@ -142,13 +140,16 @@ impl Symbols {
             let (_, name, data) = known.ok_or_else(|| bad(format!("vector {vector} has no name here")))?;
             let symbol = symbol(name).ok_or_else(|| bad(format!("no handler {name}")))?;
             let (start, len) = (symbol.address() as u32 & !1, symbol.size() as u32);
+            // What `#[interrupt]` marks is a function of its own, where it is not inlined.
+            let marked = format!("__cortex_m_rt_{name}");
+            let is_body = |symbol: &object::Symbol<'_, '_>| symbol.name().is_ok_and(|n| n.contains(&marked));
+            let body: u64 = elf.symbols().filter(is_body).map(|symbol| symbol.size()).sum();
             let handler = Handler {
                 name: (*name).to_owned(),
                 priority: *priority,
                 activations: [None; KINDS],
                 least: 0,
-                each_sample: 0,
-                code: u64::from(len) / 2,
+                code: (u64::from(len) + body) / 2,
             };
             handlers.push((handler, format!(",handler={name}:{start:x}:{:x}:{data:x}", start + len)));
         }
@@ -196,7 +197,7 @@ pub fn measure(image: &Path, plugin: &Path) -> Result<Tasks, BenchError> {
         let name = rest.split(' ').next().unwrap_or_default();
         let Some(handler) = found.iter_mut().find(|handler| handler.name == name) else { continue };
         if what == "HANDLER" {
-            (handler.least, handler.each_sample) = (number("least=")?, number("each=")?);
+            handler.least = number("least=")?;
         } else if let Some(activation) = handler.activations.get_mut(number("seen=")? as usize) {
             let (runs, instructions, cycles) = (number("runs=")?, number("insns=")?, number("cycles=")?);
             *activation = Some(Activation { runs, instructions, cycles });
