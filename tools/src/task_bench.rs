@@ -6,8 +6,9 @@ use crate::simulate::{Config, Sample, Simulation};
 use crate::target_bench::{BenchError, MACHINE, field};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::xsens::MtData2;
-use gyronet::service::Request;
-use gyronet::service::frame::emit;
+use gyronet::service::frame::{Deframer, emit};
+use gyronet::service::message::AllCounters;
+use gyronet::service::{Reply, Request};
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -20,12 +21,13 @@ use std::time::{Duration, Instant};
 
 /// Samples: static initialisation, and forty windows.
 const SAMPLES: usize = 500;
-/// Frames of a sample; each of the host's lines has an answer too.
-const FRAMES: usize = 6;
 /// How long the emulator may take to connect and the image to answer.
 const START: Duration = Duration::from_secs(60);
-/// How long the frames of a sample may take.
-const TURN: Duration = Duration::from_secs(2);
+/// How long a sample may take, and how often it is asked whether it was processed.
+const TURN: Duration = Duration::from_secs(10);
+const ASK: Duration = Duration::from_millis(20);
+/// Windows of the network that must have run, or nothing is known of it.
+const WINDOWS: usize = 20;
 /// 8 ns for an instruction: the board's clock and its instructions stay in step as they do at
 /// about 125 million instructions a second.
 const ICOUNT: &str = "shift=3";
@@ -206,15 +208,22 @@ pub fn measure(image: &Path, plugin: &Path) -> Result<Tasks, BenchError> {
     Ok(Tasks { handlers: found, all_off, some_off })
 }
 
+/// Samples and windows, once it has answered.
+#[derive(Default)]
+struct Seen {
+    answers: AtomicUsize,
+    samples: AtomicUsize,
+    windows: AtomicUsize,
+}
+
 struct Emulator {
     process: std::process::Child,
     imu: TcpStream,
     slcan: TcpStream,
     gyro: Option<TcpStream>,
     service: TcpStream,
-    /// Lines of SLCAN, and bytes of the service line, that have come.
-    lines: Arc<AtomicUsize>,
-    answers: Arc<AtomicUsize>,
+    /// What the image has said last of its pipeline.
+    seen: Arc<Seen>,
 }
 
 impl Emulator {
@@ -256,12 +265,21 @@ impl Emulator {
             let output = String::from_utf8_lossy(&output.stderr).into_owned();
             return Err(BenchError::Failed { program: program.to_owned(), output });
         };
-        let lines = counter(&slcan, |byte| byte == b'\r').map_err(start)?;
-        let answers = counter(&service, |_| true).map_err(start)?;
-        if let Some(gyro) = &gyro {
-            counter(gyro, |_| true).map_err(start)?;
+        for line in [&imu, &slcan].into_iter().chain(&gyro) {
+            read(line, |_| {}).map_err(start)?;
         }
-        Ok(Self { process, imu, slcan, gyro, service, lines, answers })
+        let seen = Arc::new(Seen::default());
+        let (told, mut deframer) = (Arc::clone(&seen), Deframer::new());
+        read(&service, move |byte| {
+            let Some(Ok((_, reply))) = deframer.push::<Reply>(byte) else { return };
+            told.answers.fetch_add(1, Ordering::Relaxed);
+            if let Reply::Counters(AllCounters { pipeline, .. }) = reply {
+                told.samples.store(pipeline.samples as usize, Ordering::Relaxed);
+                told.windows.store(pipeline.windows as usize, Ordering::Relaxed);
+            }
+        })
+        .map_err(start)?;
+        Ok(Self { process, imu, slcan, gyro, service, seen })
     }
 
     /// Sends everything and ends; what the plugin has printed.
@@ -279,25 +297,23 @@ impl Emulator {
     }
 
     fn talk(&mut self) -> std::io::Result<()> {
-        let requests =
-            [Request::Info, Request::GetConfiguration, Request::Counters, Request::Log { after: 0 }];
-        let frames: Vec<_> = requests.iter().filter_map(|request| emit(1, request)).collect();
+        let failed = |what: String| Err(std::io::Error::other(what));
+        let others = [Request::Info, Request::GetConfiguration, Request::Log { after: 0 }];
+        let [info, configuration, log] = others.map(|request| emit(1, &request).unwrap_or_default());
+        let counters = emit(1, &Request::Counters).unwrap_or_default();
         let until = Instant::now() + START;
-        while self.answers.load(Ordering::Relaxed) == 0 {
+        while self.seen.answers.load(Ordering::Relaxed) == 0 {
             if Instant::now() > until {
-                return Err(std::io::Error::other("no answer on the service line"));
+                return failed("no answer on the service line".to_owned());
             }
-            self.service.write_all(&frames[0])?;
+            self.service.write_all(&info)?;
             thread::sleep(Duration::from_millis(200));
         }
-        let (mut silent, mut awaited) = (0, self.lines.load(Ordering::Relaxed));
         for (k, sample) in Simulation::new(&Config::DEFAULT).take(SAMPLES).enumerate() {
             // Standing, as Toyota's frame has it, and now and then what a host asks.
             self.slcan.write_all(b"t0AA81A6F1A6F1A6F1A6F\r")?;
-            awaited += FRAMES + 1;
             if k % 50 == 0 {
                 self.slcan.write_all(b"V\rN\rF\r")?;
-                awaited += 3;
             }
             if let Some(gyro) = &mut self.gyro {
                 for number in GYRO_MESSAGES * k..GYRO_MESSAGES * (k + 1) {
@@ -305,17 +321,22 @@ impl Emulator {
                 }
             }
             self.imu.write_all(&message(k, &sample).emit())?;
-            self.service.write_all(&frames[k % frames.len()])?;
+            self.service.write_all([&info, &configuration, &log][k % 3])?;
+            // One by one, however slow the host is.
             let until = Instant::now() + TURN;
-            while self.lines.load(Ordering::Relaxed) < awaited && Instant::now() < until {
-                thread::sleep(Duration::from_micros(200));
+            while self.seen.samples.load(Ordering::Relaxed) <= k {
+                if Instant::now() > until {
+                    return failed(format!("sample {k} of {SAMPLES} was not processed"));
+                }
+                let again = Instant::now() + ASK;
+                self.service.write_all(&counters)?;
+                while self.seen.samples.load(Ordering::Relaxed) <= k && Instant::now() < again {
+                    thread::sleep(Duration::from_micros(200));
+                }
             }
-            silent += usize::from(self.lines.load(Ordering::Relaxed) < awaited);
         }
-        if silent * 10 > SAMPLES {
-            return Err(std::io::Error::other(format!("no frames for {silent} of {SAMPLES} samples")));
-        }
-        Ok(())
+        let windows = self.seen.windows.load(Ordering::Relaxed);
+        if windows < WINDOWS { failed(format!("only {windows} windows were used")) } else { Ok(()) }
     }
 }
 
@@ -340,16 +361,14 @@ fn increment(number: usize, sample: &Sample) -> Message {
     }
 }
 
-/// Reads a line to its end in a thread; how many bytes of a kind have come.
-fn counter(line: &TcpStream, counts: fn(u8) -> bool) -> std::io::Result<Arc<AtomicUsize>> {
-    let (mut line, count) = (line.try_clone()?, Arc::new(AtomicUsize::new(0)));
-    let shared = Arc::clone(&count);
+/// Reads a line to its end in a thread.
+fn read(line: &TcpStream, mut take: impl FnMut(u8) + Send + 'static) -> std::io::Result<()> {
+    let mut line = line.try_clone()?;
     thread::spawn(move || {
         let mut bytes = [0; 4096];
         while let Ok(len @ 1..) = line.read(&mut bytes) {
-            let more = bytes[..len].iter().filter(|byte| counts(**byte)).count();
-            shared.fetch_add(more, Ordering::Relaxed);
+            bytes[..len].iter().for_each(|byte| take(*byte));
         }
     });
-    Ok(count)
+    Ok(())
 }
