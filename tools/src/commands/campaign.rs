@@ -1,0 +1,74 @@
+//! `gyronet campaign`: faults on purpose.
+
+use super::networks::Weights;
+use super::{Common, WriteError, progress};
+use gyronet_tools::bundled;
+use gyronet_tools::campaign::drive::Drive;
+use gyronet_tools::campaign::part::Part;
+use gyronet_tools::campaign::report::Report;
+use gyronet_tools::campaign::{self, Plan, plot};
+use gyronet_tools::recording::Recording;
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Damage drives on purpose, as bytes on the board's lines, and see what a receiver is told.
+///
+/// The bundled simulated drive, and recordings where they are given, go through the bytes of four
+/// parts and through SLCAN; faults are drawn by a seed, single and in pairs. Exit status 1 when
+/// one goes undetected that is not on the named list, or anything panics.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Args {
+    /// Recordings to damage beside the simulated drive.
+    #[arg(value_name = "DRIVE.csv")]
+    drives: Vec<PathBuf>,
+    /// How many runs, of 8 s at most.
+    #[arg(long, default_value_t = 20_000)]
+    runs: usize,
+    /// The same seed gives the same runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// A small part of it: 320 runs.
+    #[arg(long)]
+    quick: bool,
+    /// Print JSON instead of the table.
+    #[arg(long)]
+    json: bool,
+    /// Draw the runs of single faults as SVG here.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let weights = Weights::open(None)?;
+    let blob = weights.blob()?;
+    let mut drives = vec![Drive::new(&bundled::simulated_drive()?)];
+    for path in &args.drives {
+        drives.push(Drive::new(&Recording::read(path)?));
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let bar = progress::bar(common, drives.len() * Part::ALL.len(), "undamaged");
+    let scenes = campaign::scenes(&drives, &blob, threads, || bar.inc(1));
+    bar.finish_and_clear();
+    let plan = Plan { runs: if args.quick { campaign::QUICK } else { args.runs }, seed: args.seed, threads };
+    let bar = progress::bar(common, plan.runs, "faults");
+    let runs = campaign::run(plan, &scenes, &blob, || bar.inc(1));
+    bar.finish_and_clear();
+    let names: Vec<String> = drives.iter().map(|drive| drive.name.clone()).collect();
+    let report = Report::new(plan.seed, &names, &runs);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        serde_json::to_writer_pretty(&mut out, &report).map_err(std::io::Error::from)?;
+        writeln!(out)?;
+    } else {
+        write!(out, "{report}")?;
+    }
+    if let Some(path) = &args.plot {
+        fs::write(path, plot::svg(&runs)?).map_err(WriteError::to(path))?;
+    }
+    match report.failures.len() {
+        0 => Ok(()),
+        count => Err(format!("{count} of {} runs must not be", plan.runs).into()),
+    }
+}
