@@ -3,8 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGES: [&str; 5] =
-    ["README.md", "CHANGELOG.md", "tools/README.md", "tools/MEASUREMENTS.md", "tools/train/README.md"];
+const PAGES: [&str; 6] = [
+    "README.md",
+    "CHANGELOG.md",
+    "host-tests/README.md",
+    "tools/README.md",
+    "tools/MEASUREMENTS.md",
+    "tools/train/README.md",
+];
 
 #[test]
 fn no_link_is_dead() {

@@ -24,6 +24,7 @@ pub mod quantize;
 pub mod recording;
 pub mod sequence;
 pub mod simulate;
+pub mod soak;
 pub mod tables;
 pub mod target_bench;
 pub mod tensors;

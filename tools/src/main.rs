@@ -31,6 +31,7 @@ enum Command {
     BenchTarget(commands::bench_target::Args),
     Device(commands::device::Args),
     Size(commands::size::Args),
+    Soak(commands::soak::Args),
 }
 
 fn main() -> ExitCode {
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
         Command::Device(args) => commands::device::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
+        Command::Soak(args) => commands::soak::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
     // Who reads our output has seen enough: `gyronet replay FILE | head`.

@@ -14,6 +14,7 @@ pub mod quantize;
 pub mod replay;
 pub mod simulate;
 pub mod size;
+pub mod soak;
 pub mod tables;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line

@@ -44,7 +44,7 @@ pub enum SequenceError {
         /// Columns of the data set.
         expected: usize,
     },
-    /// A field is not a number.
+    /// A field is not a number, or beyond all sense.
     #[error("{path}: line {line}, column {column}: {text:?} is {error}")]
     Value {
         /// The file.
@@ -69,6 +69,18 @@ pub enum SequenceError {
         last: i64,
         /// Stamp of this row.
         at: i64,
+    },
+    /// A file stops for so long that what follows is another drive.
+    #[error("{path}: line {line}: silent for {seconds:.0} s before it, at most {most} s are one drive")]
+    Silent {
+        /// The file.
+        path: String,
+        /// The line.
+        line: u64,
+        /// Time since the row before, s.
+        seconds: f64,
+        /// What is allowed, s.
+        most: f64,
     },
     /// The calibration has no such parameter.
     #[error("{path}: no usable parameter {parameter:?}")]

@@ -9,6 +9,11 @@ use std::fs::File;
 use std::path::Path;
 use std::rc::Rc;
 
+/// A value beyond this is none of any part or map: metres of UTM are some 4e6.
+const MAX_VALUE: f64 = 1e12;
+/// A file that is silent for longer is not one drive, s.
+const MAX_SILENCE: f64 = 600.0;
+
 /// Bytes read so far of all files of a sequence, for whoever watches.
 pub(super) type Progress = Rc<Cell<u64>>;
 
@@ -89,6 +94,9 @@ impl<const N: usize> Rows<N> {
                 return Err(SequenceError::Columns { path, line, found, expected });
             }
             let stamp: i64 = self.field(line, 0)?;
+            if stamp < 0 {
+                return Err(self.value(line, 0, ValueError::OutOfRange));
+            }
             let mut fields = [0.0_f64; N];
             for (field, column) in fields.iter_mut().zip(self.format.used) {
                 *field = self.field(line, column)?;
@@ -96,6 +104,9 @@ impl<const N: usize> Rows<N> {
             if fields.iter().any(|field| !field.is_finite()) {
                 self.summary.not_finite.count(line);
                 continue;
+            }
+            if let Some(k) = fields.iter().position(|field| field.abs() > MAX_VALUE) {
+                return Err(self.value(line, self.format.used[k], ValueError::OutOfRange));
             }
             if let Some(last) = self.last {
                 if stamp == last {
@@ -105,6 +116,11 @@ impl<const N: usize> Rows<N> {
                 if stamp < last {
                     return Err(SequenceError::Backwards { path: self.path.clone(), line, last, at: stamp });
                 }
+                let seconds = self.seconds(stamp - last);
+                if seconds > MAX_SILENCE {
+                    let (path, most) = (self.path.clone(), MAX_SILENCE);
+                    return Err(SequenceError::Silent { path, line, seconds, most });
+                }
             }
             self.last = Some(stamp);
             self.summary.row(stamp);
@@ -113,14 +129,17 @@ impl<const N: usize> Rows<N> {
     }
 
     fn field<T: std::str::FromStr>(&self, line: u64, column: usize) -> Result<T, SequenceError> {
-        let bytes = self.record.get(column).unwrap_or_default();
-        let text = std::str::from_utf8(bytes).unwrap_or_default();
-        text.parse().map_err(|_| SequenceError::Value {
-            path: self.path.clone(),
-            line,
-            column: column + 1,
-            text: String::from_utf8_lossy(bytes).into_owned(),
-            error: if bytes.is_empty() { ValueError::Empty } else { ValueError::NotANumber },
-        })
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let error = if self.bytes(column).is_empty() { ValueError::Empty } else { ValueError::NotANumber };
+        text.parse().map_err(|_| self.value(line, column, error))
+    }
+
+    fn bytes(&self, column: usize) -> &[u8] {
+        self.record.get(column).unwrap_or_default()
+    }
+
+    fn value(&self, line: u64, column: usize, error: ValueError) -> SequenceError {
+        let text = String::from_utf8_lossy(self.bytes(column)).into_owned();
+        SequenceError::Value { path: self.path.clone(), line, column: column + 1, text, error }
     }
 }

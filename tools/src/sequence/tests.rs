@@ -177,6 +177,32 @@ fn time_must_not_go_back() {
 }
 
 #[test]
+fn a_stamp_far_off_is_an_error_and_no_endless_grid() {
+    let scratch = Scratch::new("far", Layout::Kaist, 10);
+    scratch.edit("global_pose.csv", |lines| set(&mut lines[900], 0, "9223372036854775807"));
+    let error = scratch.error();
+    assert!(error.contains("global_pose.csv: line 901: silent for 76993720"), "{error}");
+    let scratch = Scratch::new("before", Layout::Kaist, 10);
+    scratch.edit(FOG, |lines| set(&mut lines[0], 0, "-9223372036854775808"));
+    let error = scratch.error();
+    assert!(
+        error.ends_with("fog.csv: line 1, column 1: \"-9223372036854775808\" is out of range"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_value_beyond_sense_is_an_error_and_no_nan() {
+    let scratch = Scratch::new("huge", Layout::Kaist, 10);
+    scratch.edit(FOG, |lines| {
+        for line in &mut lines[10..12] {
+            set(line, 3, "1.7e308");
+        }
+    });
+    assert!(scratch.error().ends_with("fog.csv: line 11, column 4: \"1.7e308\" is out of range"));
+}
+
+#[test]
 fn an_empty_file_is_an_error() {
     let scratch = Scratch::new("empty", Layout::Kaist, 10);
     fs::write(scratch.0.join(ENCODER), "").unwrap();

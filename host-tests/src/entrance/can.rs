@@ -1,0 +1,166 @@
+//! Frames from the vehicle bus: wheel speeds, and messages as a receiver of ours reads them.
+
+use super::{Seed, byte, take};
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::bosch::Message;
+use gyronet::can::e2e::{Checker, DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
+use gyronet::can::j1939::Vdc2;
+use gyronet::can::signal::{BitField, ByteOrder};
+use gyronet::can::wheel::{Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
+use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage};
+use gyronet::sample::Standstill;
+use gyronet::units::{Micros, WheelSpeed};
+
+const ID: Id = Id::Standard(StandardId::new(0xAA).expect("of eleven bits"));
+const OTHER: Id = Id::Extended(ExtendedId::new(0x18FE_BF0B).expect("of 29 bits"));
+const PROFILES: [Profile; 4] = [
+    Profile::P01(P01 { data_id: 0x123, mode: DataIdMode::Both }),
+    Profile::P02(P02 { data_ids: [7; 16] }),
+    Profile::P05(P05 { data_id: 0x1234 }),
+    Profile::P11(P11 { data_id: 0x123, mode: P11Mode::Both }),
+];
+
+/// Two signed wheels from byte 3 on, a counter in byte 7's upper half.
+fn two_wheels(id: Id, checksum: Checksum) -> WheelFrame {
+    let field = |start, len, signed| BitField::new(start, len, ByteOrder::Intel, signed).expect("inside");
+    let signal = |wheel, start| {
+        let (factor_q16, offset) = (WheelSignal::per_bit_kmh(0.036), WheelSpeed(0));
+        Some(WheelSignal { wheel, field: field(start, 16, true), factor_q16, offset, invalid: Some(0x8000) })
+    };
+    WheelFrame {
+        id,
+        signals: [signal(2, 24), signal(3, 40), None, None],
+        counter: Some(field(60, 4, false)),
+        checksum,
+    }
+}
+
+/// The first byte chooses the settings; then frames: a byte of time, a byte of kind (which
+/// identifier, how long, whether its protection is made to fit), eight bytes. Of what is said of
+/// the wheels, nothing is older than its limit or contradicts the speeds.
+pub fn wheels(mut data: &[u8]) {
+    let choice = byte(&mut data);
+    let checksum = match choice % 8 {
+        0 => Checksum::J1850 { at: 0 },
+        1 => Checksum::Xor { at: 1 },
+        2 => Checksum::Sum { at: 7 },
+        3..=6 => Checksum::E2e(PROFILES[usize::from(choice % 8 - 3)]),
+        _ => Checksum::None,
+    };
+    let own = two_wheels(ID, checksum);
+    let settings = WheelSettings {
+        frames: [Some(own), None, None, None],
+        timeout_us: 50_000,
+        still_speed: WheelSpeed(655),
+        still_for_us: 200_000,
+    };
+    let settings = if choice & 0x80 == 0 { settings } else { WheelSettings::TOYOTA };
+    let mut receiver = WheelReceiver::new(settings).expect("settings of ours");
+    let mut now = 0;
+    while !data.is_empty() {
+        now += u64::from(byte(&mut data)) * 1_000;
+        let kind = byte(&mut data);
+        let mut content = [0; 8];
+        let given = take(&mut data, 8);
+        content[..given.len()].copy_from_slice(given);
+        if let (Checksum::E2e(profile), true) = (checksum, kind & 0x10 != 0) {
+            let counter = u16::from(kind >> 5) % profile.counters();
+            profile.protect(&mut content, counter as u8).expect("eight bytes and a counter that occurs");
+        }
+        let id = if kind & 0x0F == 0x0F { OTHER } else { ID };
+        let len = if kind & 0x0F < 8 { usize::from(kind & 0x0F) + 1 } else { 8 };
+        let frame = DataFrame::new(id, &content[..len]).expect("eight bytes at most");
+        let judged = receiver.process(&frame, Micros(now));
+        assert_eq!(judged.is_none(), id == OTHER);
+        let sample = receiver.poll(Micros(now));
+        if let Some(Ok(judged)) = judged {
+            assert_eq!(judged, sample);
+        }
+        let slow =
+            |speed: Option<WheelSpeed>| speed.is_none_or(|speed| speed.0.abs() <= settings.still_speed.0);
+        assert!(sample.standstill != Standstill::Still || sample.speeds.into_iter().all(slow));
+        let mut later = receiver;
+        assert_eq!(later.poll(Micros(now + settings.timeout_us + 1)).speeds, [None; 4]);
+    }
+}
+
+pub fn wheel_seeds() -> Vec<Seed> {
+    let frames = |choice: u8, kind: u8, content: [u8; 8]| {
+        let mut data = vec![choice];
+        for k in 0..4 {
+            data.extend([20, kind | k << 5]);
+            data.extend(content);
+        }
+        data
+    };
+    let standing = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
+    vec![
+        ("toyota", frames(0x80, 0x1E, standing)),
+        ("p01", frames(3, 0x1E, [0, 0, 0, 1, 0, 1, 0, 0])),
+        ("p02", frames(4, 0x1E, [0, 0, 0, 200, 0, 200, 0, 0])),
+        ("p05", frames(5, 0x1E, [0, 0, 0, 1, 0, 1, 0, 0])),
+        ("p11", frames(6, 0x1E, [0, 0, 0, 0, 0x80, 1, 0, 0])),
+        ("xor", frames(1, 0x1E, [1, 1, 0, 0, 0, 0, 0, 0])),
+    ]
+}
+
+/// Blocks of eight bytes and a last short one as every message there is, and through the checks of
+/// every profile; three bytes as a place of a signal in the block. What is read is written the
+/// same.
+pub fn messages(mut data: &[u8]) {
+    let (start, len, kind) = (byte(&mut data), byte(&mut data), byte(&mut data));
+    let order = if kind & 1 == 0 { ByteOrder::Intel } else { ByteOrder::Motorola };
+    let field = BitField::new(start, len, order, kind & 2 != 0);
+    let mut checkers = PROFILES.map(|profile| Checker::new(profile, kind >> 2));
+    for block in data.chunks(8) {
+        if let Ok(field) = field
+            && let (Some(raw), Some(value)) = (field.raw(block), field.value(block))
+        {
+            let modulus = 1_i64 << field.bits();
+            assert!(i64::from(raw) < modulus && value.rem_euclid(modulus) == i64::from(raw));
+        }
+        for (checker, profile) in checkers.iter_mut().zip(PROFILES) {
+            let _ = checker.check(block);
+            let mut own = block.to_vec();
+            if profile.protect(&mut own, 1).is_ok() {
+                assert_eq!(profile.check(&own), Ok(1));
+                let _ = checker.check(&own);
+            }
+        }
+        let behind = |bytes: [u8; 8]| bytes[3..] == block[3..];
+        if let Ok(message) = Message::parse(block) {
+            assert_eq!(message.emit(), block);
+        }
+        if let Ok(message) = RateMessage::parse(block) {
+            // The three bits above quality mean nothing yet.
+            assert_eq!(message.emit()[3..7], block[3..7]);
+            assert!(message.deg_per_sec().is_none_or(f64::is_finite));
+        }
+        assert!(AngleMessage::parse(block).map_or(true, |message| behind(message.emit())));
+        assert!(DetailMessage::parse(block).map_or(true, |message| behind(message.emit())));
+        if let Ok(message) = Vdc2::parse(block) {
+            assert_eq!(Vdc2::parse(&message.emit()), Ok(message));
+            assert!(message.yaw_rate_rad_per_sec().is_none_or(f64::is_finite));
+        }
+    }
+}
+
+pub fn message_seeds() -> Vec<Seed> {
+    let with = |place: [u8; 3], blocks: &[[u8; 8]]| [&place[..], &blocks.concat()].concat();
+    let tx1 = Message {
+        rate: 32_768,
+        rate_status: gyronet::can::bosch::SignalStatus::OK,
+        nibble: 0,
+        temperature: 125,
+        acceleration: 32_768,
+        acceleration_status: gyronet::can::bosch::SignalStatus::OK,
+        counter: 5,
+    };
+    let vdc2 = [0xFF, 0xFF, 0xFF, 0xC4, 0x7D, 0x00, 0x7D, 0x7D];
+    let detail = DetailMessage { correction: -100, sigma: 300, latency: 140 };
+    vec![
+        ("intel", with([12, 16, 2], &[tx1.emit(), vdc2])),
+        ("motorola", with([7, 16, 1], &[detail.emit(), tx1.emit(), tx1.emit()])),
+    ]
+}

@@ -1,0 +1,76 @@
+//! Every place where bytes from outside come in, as a function of any bytes that panics where
+//! what comes out breaks a promise.
+//!
+//! The fuzz targets of `host-tests/fuzz` run these under coverage; `tests/entrances.rs` runs them
+//! over the corpus and over damaged copies of it.
+
+mod can;
+mod ram_flash;
+mod recording;
+mod records;
+mod sensors;
+mod sequences;
+mod service;
+mod slcan;
+mod weights;
+
+/// A named input.
+pub type Seed = (&'static str, Vec<u8>);
+
+/// One entrance.
+#[derive(Debug, Clone, Copy)]
+pub struct Entrance {
+    /// Of its fuzz target and of its folder in the corpus.
+    pub name: &'static str,
+    /// Takes any bytes.
+    pub run: fn(&[u8]),
+    /// What the corpus begins with: made here, none of it recorded.
+    pub seeds: fn() -> Vec<Seed>,
+    /// Damaged copies that a test runs in well under a second.
+    pub mutations: u64,
+}
+
+/// All of them.
+pub const ALL: [Entrance; 15] = [
+    Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
+    Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
+    Entrance { name: "dsp3000", run: sensors::dsp3000, seeds: sensors::dsp3000_seeds, mutations: 20_000 },
+    Entrance { name: "icm42688", run: sensors::icm42688, seeds: sensors::icm42688_seeds, mutations: 20_000 },
+    Entrance {
+        name: "adis16465",
+        run: sensors::adis16465,
+        seeds: sensors::adis16465_seeds,
+        mutations: 20_000,
+    },
+    Entrance { name: "slcan_board", run: slcan::board, seeds: slcan::board_seeds, mutations: 20_000 },
+    Entrance { name: "slcan_host", run: slcan::host, seeds: slcan::host_seeds, mutations: 20_000 },
+    Entrance { name: "can_wheels", run: can::wheels, seeds: can::wheel_seeds, mutations: 20_000 },
+    Entrance { name: "can_messages", run: can::messages, seeds: can::message_seeds, mutations: 20_000 },
+    Entrance { name: "service", run: service::line, seeds: service::seeds, mutations: 5_000 },
+    Entrance { name: "records", run: records::flash, seeds: records::seeds, mutations: 5_000 },
+    Entrance { name: "gyronet_blob", run: weights::gyronet, seeds: weights::seeds, mutations: 100 },
+    Entrance { name: "fognet_blob", run: weights::fognet, seeds: weights::seeds, mutations: 50 },
+    Entrance { name: "recording", run: recording::csv, seeds: recording::seeds, mutations: 1_000 },
+    Entrance { name: "sequences", run: sequences::folder, seeds: sequences::seeds, mutations: 300 },
+];
+
+/// Runs an entrance by its name.
+///
+/// # Panics
+/// When there is none of that name, or when it breaks a promise.
+pub fn run(name: &str, data: &[u8]) {
+    let entrance = ALL.iter().find(|entrance| entrance.name == name).expect("an entrance of that name");
+    (entrance.run)(data);
+}
+
+/// Takes bytes off the front; all there are where there are fewer.
+fn take<'d>(data: &mut &'d [u8], len: usize) -> &'d [u8] {
+    let (head, tail) = data.split_at(len.min(data.len()));
+    *data = tail;
+    head
+}
+
+/// Takes a byte off the front; zero at the end.
+fn byte(data: &mut &[u8]) -> u8 {
+    take(data, 1).first().copied().unwrap_or_default()
+}

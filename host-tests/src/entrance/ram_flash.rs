@@ -1,0 +1,79 @@
+//! Flash in RAM, as quick as fuzzing wants it. The rules of the real one are
+//! [`crate::flash`]'s to hold.
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+use gyronet::service::MappedSlots;
+use gyronet::store::layout::SLOT_SIZE;
+
+/// Two sectors.
+#[derive(Clone)]
+pub struct RamFlash<const SECTOR: usize> {
+    words: Vec<u32>,
+}
+
+impl<const SECTOR: usize> RamFlash<SECTOR> {
+    /// Begins with these bytes, erased behind them.
+    pub fn new(content: &[u8]) -> Self {
+        let mut flash = Self { words: vec![u32::MAX; 2 * SECTOR / 4] };
+        let len = content.len().min(2 * SECTOR);
+        flash.bytes_mut()[..len].copy_from_slice(&content[..len]);
+        flash
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(&mut self.words)
+    }
+
+    fn range(&mut self, from: u32, len: usize) -> Result<&mut [u8], NorFlashErrorKind> {
+        let from = from as usize;
+        self.bytes_mut().get_mut(from..from + len).ok_or(NorFlashErrorKind::OutOfBounds)
+    }
+}
+
+impl<const SECTOR: usize> ErrorType for RamFlash<SECTOR> {
+    type Error = NorFlashErrorKind;
+}
+
+impl<const SECTOR: usize> ReadNorFlash for RamFlash<SECTOR> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        bytes.copy_from_slice(self.range(offset, bytes.len())?);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        2 * SECTOR
+    }
+}
+
+impl<const SECTOR: usize> NorFlash for RamFlash<SECTOR> {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        if !(from as usize).is_multiple_of(SECTOR) || !((to - from) as usize).is_multiple_of(SECTOR) {
+            return Err(NorFlashErrorKind::NotAligned);
+        }
+        self.range(from, (to - from) as usize)?.fill(0xFF);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        if !offset.is_multiple_of(4) || !bytes.len().is_multiple_of(4) {
+            return Err(NorFlashErrorKind::NotAligned);
+        }
+        // Programming clears bits, and that is all it does.
+        for (to, from) in self.range(offset, bytes.len())?.iter_mut().zip(bytes) {
+            *to &= from;
+        }
+        Ok(())
+    }
+}
+
+impl MappedSlots for RamFlash<SLOT_SIZE> {
+    fn slots(&self) -> [&[u8]; 2] {
+        let (a, b) = bytemuck::cast_slice(&self.words).split_at(SLOT_SIZE);
+        [a, b]
+    }
+}

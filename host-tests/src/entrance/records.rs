@@ -1,0 +1,103 @@
+//! What is stored in flash: configuration, calibration, and which weights were accepted.
+
+use super::ram_flash::RamFlash;
+use super::{Seed, byte, take};
+use crate::synthetic::turning;
+use embedded_storage::nor_flash::ReadNorFlash;
+use gyronet::can::DataFrame;
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
+use gyronet::model::blob::CRC;
+use gyronet::pipeline::Pipeline;
+use gyronet::store::{Accepted, Calibration, Configuration, Level, Record, Store};
+use gyronet::units::{AngularRate, CentiCelsius};
+
+/// Smaller than the part's, so that it is soon full.
+pub const SECTOR: usize = 1024;
+type Flash = RamFlash<SECTOR>;
+
+/// As the bytes of both sectors; or, behind an odd byte, as records (key, version, length,
+/// content) whose lengths, headers and checksums are made to fit. What is read is inside its
+/// ranges and fit to be run with, and what is stored is read again.
+pub fn flash(mut data: &[u8]) {
+    let flash = if byte(&mut data) & 1 == 0 { Flash::new(data) } else { Flash::new(&fitting(data)) };
+    let mut store = Store::open(flash, 0).expect("the flash answers");
+    let calibration = store.get::<Calibration>().ok().flatten().unwrap_or_default();
+    calibration.check().expect("what is read was checked");
+    for temperature in [i16::MIN, 0, 2_500, i16::MAX] {
+        let _ = calibration.bias_at(Some(CentiCelsius(temperature)));
+    }
+    if let Ok(Some(configuration)) = store.get::<Configuration>() {
+        configuration.check().expect("what is read was checked");
+        run(&configuration, &calibration);
+    }
+    let _ = store.get::<Accepted>();
+    if store.set(&Configuration::DEFAULT).is_ok() {
+        assert_eq!(store.get(), Ok(Some(Configuration::DEFAULT)));
+    }
+}
+
+/// A few samples through a pipeline and its messages.
+fn run(configuration: &Configuration, calibration: &Calibration) {
+    let mut pipeline = Pipeline::new(configuration.pipeline(calibration));
+    let mut feeds = Feeds::new(Config::new(configuration.can).expect("checked with the rest"));
+    for tick in 0..3 {
+        let output = pipeline.process(turning(tick, AngularRate(1_000))).expect("a place on the grid");
+        let _ = feeds.process::<DataFrame>(&output.vehicle);
+    }
+}
+
+/// A sector of records as they should be.
+fn fitting(mut data: &[u8]) -> Vec<u8> {
+    let generation = 1_u32;
+    let header = CRC.checksum(&(generation ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
+    let mut sector = [generation.to_le_bytes(), header.to_le_bytes()].concat();
+    while !data.is_empty() {
+        let (key, version) = (byte(&mut data), byte(&mut data));
+        let len = usize::from(byte(&mut data));
+        let content = take(&mut data, len);
+        let mut record = vec![key, version, content.len() as u8, 0];
+        record.extend(content);
+        record.resize(record.len().next_multiple_of(4), 0xFF);
+        record.extend(CRC.checksum(&record).to_le_bytes());
+        sector.extend(record);
+    }
+    sector
+}
+
+pub fn seeds() -> Vec<Seed> {
+    let mut calibration =
+        Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Calibration::default() };
+    calibration.add_bias([AngularRate(5), AngularRate(-5), AngularRate(7)], Some(CentiCelsius(2_500)));
+    calibration.add_bias([AngularRate(6), AngularRate(-6), AngularRate(8)], Some(CentiCelsius(4_500)));
+    let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    let mut store = Store::open(Flash::new(&[]), 0).expect("the flash answers");
+    store.set(&configuration).and_then(|()| store.set(&calibration)).expect("there is room");
+    // The first sector, as the flash has it.
+    let mut raw = vec![0; 1 + SECTOR];
+    let mut flash = Flash::new(&[]);
+    let mut store = Store::open(&mut flash, 0);
+    if let Ok(store) = &mut store {
+        store.set(&configuration).and_then(|()| store.set(&calibration)).expect("there is room");
+    }
+    drop(store);
+    flash.read(0, &mut raw[1..]).expect("inside");
+    while raw.last() == Some(&0xFF) {
+        raw.pop();
+    }
+    let record = |key: u8, version: u8, content: &[u8]| {
+        [&[1, key, version, content.len() as u8][..], content].concat()
+    };
+    // A record in flash: its first word, its content, its checksum.
+    let content = |at: usize| {
+        let len = usize::from(raw[at + 2]);
+        (raw[at + 4..at + 4 + len].to_vec(), at + 8 + len.next_multiple_of(4))
+    };
+    let (first, next) = content(1 + 8);
+    let (second, _) = content(next);
+    vec![
+        ("sectors", raw.clone()),
+        ("configuration", record(Configuration::KEY, Configuration::VERSION, &first)),
+        ("calibration", record(Calibration::KEY, Calibration::VERSION, &second)),
+    ]
+}

@@ -1,0 +1,153 @@
+//! The bytes of the five sensors.
+
+use super::Seed;
+use crate::wire::{bytes, message, synthetic_frame};
+use gyronet::sensor::adis16465::{BURST, Burst, Model};
+use gyronet::sensor::crc::CRC_32_MPEG_2;
+use gyronet::sensor::dsp1760::command::{Command, Reply, setup};
+use gyronet::sensor::dsp1760::dialogue::Dialogue as KvhDialogue;
+use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
+use gyronet::sensor::dsp3000::Mode;
+use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, Reading};
+use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word};
+use gyronet::sensor::icm42688::packet::{Packet, Resolution};
+use gyronet::sensor::serial::Dialogue as _;
+use gyronet::sensor::xsens::dialogue::Dialogue as XsensDialogue;
+use gyronet::sensor::xsens::precision::Precision;
+use gyronet::sensor::xsens::{MtData2, Mti, xbus};
+use gyronet::units::Micros;
+
+/// As a stream to an MTi and to the dialogue, and as the data of a message.
+pub fn xsens(data: &[u8]) {
+    let mut mti = Mti::new();
+    let mut dialogue = XsensDialogue::new();
+    for (now, byte) in (0..).zip(data) {
+        mti.push(*byte);
+        while mti.next_sample().is_some() {}
+        dialogue.push(*byte);
+        let _ = dialogue.poll(Micros(now * 10_000));
+    }
+    if let Ok(message) = MtData2::parse(data) {
+        // What was read is written and read as the same; NaN is not equal to itself.
+        let frame = message.emit_as(Precision::Double);
+        let (_, again) = xbus::parse(&frame).expect("a frame of its own");
+        let again = MtData2::parse(again).expect("a message of its own");
+        assert_eq!(again.emit_as(Precision::Double), frame);
+    }
+}
+
+pub fn xsens_seeds() -> Vec<Seed> {
+    let fixed = message(77).emit_as(Precision::Fixed1632);
+    let (_, data) = xbus::parse(&fixed).expect("a frame of its own");
+    vec![
+        ("stream", [synthetic_frame(), message(200).emit_as(Precision::Single).to_vec()].concat()),
+        ("acks", bytes("fa ff 31 00 d0 fa ff 42 01 04 ba fa ff 11 00 f0")),
+        ("fixed_data", data.to_vec()),
+    ]
+}
+
+/// As a stream to the parser and to the dialogue, as a message, and as a message whose checksum
+/// is made to fit.
+pub fn dsp1760(data: &[u8]) {
+    let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
+    let mut dialogue = KvhDialogue::new(Dsp1760Config::DEFAULT);
+    for (now, byte) in (0..).zip(data) {
+        part.push(*byte);
+        while part.next_sample().is_some() {}
+        dialogue.push(*byte);
+        let _ = dialogue.poll(Micros(now * 10_000));
+    }
+    let _ = (Command::parse(data), Reply::parse(data));
+    let mut frame = data.to_vec();
+    frame.extend(CRC_32_MPEG_2.checksum(data).to_be_bytes());
+    for frame in [data, &frame] {
+        if let Ok(message) = Message::parse(frame) {
+            let again = Message::parse(&message.emit()).expect("a message of its own");
+            // By their bytes: NaN is not equal to itself.
+            assert_eq!(again.emit(), message.emit());
+        }
+    }
+}
+
+pub fn dsp1760_seeds() -> Vec<Seed> {
+    let message = |sequence, extra| {
+        let (rotation, acceleration) = ([0.0, 0.0, 1.75e-5], [0.0, 0.0, 1.0]);
+        Message { rotation, acceleration, extra, validity: Validity::GYRO, sequence }.emit().to_vec()
+    };
+    let [extras @ .., self_test] = [
+        message(1, Extra::Temperature(25)),
+        message(2, Extra::Timed { time: 123_456_789, temperature: 25 }),
+        message(3, Extra::Slow(25.0)),
+        [bytes("fe 81 00 aa 7f 7f 7f 7f 7f 7f 55"), message(4, Extra::Temperature(25))].concat(),
+    ];
+    let commands = setup(&Dsp1760Config::DEFAULT).map(|command| command.emit().into_bytes().to_vec());
+    vec![("stream", extras.concat()), ("self_test", self_test), ("commands", commands.concat())]
+}
+
+/// As lines, as words.
+pub fn dsp3000(data: &[u8]) {
+    let mut lines = Dsp3000Ascii::new();
+    let mut words = Dsp3000Binary::new(Mode::Rate, 0);
+    for byte in data {
+        if let Some(Ok(reading)) = lines.push(*byte) {
+            let line = reading.emit();
+            assert_eq!(Reading::parse(line.trim_end().as_bytes()), Ok(reading));
+        }
+        if let Some(word) = words.push(*byte) {
+            assert_eq!(Word::parse(word.emit()), Ok(word));
+        }
+    }
+}
+
+pub fn dsp3000_seeds() -> Vec<Seed> {
+    let line = |millionths, valid| Reading { millionths, valid }.emit().into_bytes().to_vec();
+    let word = |value| Word { valid: true, sync: 0, mode: Mode::Rate, value }.emit();
+    let values = -100_000..i32::from(LOCK) - 100_000 + 2;
+    vec![
+        ("lines", [line(10_000_000, true), line(-123, false)].concat()),
+        ("words", values.flat_map(word).collect()),
+    ]
+}
+
+/// As packets of either kind.
+pub fn icm42688(data: &[u8]) {
+    for resolution in [Resolution::Bits16, Resolution::Bits20] {
+        for bytes in data.chunks(resolution.bytes()) {
+            if let Ok(packet) = Packet::parse(resolution, bytes) {
+                assert_eq!(Packet::parse(resolution, &packet.emit()), Ok(packet));
+            }
+        }
+    }
+}
+
+pub fn icm42688_seeds() -> Vec<Seed> {
+    let packet = |resolution| {
+        let (acceleration, rate) = ([Some(0), Some(-1), Some(2048)], [Some(5), None, Some(-164)]);
+        Packet { resolution, acceleration, rate, temperature: Some(3), time: 1_000 }.emit().to_vec()
+    };
+    vec![("packet_3", packet(Resolution::Bits16)), ("packet_4", packet(Resolution::Bits20))]
+}
+
+/// As bursts, as they are and with a sum that fits.
+pub fn adis16465(data: &[u8]) {
+    let (bursts, _) = data.as_chunks::<BURST>();
+    for bytes in bursts {
+        let mut fitting = *bytes;
+        let sum: u16 = fitting.iter().take(18).map(|byte| u16::from(*byte)).sum();
+        fitting[18..].copy_from_slice(&sum.to_be_bytes());
+        for bytes in [*bytes, fitting] {
+            if let Ok(burst) = Burst::parse(&bytes) {
+                assert_eq!(burst.emit(), bytes);
+                for model in [Model::Adis16465_1, Model::Adis16465_2, Model::Adis16465_3, Model::Adis16470] {
+                    let _ = burst.sample(model, Micros(0));
+                }
+            }
+        }
+    }
+}
+
+pub fn adis16465_seeds() -> Vec<Seed> {
+    // No flag, rate -3, 400, 12; force -40, 4000, 0.0; 25.3 deg C; counter.
+    vec![("burst", bytes("00 00 00 00 ff fd 01 90 00 0c ff d8 0f a0 00 fd 12 34 06 62"))]
+}

@@ -1,0 +1,95 @@
+//! SLCAN: what a host says to the board, and what the monitor reads from a line or a log.
+
+use super::Seed;
+use crate::synthetic::{rate, vehicle};
+use embedded_can::{Frame, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
+use gyronet::can::slcan::port::Port;
+use gyronet::can::slcan::{emit, emit_stamped, parse, parse_stamped};
+use gyronet::units::{Micros, Yaw};
+use gyronet_tools::candump::Log;
+use gyronet_tools::monitor::Monitor;
+use gyronet_tools::monitor::line::{Splitter, parse_line};
+
+/// What the board answers besides frames.
+const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
+
+/// As a host's commands, while frames go out over a line that takes a few bytes now and then:
+/// what leaves is whole lines, each an answer or the frame that was sent.
+pub fn board(data: &[u8]) {
+    let own = DataFrame::new(StandardId::MAX, &[1, 2, 3]).expect("a frame");
+    let mut port = Port::<4>::new(500_000);
+    let mut sent = Vec::new();
+    for (k, byte) in (0..).zip(data) {
+        if k % 8 == 0 {
+            port.push(own, Micros(k * 10_000));
+        }
+        if let Some(frame) = port.receive(*byte) {
+            let line = emit(&frame).expect("a data frame");
+            assert_eq!(parse(&line[..line.len() - 1]), Ok(frame));
+        }
+        if let Some(outgoing) = port.outgoing() {
+            assert!(!outgoing.is_empty());
+            let taken = outgoing.len().min(usize::from(byte & 7));
+            sent.extend_from_slice(&outgoing[..taken]);
+            port.sent(taken);
+        }
+    }
+    while let Some(outgoing) = port.outgoing() {
+        sent.extend_from_slice(outgoing);
+        let taken = outgoing.len();
+        port.sent(taken);
+    }
+    assert!(sent.last().is_none_or(|byte| matches!(byte, b'\r' | 7)), "a torn line");
+    for line in sent.split(|byte| matches!(byte, b'\r' | 7)) {
+        let is_status = matches!(line, [b'F', _, _]);
+        let is_own = parse(line) == Ok(own)
+            || parse_stamped(line).is_ok_and(|(frame, _): (DataFrame, _)| frame == own);
+        assert!(ANSWERS.contains(&line) || is_status || is_own, "{:?}", String::from_utf8_lossy(line));
+    }
+}
+
+pub fn board_seeds() -> Vec<Seed> {
+    vec![
+        ("python_can", b"C\rS6\r\rO\rt0AA81A6F1A6F1A6F1A6F\r".to_vec()),
+        ("stamps", b"Z1\rF\rV\rN\rT18FEBF0B21234\rZ0\r".to_vec()),
+        ("refused", b"S9\rt9FF0\rt0AA8zz\rtoo long a line for anybody to have reason to send it\r".to_vec()),
+    ]
+}
+
+/// As what a serial line or a log gives to the monitor. A frame that is read can be said again.
+pub fn host(data: &[u8]) {
+    let mut splitter = Splitter::default();
+    let mut monitor = Monitor::new(&Config::DEFAULT);
+    for (k, byte) in data.iter().enumerate() {
+        let Some(line) = splitter.push(*byte) else { continue };
+        let _ = monitor.take_line(&line, k as f64 * 1e-3);
+        if let Ok((_, frame)) = parse_line(&line) {
+            let line = emit(&frame).expect("a data frame");
+            let line = std::str::from_utf8(&line).expect("ASCII");
+            assert_eq!(parse_line(line), Ok((None, frame)));
+        }
+    }
+    let state = &monitor.state;
+    let values = [state.rate, state.yaw, state.correction, state.sigma, state.latency];
+    assert!(values.into_iter().chain([state.drop_in, state.vdc2]).flatten().all(f64::is_finite));
+}
+
+pub fn host_seeds() -> Vec<Seed> {
+    let mut feeds = Feeds::new(Config::DEFAULT);
+    let (mut plain, mut stamped, mut log) = (Vec::new(), Vec::new(), Vec::new());
+    let mut candump = Log::new(&mut log);
+    for tick in 0..2 {
+        let time = Micros(u64::from(tick) * 10_000);
+        let sample = vehicle(tick, rate(0.25), Yaw(i64::from(tick) << 20));
+        for frame in feeds.process::<DataFrame>(&sample) {
+            plain.extend(emit(&frame).expect("a data frame"));
+            stamped.extend(emit_stamped(&frame, time).expect("a data frame"));
+            candump.frame(time, &frame).expect("a vector takes all");
+        }
+    }
+    candump.finish().expect("a vector takes all");
+    vec![("plain", plain), ("stamped", stamped), ("candump", log)]
+}

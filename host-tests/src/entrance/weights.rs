@@ -1,0 +1,89 @@
+//! Weight files of both networks.
+
+use super::{Seed, byte, take};
+use gyronet::model::blob::{Blob, CRC, HEADER_LEN};
+use gyronet::model::fognet_blob::FogBlob;
+use gyronet::model::{GyroNet, WindowNetwork, weights};
+use gyronet::window::{FEATURES, WINDOW};
+
+/// Bytes, on a word boundary.
+fn aligned(bytes: &[u8]) -> Vec<u32> {
+    let mut words = vec![0; bytes.len().div_ceil(4)];
+    bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+    words
+}
+
+/// The built-in file with places of it (three bytes of offset, one of length up to 15) written
+/// over and its checksum made to fit; `None` for data that are meant to be a file themselves.
+fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
+    if byte(&mut data) & 1 == 0 {
+        return None;
+    }
+    let mut words = aligned(file);
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+    let end = file.len() - 4;
+    while !data.is_empty() {
+        let [a, b, c] = [byte(&mut data), byte(&mut data), byte(&mut data)].map(usize::from);
+        let at = (a | b << 8 | c << 16) % end;
+        let len = usize::from(byte(&mut data) & 15);
+        for (to, from) in bytes[at..end].iter_mut().zip(take(&mut data, len)) {
+            *to = *from;
+        }
+    }
+    let crc = CRC.checksum(&bytes[..end]).to_le_bytes();
+    bytes[end..file.len()].copy_from_slice(&crc);
+    Some(words)
+}
+
+/// As a file, or as changes of the built-in one. What is accepted runs at the limits of its
+/// inputs without an overflow (which panics where these checks run).
+pub fn gyronet(data: &[u8]) {
+    let file = &weights::DEFAULT.0;
+    match patched(data, file) {
+        None => {
+            let content = &data[data.len().min(1)..];
+            assert!(Blob::new_checked(&bytemuck::cast_slice(&aligned(content))[..content.len()]).is_err());
+        }
+        Some(words) => {
+            if let Ok(blob) = Blob::new_checked(&bytemuck::cast_slice(&words)[..file.len()]) {
+                let mut network = GyroNet::new(blob);
+                let estimate = network.estimate(&[[i32::MAX; FEATURES]; WINDOW]);
+                assert!(estimate.scale.0 > 0 && usize::from(estimate.clamped_inputs) <= WINDOW * FEATURES);
+            }
+        }
+    }
+}
+
+/// As [`gyronet`], of FoGNet; its kernels are the same.
+pub fn fognet(data: &[u8]) {
+    let file = &weights::FOGNET.0;
+    match patched(data, file) {
+        None => {
+            let content = &data[data.len().min(1)..];
+            assert!(FogBlob::new_checked(&bytemuck::cast_slice(&aligned(content))[..content.len()]).is_err());
+        }
+        Some(words) => {
+            if let Ok(blob) = FogBlob::new_checked(&bytemuck::cast_slice(&words)[..file.len()]) {
+                assert!(blob.input_clamp > 0);
+                let _ = (blob.spread(i32::MIN), blob.spread(i32::MAX), blob.mean_gain());
+            }
+        }
+    }
+}
+
+pub fn seeds() -> Vec<Seed> {
+    let header = &weights::DEFAULT.0[..HEADER_LEN];
+    let change = |at: usize, content: &[u8]| {
+        let [a, b, c, ..] = at.to_le_bytes();
+        [&[a, b, c, content.len() as u8], content].concat()
+    };
+    let one = |at, content: &[u8]| [&[1][..], &change(at, content)].concat();
+    vec![
+        ("header", [&[0][..], header].concat()),
+        ("untouched", vec![1]),
+        ("clamp", one(24, &[0xFF, 0x7F, 0, 0])),
+        ("topology", one(12, &[11, 0])),
+        ("weights", [one(2_000, &[0x7F; 8]), change(40_000, &[0x80; 8])].concat()),
+        ("provenance", one(80, &[0xFF, 0xFE])),
+    ]
+}
