@@ -33,6 +33,7 @@ pub mod plot;
 pub mod receiver;
 pub mod report;
 pub mod scene;
+pub mod upsets;
 pub mod wire;
 
 use draw::Draw;

@@ -101,9 +101,21 @@ impl<'d> Scene<'d> {
 
     /// Runs a stretch with faults; it begins where a state is kept.
     pub fn run(&self, span: Span, faults: &[Fault], network: &mut impl WindowNetwork) -> Outcome {
+        self.run_on(span, faults, None, &mut Remembering { network, known: &self.known })
+    }
+
+    /// [`Scene::run`] on a network that is asked about every window; `upset`: when something else
+    /// than the faults is done, microseconds.
+    pub fn run_on(
+        &self,
+        span: Span,
+        faults: &[Fault],
+        upset: Option<u64>,
+        network: &mut impl WindowNetwork,
+    ) -> Outcome {
         let (mut board, mut receiver) = self.states[span.from / STATE_EVERY].clone();
         let mut readings = self.drive.readings[span.from..span.to].to_vec();
-        let mut begin: Option<u64> = None;
+        let mut begin = upset;
         let mut began = |at: Option<u64>| begin = begin.into_iter().chain(at).min();
         for fault in faults {
             began(disturb(&mut readings, span.from, fault, self.part, self.gyro_bias));
@@ -112,13 +124,12 @@ impl<'d> Scene<'d> {
         for fault in faults.iter().filter(|fault| fault.line != Line::Out) {
             began(damage(&mut messages, fault));
         }
-        let mut network = Remembering { network, known: &self.known };
         let mut out = Vec::new();
         let mut rest = messages.iter().peekable();
         let start = readings.first().map_or(0, |reading| reading.at - PERIOD_US);
         let mut last = start;
         for (row, reading) in (span.from..).zip(&readings) {
-            turn(&mut board, &mut rest, row, last..reading.at, &mut network, &mut out);
+            turn(&mut board, &mut rest, row, last..reading.at, network, &mut out);
             last = reading.at;
         }
         for fault in faults.iter().filter(|fault| fault.line == Line::Out) {
@@ -128,7 +139,8 @@ impl<'d> Scene<'d> {
         out.iter().for_each(|message| receiver.receive(message, &mut seen));
         receiver.time(last, &mut seen);
         let at = |row: usize| readings.get(row - span.from).map_or(last, |reading| reading.at);
-        let end = faults.iter().map(|fault| at(fault.from + fault.rows)).max().unwrap_or(last);
+        let over = faults.iter().map(|fault| at(fault.from + fault.rows)).chain(upset);
+        let end = over.max().unwrap_or(last);
         let begin = begin.unwrap_or(last);
         let times = Times { from: span.from, to: span.to, begin, end, last };
         let mut outcome = self.baseline.judge(&seen, times);
