@@ -80,7 +80,7 @@ impl core::fmt::Display for AlignError {
 
 impl core::error::Error for AlignError {}
 
-/// Where the grid stands.
+/// Puts samples on the 100 Hz grid by their own time stamps; holds where the grid stands.
 #[derive(Debug, Clone, Default)]
 pub struct Aligner {
     last: Option<(Micros, u32)>,

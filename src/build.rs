@@ -1,13 +1,19 @@
-//! Hands `memory.x` to the linker of the firmware images, and tells the library whether the
+//! Hands the memory map to the linker of the firmware images, and tells the library whether the
 //! processor has the DSP extension: a stable compiler does not show that feature to `cfg`.
 
 use std::{env, fs, path::PathBuf};
 
+/// The memory regions of the part that an image is built for.
+const REGIONS: [&str; 2] =
+    ["src/bin/coprocessor/stm32f405/regions.x", "src/bin/coprocessor/stm32h743/regions.x"];
 /// What only the image that is flashed must keep to.
 const SLOTS: &str = "src/bin/coprocessor/slots.x";
 
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");
+    for regions in REGIONS {
+        println!("cargo:rerun-if-changed={regions}");
+    }
     println!("cargo:rerun-if-changed=src/build.rs");
     println!("cargo:rerun-if-changed={SLOTS}");
     println!("cargo:rustc-check-cfg=cfg(gyronet_dsp, gyronet_armv8m)");
@@ -18,11 +24,17 @@ fn main() {
         println!("cargo:rustc-cfg=gyronet_dsp");
     }
     if env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
-        // cortex-m-rt's link.x includes memory.x from the search path.
+        // cortex-m-rt's link.x includes memory.x, and that regions.x, from the search path.
+        let [stm32f405, stm32h743] = REGIONS;
+        let regions = if env::var_os("CARGO_FEATURE_STM32H743").is_some() { stm32h743 } else { stm32f405 };
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
         fs::copy("memory.x", out.join("memory.x")).expect("memory.x stands in the package root");
+        fs::copy(regions, out.join("regions.x")).expect("a part's regions stand with its code");
         println!("cargo:rustc-link-search={}", out.display());
         println!("cargo:rustc-link-arg-bin=coprocessor=-T{SLOTS}");
+        if env::var_os("CARGO_FEATURE_RTT").is_some() {
+            println!("cargo:rustc-link-arg-bin=coprocessor=-Tdefmt.x");
+        }
     }
 }
 

@@ -53,7 +53,7 @@ pub struct ImplausibleTurn {
     pub correction: Angle,
 }
 
-/// What one frame led to.
+/// What one frame of 10 ms led to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogOutput {

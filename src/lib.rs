@@ -1,4 +1,87 @@
-#![doc = include_str!("../README.md")]
+//! Learned yaw-rate correction in real time: sensor bytes in, corrected yaw rate on CAN out.
+//!
+//! The library under the firmware, for a board of your own: `no_std`, no heap, no hardware in it
+//! but the traits of `embedded-hal`, `embedded-io` and `embedded-can`. Time is an argument, weights
+//! are bytes in flash that are checked once, state is a value that the caller owns. What runs here
+//! gives the same bits on a Cortex-M and on a desk; the README of the repository has the numbers.
+//!
+//! | on the way | module | what |
+//! |---|---|---|
+//! | bytes to samples | [`sensor`] | Xsens MTi, KVH DSP-1760 and DSP-3000, ICM-42688, ADIS16465 |
+//! | samples | [`sample`], [`units`] | fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds |
+//! | one clock | [`align`] | the 100 Hz grid; gaps, duplicates, jumps |
+//! | the sensor in the car | [`mounting`], [`bias`] | rotation, levelling, static bias, zero-rate updates |
+//! | network | [`window`], [`nn`], [`model`] | ten samples in, the gyro's error out |
+//! | estimates to rates | [`compensate`], [`uncertainty`] | overlap, lag, carry; the expected error |
+//! | all of that | [`pipeline`], [`guard`] | sample in, [`vehicle::VehicleSample`] out; the watch over the sensor |
+//! | the bus | [`can`], [`wheels`] | Bosch MM5.10, own messages, J1939, E2E, SLCAN; wheel speeds in |
+//! | a fibre-optic gyro | [`seconds`], [`fog`] | FoGNet: a minute in, a corrected turn out |
+//! | where it goes | [`odometry`] | dead reckoning with wheel speeds |
+//! | a product | [`health`], [`store`], [`service`] | states and counters, flash records, the service line |
+//!
+//! # On a board of your own
+//!
+//! Everything but the board itself (`src/examples/own_board.rs`); `src/examples/cortex_m.rs` is the
+//! same as an image for a Cortex-M.
+//!
+//! ```
+#![doc = include_str!("examples/own_board.rs")]
+//! # // A port that holds four seconds of a parked car's samples, and a controller that counts.
+//! # use embedded_can::{Frame, nb};
+//! # struct Port(std::collections::VecDeque<u8>);
+//! # impl embedded_io::ErrorType for Port { type Error = core::convert::Infallible; }
+//! # impl embedded_io::Read for Port {
+//! #     fn read(&mut self, to: &mut [u8]) -> Result<usize, Self::Error> {
+//! #         let count = to.len().min(self.0.len());
+//! #         to.iter_mut().zip(self.0.drain(..count)).for_each(|(to, byte)| *to = byte);
+//! #         Ok(count)
+//! #     }
+//! # }
+//! # impl embedded_io::ReadReady for Port {
+//! #     fn read_ready(&mut self) -> Result<bool, Self::Error> { Ok(!self.0.is_empty()) }
+//! # }
+//! # #[derive(Default)]
+//! # struct Controller(std::rc::Rc<std::cell::RefCell<Vec<gyronet::can::DataFrame>>>);
+//! # impl nb::Can for Controller {
+//! #     type Frame = gyronet::can::DataFrame;
+//! #     type Error = core::convert::Infallible;
+//! #     fn transmit(&mut self, frame: &Self::Frame) -> ::nb::Result<Option<Self::Frame>, Self::Error> {
+//! #         self.0.borrow_mut().push(*frame);
+//! #         Ok(None)
+//! #     }
+//! #     fn receive(&mut self) -> ::nb::Result<Self::Frame, Self::Error> { Err(::nb::Error::WouldBlock) }
+//! # }
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # use gyronet::sensor::xsens::MtData2;
+//! # let messages = (0..400_u32).flat_map(|k| MtData2 {
+//! #     packet_counter: Some(k as u16), sample_time_fine: Some(100 * k), temperature: None, status: Some(3),
+//! #     acceleration: Some([0.0, 0.0, 9.81 + 0.001 * (k % 2) as f32]), rate_of_turn: Some([0.0, 0.0, 0.01]),
+//! # }.emit().to_vec());
+//! let (uart, can) = (/* your port and your controller */
+//! #     Port(messages.collect()), Controller::default());
+//! # let frames = can.0.clone();
+//! let mut coprocessor = Coprocessor::new(uart, can)?;
+//! coprocessor.poll(Micros(0));
+//! # assert_eq!((frames.borrow().len(), coprocessor.lost), (6 * 400, [0, 0]));
+//! # let last = gyronet::can::bosch::Tx1::parse(frames.borrow()[6 * 399].data())?;
+//! # assert_eq!(last.yaw_rate_status, gyronet::can::bosch::SignalStatus::OK);
+//! # assert!(last.yaw_rate_deg_per_sec().abs() < 0.05, "the bias is off: {}", last.yaw_rate_deg_per_sec());
+//! # coprocessor.poll(Micros(1_000_000));
+//! # assert_eq!(frames.borrow().len(), 6 * 401, "silence is told");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Features, unsafe code, panics
+//!
+//! No feature is on by default. `defmt`: `defmt::Format` on the public types. `firmware`: what the
+//! images of the repository need, nothing for a user of the library.
+//!
+//! Unsafe code is denied but for one kernel file for Cortex-M with the DSP extension
+//! (`src/nn/simd`), whose results equal those of portable code to the last bit.
+//!
+//! Nothing that comes from outside can make the library panic: bad bytes, times and weights are typed
+//! errors or counted, and what is wrong is said on the bus. Errors implement [`core::error::Error`].
 #![cfg_attr(not(test), no_std)]
 
 pub mod align;
@@ -23,3 +106,8 @@ pub mod units;
 pub mod vehicle;
 pub mod wheels;
 pub mod window;
+
+/// The README's examples run as tests, too.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -150,7 +150,7 @@ impl Rotation {
         self.turn(force.map(|axis| axis.0)).map(SpecificForce)
     }
 
-    /// A sample in the vehicle's axes.
+    /// A sample in the vehicle's axes: x forward, y left, z up.
     #[must_use]
     pub fn sample(&self, sample: &ImuSample) -> ImuSample {
         ImuSample {

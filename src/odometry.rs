@@ -35,7 +35,7 @@ impl Track {
     }
 }
 
-/// Dead reckoning on a board.
+/// Dead reckoning on a board, in integers: 2^-32 m and 2^-44 rad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Odometry {

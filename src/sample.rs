@@ -68,7 +68,7 @@ pub enum Standstill {
     Still,
 }
 
-/// What is known of the wheels.
+/// What is known of the wheels: their speeds, and whether they stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSample {

@@ -35,7 +35,7 @@ pub struct PromptSample {
     pub quality: Quality,
 }
 
-/// What goes out for one sample.
+/// What goes out for one sample: both rates, the other axes, and what they are worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VehicleSample {

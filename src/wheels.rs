@@ -8,7 +8,7 @@
 use crate::sample::{Standstill, WHEELS, WheelSample};
 use crate::units::{Micros, WheelSpeed};
 
-/// When wheels stand.
+/// When wheels count as standing, and when as silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StandstillRule {
@@ -55,7 +55,7 @@ impl Wheels {
         }
     }
 
-    /// Looks at the new speeds.
+    /// Judges standing or moving anew, by the speeds that have been set.
     pub fn judge(&mut self, now: Micros) {
         let limit = self.rule.still_speed.0.unsigned_abs();
         let slow = self.speeds.iter().flatten().all(|(speed, _)| speed.0.unsigned_abs() <= limit);

@@ -37,7 +37,7 @@ impl Window {
         self.filled = 0;
     }
 
-    /// Adds the newest sample.
+    /// Adds the newest sample; the oldest one makes way.
     pub fn push(&mut self, features: Features) {
         if let Some(place) = self.ring.get_mut(self.next) {
             *place = features;

@@ -3,9 +3,8 @@
 use crate::qemu;
 use crate::recordings::workspace;
 use crate::require::{self, Need};
-use gyronet_tools::target_bench::{self, TARGET};
+use gyronet_tools::target_bench;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// The ELF file of an image (`coprocessor`, `selftest`, `bench`), for a test that is skipped
 /// (aloud) where the target's standard library is not installed.
@@ -17,7 +16,7 @@ use std::process::Command;
 /// When the build fails: that is an error, not a missing tool.
 #[must_use]
 pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
-    require::wants(test, Need::Qemu, target_installed())?;
+    require::wants(test, Need::Qemu, target_bench::target_installed())?;
     let folder = Path::new(scratch).join("fw");
     Some(target_bench::build(workspace(), image, &folder).unwrap_or_else(|error| panic!("{error}")))
 }
@@ -27,20 +26,4 @@ pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
 pub fn coprocessor(test: &str, scratch: &str) -> Option<PathBuf> {
     qemu::available(test)?;
     firmware(test, scratch, "coprocessor")
-}
-
-/// Whether rustc has a standard library for the target.
-fn target_installed() -> Result<(), String> {
-    let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
-    let output = Command::new(rustc)
-        .args(["--print", "target-libdir", "--target", TARGET])
-        .current_dir(workspace())
-        .output()
-        .map_err(|error| format!("rustc cannot be run: {error}"))?;
-    let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-    if output.status.success() && Path::new(&folder).is_dir() {
-        Ok(())
-    } else {
-        Err(format!("the Rust target {TARGET} is not installed (rustup target add {TARGET})"))
-    }
 }

@@ -3,6 +3,7 @@
 
 pub mod entrance;
 pub mod flash;
+pub mod golden;
 pub mod image;
 pub mod noise;
 pub mod packing;

@@ -1,271 +1,43 @@
-//! The emulated board: QEMU's `netduinoplus2`, an STM32F405 with its serial lines on TCP.
-//!
-//! The harness listens on ports that the system picks, and QEMU connects to them before the
-//! machine starts: no port is guessed, and nothing that the board sends is lost. What is sent to
-//! a receiver that the image has not switched on yet would be lost, as on a desk; so
-//! [`Board::send`] first looks at its enable bits through QEMU's test port. Every wait has a
-//! limit, and QEMU is killed when the [`Board`] goes. Bytes travel at the host's pace, not at a
-//! baud rate.
+//! The emulated board for tests: [`gyronet_tools::emulator`], whose errors end the test.
 
 use crate::require::{self, Need};
-use std::fmt::Display;
-use std::io::{Read, Write};
-use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
+use gyronet_tools::emulator::{self, Result};
+use std::net::SocketAddr;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
-
-const PROGRAM: &str = "qemu-system-arm";
-/// How long QEMU may take to connect its lines, and the image to switch a receiver on.
-const START: Duration = Duration::from_secs(20);
-const POLL: Duration = Duration::from_millis(5);
-/// How long a client is given to speak first.
-const HELLO: Duration = Duration::from_secs(2);
-
-/// Control register 1 of USART 1 to 6 (RM0090, table 1 and 30.6.4), and its bits UE and RE.
-const CR1: [u32; 6] = [0x4001_100C, 0x4000_440C, 0x4000_480C, 0x4000_4C0C, 0x4000_500C, 0x4001_140C];
-const RECEIVER_ENABLED: u32 = 1 << 13 | 1 << 2;
-/// Status register, which lies before it; its bit TXE. The emulated one takes a word beyond ten
-/// bits as a mask, any other as a value with TXE set.
-const SR_BEFORE_CR1: u32 = 0x0C;
-const ALL_BUT_TXE: u32 = !(1 << 7);
+use std::time::Duration;
 
 /// Whether QEMU is there, for a test that is skipped (aloud) without it.
 #[must_use]
 pub fn available(test: &str) -> Option<()> {
-    let version = Command::new(PROGRAM).arg("--version").stdout(Stdio::null()).status();
-    let found = version.map(drop).map_err(|error| format!("{PROGRAM} cannot be run: {error}"));
-    require::wants(test, Need::Qemu, found)
+    require::wants(test, Need::Qemu, emulator::available().map_err(|error| error.to_string()))
 }
 
-/// What a thread collects until its source ends.
-#[derive(Debug, Default)]
-struct Collected {
-    bytes: Mutex<Vec<u8>>,
-    more: Condvar,
-    ended: AtomicBool,
-}
-
-impl Collected {
-    /// All bytes so far and whether it is enough, once it is or time is up.
-    fn wait(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> (Vec<u8>, bool) {
-        let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
-        let (bytes, timeout) = self
-            .more
-            .wait_timeout_while(bytes, limit, |bytes| !enough(bytes))
-            .unwrap_or_else(PoisonError::into_inner);
-        (bytes.clone(), !timeout.timed_out())
-    }
-}
-
-impl Collected {
-    /// Hands on what comes until there is no more, or the sink takes no more.
-    fn copy_to(&self, mut sink: impl Write) {
-        let mut copied = 0;
-        loop {
-            let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
-            let ended = || self.ended.load(Ordering::Acquire);
-            let (bytes, _) = self
-                .more
-                .wait_timeout_while(bytes, START, |bytes| bytes.len() == copied && !ended())
-                .unwrap_or_else(PoisonError::into_inner);
-            let new = bytes[copied..].to_vec();
-            drop(bytes);
-            if (new.is_empty() && ended()) || sink.write_all(&new).is_err() {
-                return;
-            }
-            copied += new.len();
-        }
-    }
-}
-
-/// QEMU itself, killed on drop, and the threads that read from it.
+/// An emulated board that runs an image. Whatever goes wrong with it is a panic with QEMU's own
+/// words; what each method does stands with that of the same name in [`emulator::Board`].
 #[derive(Debug)]
-struct Process {
-    child: Child,
-    errors: Arc<Collected>,
-    threads: Vec<JoinHandle<()>>,
+pub struct Board(emulator::Board);
+
+#[track_caller]
+fn sure<T>(result: Result<T>) -> T {
+    result.unwrap_or_else(|error| panic!("{error}"))
 }
 
-impl Process {
-    fn start(mut command: Command) -> Self {
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-        let mut child = command.spawn().unwrap_or_else(|error| panic!("{PROGRAM} cannot be run: {error}"));
-        let stderr = child.stderr.take().expect("it is piped");
-        let mut process = Self { child, errors: Arc::default(), threads: Vec::new() };
-        process.errors = process.collect(stderr);
-        process
-    }
-
-    fn collect(&mut self, mut source: impl Read + Send + 'static) -> Arc<Collected> {
-        let collected = Arc::<Collected>::default();
-        let sink = Arc::clone(&collected);
-        self.threads.push(std::thread::spawn(move || {
-            let mut chunk = [0; 4096];
-            while let Ok(len @ 1..) = source.read(&mut chunk) {
-                sink.bytes.lock().unwrap_or_else(PoisonError::into_inner).extend(&chunk[..len]);
-                sink.more.notify_all();
-            }
-            sink.ended.store(true, Ordering::Release);
-            sink.more.notify_all();
-        }));
-        collected
-    }
-
-    /// QEMU's end of a line.
-    fn accept(&mut self, listener: &TcpListener) -> Line {
-        let until = Instant::now() + START;
-        listener.set_nonblocking(true).expect("a listener can be polled");
-        let stream = loop {
-            if let Ok((stream, _)) = listener.accept() {
-                break stream;
-            }
-            if let Ok(Some(status)) = self.child.try_wait() {
-                self.fail(format!("ended at its start with {status}"));
-            }
-            self.sleep(until, "did not connect its lines");
-        };
-        stream.set_nonblocking(false).expect("a socket can block");
-        stream.set_nodelay(true).expect("TCP has no-delay");
-        let received = self.collect(stream.try_clone().expect("a socket can be cloned"));
-        Line { stream, received }
-    }
-
-    /// A short sleep, unless time is up.
-    fn sleep(&self, until: Instant, what: impl Display) {
-        if Instant::now() > until {
-            self.fail(what);
-        }
-        std::thread::sleep(POLL);
-    }
-
-    fn errors(&self) -> String {
-        String::from_utf8_lossy(&self.errors.wait(Duration::ZERO, |_| true).0).into_owned()
-    }
-
-    fn fail(&self, what: impl Display) -> ! {
-        panic!("{PROGRAM}: {what}\nits standard error:\n{}", self.errors());
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        // It may have ended by itself already. Its ends of all lines close with it.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
-        }
-    }
-}
-
-/// One connection to QEMU.
-#[derive(Debug)]
-struct Line {
-    stream: TcpStream,
-    received: Arc<Collected>,
-}
-
-/// Whole lines without their ends.
-fn split(bytes: &[u8], end: u8) -> Vec<Vec<u8>> {
-    let mut lines: Vec<Vec<u8>> = bytes.split(|byte| *byte == end).map(<[u8]>::to_vec).collect();
-    lines.pop();
-    lines
-}
-
-/// An emulated board that runs an image.
-#[derive(Debug)]
-pub struct Board {
-    process: Process,
-    registers: Line,
-    usarts: Vec<Line>,
-}
-
+#[expect(missing_docs, reason = "see the type")]
 impl Board {
-    /// Starts QEMU with an image and its first `usarts` serial lines (1 to 6) connected;
-    /// `arguments` are added to QEMU's.
-    ///
-    /// # Panics
-    /// When QEMU does not start; its own words are in the message.
     #[must_use]
     pub fn boot(image: &Path, usarts: usize, arguments: &[&str]) -> Self {
-        let listen = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port on the loopback");
-        let port = |listener: &TcpListener| listener.local_addr().expect("it is bound").port();
-        let registers = listen();
-        let listeners: Vec<TcpListener> = (0..usarts).map(|_| listen()).collect();
-        let mut command = Command::new(PROGRAM);
-        command
-            .args(["-machine", "netduinoplus2", "-nographic"])
-            // An instruction takes a nanosecond: the board's time does not depend on how busy the host is.
-            .args(["-icount", "shift=0"])
-            .args(["-semihosting-config", "enable=on,target=native"])
-            .args([
-                "-monitor",
-                "none",
-                "-qtest",
-                &format!("tcp:127.0.0.1:{}", port(&registers)),
-                "-qtest-log",
-                "/dev/null",
-            ])
-            .args(arguments);
-        // A multiplexer of one: it keeps up to 32 bytes, so that QEMU need not be woken for each of
-        // them, which takes longer the busier the host is. Its escape character is none of a byte.
-        command.args(["-echr", "256"]);
-        for (n, listener) in listeners.iter().enumerate() {
-            let socket =
-                format!("socket,id=line{n},host=127.0.0.1,port={},nodelay=on,mux=on", port(listener));
-            command.args(["-chardev", &socket, "-serial", &format!("chardev:line{n}")]);
-        }
-        if usarts == 0 {
-            command.args(["-serial", "none"]);
-        }
-        command.arg("-kernel").arg(image);
-        let mut process = Process::start(command);
-        let registers = process.accept(&registers);
-        let usarts = listeners.iter().map(|listener| process.accept(listener)).collect();
-        Self { process, registers, usarts }
+        Self(sure(emulator::Board::boot(image, usarts, arguments)))
     }
 
-    /// Sends bytes into USART `n` (1 to 6) once its receiver is on, waiting while the board
-    /// takes none.
-    ///
-    /// # Panics
-    /// When the receiver stays off, or takes no byte for `limit`.
     pub fn send(&mut self, n: usize, bytes: &[u8], limit: Duration) {
-        let until = Instant::now() + START;
-        while self.word(CR1[n - 1]) & RECEIVER_ENABLED != RECEIVER_ENABLED {
-            self.process.sleep(until, format!("the image does not switch USART{n}'s receiver on"));
-        }
-        let mut stream = &self.usarts[n - 1].stream;
-        stream.set_write_timeout(Some(limit)).expect("the limit is not zero");
-        if let Err(error) = stream.write_all(bytes) {
-            self.process.fail(format!("USART{n} does not take the bytes: {error}"));
-        }
+        sure(self.0.send(n, bytes, limit));
     }
 
-    /// Everything that USART `n` has sent since the start, once it holds `count` lines (ends of
-    /// line `end`). Each line without its end; an unfinished one is left out.
-    ///
-    /// # Panics
-    /// When they do not come within `limit`; the message says how many did.
     #[must_use]
     pub fn lines(&self, n: usize, end: u8, count: usize, limit: Duration) -> Vec<Vec<u8>> {
-        let ends = |bytes: &[u8]| bytes.iter().filter(|byte| **byte == end).count();
-        let (bytes, enough) = self.usarts[n - 1].received.wait(limit, |bytes| ends(bytes) >= count);
-        if !enough {
-            self.process
-                .fail(format!("USART{n} sent {} lines in {limit:?} instead of {count}", ends(&bytes)));
-        }
-        split(&bytes, end)
+        sure(self.0.lines(n, end, count, limit))
     }
 
-    /// The same, once they are what is awaited.
-    ///
-    /// # Panics
-    /// When they are not within `limit`.
     #[must_use]
     pub fn lines_until(
         &self,
@@ -274,93 +46,28 @@ impl Board {
         limit: Duration,
         enough: impl Fn(&[Vec<u8>]) -> bool,
     ) -> Vec<Vec<u8>> {
-        let (bytes, is_enough) = self.usarts[n - 1].received.wait(limit, |bytes| enough(&split(bytes, end)));
-        if !is_enough {
-            self.process.fail(format!("USART{n} did not send in {limit:?} what is awaited"));
-        }
-        split(&bytes, end)
+        sure(self.0.lines_until(n, end, limit, enough))
     }
 
-    /// USART `n` takes no more bytes from the image (its transmit register stays full), or does
-    /// again.
-    ///
-    /// # Panics
-    /// When QEMU does not answer.
     pub fn stall(&mut self, n: usize, stalled: bool) {
-        let value = if stalled { ALL_BUT_TXE } else { 0 };
-        self.ask(&format!("writel {:#x} {value:#x}", CR1[n - 1] - SR_BEFORE_CR1));
+        sure(self.0.stall(n, stalled));
     }
 
-    /// An address at which one TCP client can talk to USART `n`, and reads everything that it
-    /// has sent since the start. It comes once the client has said something, or said nothing for
-    /// a while: pyserial throws away what is there when it opens a line.
-    ///
-    /// # Panics
-    /// When the system gives no port.
     #[must_use]
     pub fn serve(&mut self, n: usize) -> SocketAddr {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port on the loopback");
-        let address = listener.local_addr().expect("it is bound");
-        let Line { stream, received } = &self.usarts[n - 1];
-        let (mut board, received) =
-            (stream.try_clone().expect("a socket can be cloned"), Arc::clone(received));
-        // Both threads end with the client or, at the latest, with the board's end of the line.
-        std::thread::spawn(move || {
-            let Ok((client, _)) = listener.accept() else { return };
-            let Ok(mut from_client) = client.try_clone() else { return };
-            let _ = client.set_read_timeout(Some(HELLO));
-            let _ = client.peek(&mut [0]);
-            let _ = client.set_read_timeout(None);
-            std::thread::spawn(move || std::io::copy(&mut from_client, &mut board));
-            received.copy_to(&client);
-            let _ = client.shutdown(Shutdown::Both);
-        });
-        address
+        sure(self.0.serve(n))
     }
 
-    /// A word of the board's memory or registers.
-    ///
-    /// # Panics
-    /// When QEMU does not answer.
     pub fn word(&mut self, address: u32) -> u32 {
-        let answer = self.ask(&format!("readl {address:#x}"));
-        let word = answer.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
-        word.unwrap_or_else(|| self.process.fail(format!("the test port answers {answer:?}")))
+        sure(self.0.word(address))
     }
 
-    /// What QEMU's test port answers to a command, behind its "OK".
-    fn ask(&mut self, command: &str) -> String {
-        let Line { stream, received } = &mut self.registers;
-        let asked = received.wait(Duration::ZERO, |_| true).0.len();
-        if let Err(error) = stream.write_all(format!("{command}\n").as_bytes()) {
-            self.process.fail(format!("the test port does not listen: {error}"));
-        }
-        let answer = |bytes: &[u8]| {
-            let text = String::from_utf8_lossy(bytes.get(asked..)?).into_owned();
-            Some(text.strip_prefix("OK")?.strip_suffix('\n')?.trim().to_owned())
-        };
-        let (bytes, _) = received.wait(START, |bytes| answer(bytes).is_some());
-        answer(&bytes)
-            .unwrap_or_else(|| self.process.fail(format!("the test port does not answer {command}")))
-    }
-
-    /// Waits until QEMU ends by itself (semihosting) and returns its exit code.
-    ///
-    /// # Panics
-    /// When it does not within `limit`, or is killed by a signal.
     pub fn exit_code(&mut self, limit: Duration) -> i32 {
-        let until = Instant::now() + limit;
-        loop {
-            if let Ok(Some(status)) = self.process.child.try_wait() {
-                return status.code().unwrap_or_else(|| self.process.fail(format!("ended with {status}")));
-            }
-            self.process.sleep(until, format!("did not end within {limit:?}"));
-        }
+        sure(self.0.exit_code(limit))
     }
 
-    /// What QEMU, and the image through semihosting, have written to standard error.
     #[must_use]
     pub fn errors(&self) -> String {
-        self.process.errors()
+        self.0.errors()
     }
 }

@@ -3,30 +3,18 @@
 use gyronet::model::fognet_blob::{HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogLayerOutputs;
 use gyronet::seconds::STEPS;
+use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_tools::fog_checkpoint::FogCheckpoint;
-use safetensors::{Dtype, SafeTensors};
-
-const WINDOWS: usize = 8;
-/// f32 sums of a few hundred products of order 1, in another order than PyTorch's.
-const TOLERANCE: f32 = 1e-5;
-
-fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Vec<f32> {
-    let view = file.tensor(name).expect(name);
-    assert_eq!((view.dtype(), view.shape()), (Dtype::F32, shape), "{name}");
-    view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
-}
 
 #[test]
 fn every_layer_equals_pytorch() {
-    let weights = workspace().join("tools/weights");
-    let checkpoint =
-        FogCheckpoint::read(&weights.join("fognet.safetensors")).expect("the committed checkpoint");
+    let path = workspace().join("tools/weights/fognet.safetensors");
+    let checkpoint = FogCheckpoint::read(&path).expect("the committed checkpoint");
     let network = checkpoint.network();
-    let bytes = std::fs::read(weights.join("fognet.golden.safetensors")).expect("the committed tensors");
-    let golden = SafeTensors::deserialize(&bytes).expect("safetensors");
+    let golden = Golden::read("fognet");
 
-    let input = tensor(&golden, "input", &[WINDOWS, STEPS, INPUTS]);
+    let input = golden.tensor("input", &[WINDOWS, STEPS, INPUTS]);
     let (windows, _) = input.as_chunks::<INPUTS>().0.as_chunks::<STEPS>();
     let outputs: Vec<_> = windows.iter().map(|window| network.layers(window)).collect();
     let flat = |layer: fn(&FogLayerOutputs) -> Vec<f32>| outputs.iter().flat_map(layer).collect::<Vec<f32>>();
@@ -39,17 +27,10 @@ fn every_layer_equals_pytorch() {
         ("correction", &[WINDOWS], flat(|o| vec![o.correction])),
         ("prediction", &[WINDOWS], flat(|o| vec![o.prediction])),
     ] {
-        let theirs = tensor(&golden, name, shape);
-        assert_eq!(ours.len(), theirs.len());
-        let largest = |values: &[f32]| values.iter().fold(0.0f32, |max, value| max.max(value.abs()));
-        let difference: Vec<f32> = ours.iter().zip(&theirs).map(|(ours, theirs)| ours - theirs).collect();
-        let (difference, value) = (largest(&difference), largest(&theirs));
-        println!("{name}: largest difference {difference:.2e}, largest value {value:.3}");
-        assert!(difference <= TOLERANCE, "{name}");
-        assert!(value > 0.0, "{name} says nothing");
+        golden.compare(name, shape, &ours);
     }
     // The corrections are small numbers: they must agree as parts of themselves too.
-    let theirs = tensor(&golden, "correction", &[WINDOWS]);
+    let theirs = golden.tensor("correction", &[WINDOWS]);
     for (ours, theirs) in outputs.iter().zip(theirs) {
         assert!(
             (ours.correction - theirs).abs() <= 1e-3 * theirs.abs() + 1e-8,

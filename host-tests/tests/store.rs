@@ -29,7 +29,8 @@ fn open(flash: &Flash) -> Store<Region<RECORD_SECTOR>> {
 
 #[test]
 fn layout_is_the_linker_s() {
-    let text = std::fs::read_to_string(workspace().join("memory.x")).expect("it is in the repository");
+    let text = std::fs::read_to_string(workspace().join("src/bin/coprocessor/stm32f405/regions.x"))
+        .expect("it is in the repository");
     assert!(text.contains(&format!("FLASH : ORIGIN = {:#010x}, LENGTH = 1024K", layout::FLASH_BASE)));
     assert!(text.contains(&format!("_stext = ORIGIN(FLASH) + {:#06X};", layout::CODE).replace("0X", "0x")));
     let limit = std::fs::read_to_string(workspace().join("src/bin/coprocessor/slots.x")).expect("it is too");

@@ -29,7 +29,7 @@ pub const PATIENCE_US: u64 = 1_000_000;
 /// Arrivals later than this are counted.
 pub const JITTER_US: u64 = 2_000;
 
-/// Why a sample is not used.
+/// Why a sample is not used: its time stamp has no place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -101,7 +101,7 @@ pub struct BoardTime {
     pub jumped: bool,
 }
 
-/// Where a part's clock stands.
+/// Takes a part's clock to the board's; holds where it stands.
 #[derive(Debug, Clone, Default)]
 pub struct PartClock {
     /// Last time stamp, its board time, and board minus part time, all microseconds.

@@ -25,7 +25,7 @@ impl Scale {
     pub const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325, zero_q32: 0 };
 }
 
-/// The residual of one signal.
+/// What rounding has left over of one signal, owed to its next code.
 #[derive(Debug, Clone, Copy)]
 pub struct RoundingCarry {
     scale: Scale,

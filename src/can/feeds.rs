@@ -10,7 +10,7 @@ use crate::vehicle::VehicleSample;
 use embedded_can::{Frame, StandardId};
 use heapless::Vec;
 
-/// The encoders of all feeds.
+/// Every configured message of a sample, each with what rounding owes its receiver.
 #[derive(Debug, Clone, Copy)]
 pub struct Feeds {
     config: Config,

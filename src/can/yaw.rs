@@ -57,7 +57,7 @@ impl core::fmt::Display for YawError {
 
 impl core::error::Error for YawError {}
 
-/// The rate message.
+/// The rate message: 1e-6 deg/s a code, where the rate comes from, what it is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateMessage {
@@ -109,7 +109,7 @@ impl RateMessage {
     }
 }
 
-/// The angle message.
+/// The angle message: accumulated yaw, 360 deg / 2^32 a code, and what is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngleMessage {
@@ -145,7 +145,7 @@ impl AngleMessage {
     }
 }
 
-/// The detail message.
+/// The detail message: correction (2e-4 deg/s a code), expected error (1e-5 deg/s), latency (0.5 ms).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DetailMessage {

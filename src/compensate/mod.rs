@@ -32,7 +32,7 @@ use crate::units::AngularRate;
 use crate::window::WINDOW;
 use serde::{Deserialize, Serialize};
 
-/// How estimates become rates.
+/// How estimates of the gyro's error become rates that go out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CompensateConfig {
     /// Which estimates.
@@ -82,7 +82,7 @@ struct Entry {
     estimate: i32,
 }
 
-/// A rate that goes out.
+/// A rate that goes out, and what was taken off for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Emitted {

@@ -32,7 +32,7 @@ pub trait WindowNetwork {
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate;
 }
 
-/// What a network made of a window.
+/// What a network made of a window: the gyro's error in each sample, and the error to expect of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {

@@ -40,8 +40,6 @@ pub const HIDDEN_FRACTION_BITS: u32 = 10;
 pub const HIDDEN_MAX: i32 = 1 << HIDDEN_FRACTION_BITS;
 /// Fraction bits of a gate's input.
 pub const GATE_FRACTION_BITS: u32 = 14;
-/// Fraction bits of the cell state.
-pub const CELL_FRACTION_BITS: u32 = 20;
 /// Gates of an LSTM unit, in PyTorch's order: input, forget, cell candidate, output.
 pub const GATES: usize = 4;
 

@@ -58,7 +58,7 @@ pub fn dense(weight: &[f32], bias: f32, x: &[f32]) -> f32 {
     weight.iter().zip(x).fold(bias, |sum, (w, x)| sum + w * x)
 }
 
-/// The logistic function.
+/// The logistic function, 1 / (1 + e^-x).
 #[must_use]
 pub fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-x))

@@ -5,7 +5,7 @@ use crate::compensate::CompensateConfig;
 use crate::mounting::{Levelling, Rotation};
 use crate::uncertainty::UncertaintyConfig;
 
-/// Settings of the pipeline.
+/// Everything that can be set about the way from sample to rate.
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineConfig {
     /// How the board sits in the vehicle.
@@ -27,7 +27,7 @@ pub struct PipelineConfig {
 }
 
 impl PipelineConfig {
-    /// A MEMS part on a car.
+    /// For a MEMS part on a car, x forward, y left, z up.
     pub const DEFAULT: Self = Self {
         mounting: Rotation::IDENTITY,
         levelling: Levelling::DEFAULT,

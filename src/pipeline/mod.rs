@@ -8,32 +8,25 @@
 //! window's newest one, so fast and slow machines emit the same frames.
 
 mod config;
+mod known;
 mod output;
+mod told;
 
 pub use config::PipelineConfig;
 pub use output::{DueWindow, Output, Owed, YawRate};
 
+use known::{Known, raw};
+
 use crate::align::{AlignError, Aligner};
-use crate::bias::{Proof, QuietDetector, Rest, Second, StaticError, StaticInit, ZeroPoint, ZeroRate};
+use crate::bias::{Proof, Second, StaticInit, ZeroPoint, ZeroRate};
 use crate::compensate::{Compensator, Emitted, Implausible, Settled};
-use crate::health::{Counters, Faults, Status, count, judge};
+use crate::health::{Counters, Faults, Status, count};
 use crate::model::Estimate;
 use crate::mounting::Rotation;
-use crate::sample::{Frame, ImuSample, PERIOD_US, Standstill, WHEELS, WheelSample};
+use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
 use crate::uncertainty::Uncertainty;
 use crate::units::{AngularRate, Yaw};
-use crate::vehicle::{PromptSample, VehicleSample, YawSample};
 use crate::window::{self, WINDOW, Window};
-
-/// What is known once static initialisation has succeeded.
-#[derive(Debug, Clone)]
-struct Known {
-    /// Beyond the configured mounting.
-    levelling: Rotation,
-    zero: ZeroPoint,
-    quiet: QuietDetector,
-    zero_rate: Option<ZeroRate>,
-}
 
 /// The whole way of the data for one vehicle.
 #[derive(Debug, Clone)]
@@ -237,42 +230,6 @@ impl Pipeline {
         implausible
     }
 
-    /// Levels a sample, and says what the gyro reads at rest; `None` before that is known.
-    fn turned(&self, sample: &mut ImuSample) -> Option<ZeroPoint> {
-        let known = self.known.as_ref()?;
-        *sample = known.levelling.sample(sample);
-        Some(known.zero)
-    }
-
-    #[inline(never)]
-    fn initialise(&mut self, frame: &Frame) -> (YawRate, Option<StaticError>) {
-        let judged = if self.standstill() == Standstill::Moving {
-            self.static_init.refuse_wheels().map(Err)
-        } else if frame.sample.clipped {
-            // A clipped reading says nothing about the bias; the gap it leaves has restarted it.
-            None
-        } else {
-            self.static_init.process(&frame.sample)
-        };
-        let refused = judged.and_then(|rest| rest.and_then(|rest| self.know(&rest)).err());
-        count(&mut self.counters.moving, u32::from(refused.is_some()));
-        let status = if frame.sample.clipped { Status::Clipped } else { Status::Init };
-        (raw(frame, status, self.prompt_yaw), refused)
-    }
-
-    #[inline(never)]
-    fn know(&mut self, rest: &Rest) -> Result<(), StaticError> {
-        let PipelineConfig { levelling, static_init, earth_rate, zero_rate, quiet, .. } = self.config;
-        let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
-        self.known = Some(Known {
-            levelling,
-            zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
-            quiet: QuietDetector::new(quiet, &static_init, rest),
-            zero_rate: zero_rate.map(ZeroRate::new),
-        });
-        Ok(())
-    }
-
     #[inline(never)]
     fn correct(
         &mut self,
@@ -373,59 +330,4 @@ impl Pipeline {
     fn standstill(&self) -> Standstill {
         self.wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill)
     }
-
-    /// What is wrong with this sample.
-    fn faults(&self, sample: &ImuSample) -> Faults {
-        let fault = |present: bool, fault| if present { fault } else { Faults::NONE };
-        self.estimate_faults
-            .with(fault(self.gap_within > 0, Faults::GAP))
-            .with(fault(sample.clipped, Faults::CLIPPED))
-            .with(fault(self.wheels_silent() || self.contradicted(), Faults::WHEELS))
-    }
-
-    fn contradicted(&self) -> bool {
-        self.zero_rate().is_some_and(ZeroRate::contradicted)
-    }
-
-    /// A wheel that has had a speed has none, or none has ever had one.
-    fn wheels_silent(&self) -> bool {
-        let Some(WheelSample { speeds, .. }) = self.wheels else { return false };
-        let lost = |(speed, seen): (&Option<_>, bool)| seen && speed.is_none();
-        speeds.iter().all(Option::is_none) || speeds.iter().zip(self.wheels_seen).any(lost)
-    }
-
-    #[inline(never)]
-    fn vehicle(&self, prompt: &YawRate, navigation: &YawRate, frame: &Frame) -> VehicleSample {
-        let (_, prompt_quality) = judge(prompt.status);
-        let (source, quality) = judge(navigation.status);
-        let zero = self.known.as_ref().map_or([AngularRate::ZERO; 3], |known| known.zero.reading());
-        let [roll_rate, pitch_rate, _] = frame.sample.angular_rate;
-        let less = |rate: AngularRate, zero: AngularRate| AngularRate(rate.0.saturating_sub(zero.0));
-        let samples_late = frame.tick.wrapping_sub(navigation.tick);
-        VehicleSample {
-            prompt: PromptSample { rate: prompt.rate, quality: prompt_quality },
-            yaw: YawSample {
-                rate: navigation.rate,
-                correction: navigation.correction,
-                yaw: navigation.yaw,
-                sigma: navigation.sigma,
-                source,
-                quality,
-                faults: self.faults(&frame.sample),
-                // From sample to sample: the pipeline has no clock to add its own time by.
-                latency_us: Some(samples_late.saturating_mul(PERIOD_US as u32)),
-            },
-            roll_rate: less(roll_rate, zero[0]),
-            pitch_rate: less(pitch_rate, zero[1]),
-            specific_force: frame.sample.specific_force,
-            temperature: frame.sample.temperature,
-            tick: frame.tick,
-        }
-    }
-}
-
-/// The gyro as it is.
-fn raw(frame: &Frame, status: Status, yaw: Yaw) -> YawRate {
-    let [_, _, rate] = frame.sample.angular_rate;
-    YawRate { tick: frame.tick, rate, correction: AngularRate::ZERO, yaw, sigma: None, status }
 }

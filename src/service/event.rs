@@ -127,14 +127,17 @@ impl EventLog {
         Self { events: Deque::new(), total: 0 }
     }
 
-    /// Notes an event.
+    /// Notes an event, and with feature `defmt` logs it.
     pub fn push(&mut self, tick: u32, kind: EventKind) {
         self.total = self.total.saturating_add(1);
         if self.events.is_full() {
             self.events.pop_front();
         }
+        let event = Event { number: self.total, tick, kind };
+        #[cfg(feature = "defmt")]
+        defmt::info!("{}", event);
         // There is room.
-        let _ = self.events.push_back(Event { number: self.total, tick, kind });
+        let _ = self.events.push_back(event);
     }
 
     /// The events after number `after`, a page of them.

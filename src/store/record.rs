@@ -33,7 +33,7 @@ const MAX_KEY: u8 = 7;
 /// A header is not to be mistaken for one of some other use of the flash.
 const FORMAT: u32 = u32::from_le_bytes(*b"GYR1");
 
-/// Something that is kept.
+/// A kind of record: its key, its layout's version, and its ranges.
 pub trait Record: Serialize + DeserializeOwned {
     /// Its place among the records, 1 to 7; never given to another one.
     const KEY: u8;
@@ -115,7 +115,7 @@ enum Place {
     End,
 }
 
-/// The records of two sectors.
+/// The newest record of each kind, in two flash sectors that are used in turn.
 pub struct Store<F> {
     flash: F,
     start: u32,

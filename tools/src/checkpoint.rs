@@ -2,37 +2,25 @@
 
 pub use crate::tensors::CheckpointError;
 
-use crate::tensors::Tensors;
+use crate::tensors::{Shape, Tensors, bilstm, dense, tensor};
 use gyronet::model::blob::HIDDEN;
 use gyronet::model::gyronet_f32::GyroNetF32;
 use gyronet::nn::reference::LstmWeights;
 use gyronet::window::FEATURES;
 use std::path::Path;
 
-/// Tensors and their shapes, as PyTorch names them.
-const TENSORS: [(&str, &[usize]); 21] = [
-    ("input_mean", &[FEATURES]),
-    ("input_std", &[FEATURES]),
-    ("output_scale", &[1]),
-    ("lstm1.weight_ih_l0", &[4 * HIDDEN, FEATURES]),
-    ("lstm1.weight_hh_l0", &[4 * HIDDEN, HIDDEN]),
-    ("lstm1.bias_ih_l0", &[4 * HIDDEN]),
-    ("lstm1.bias_hh_l0", &[4 * HIDDEN]),
-    ("lstm1.weight_ih_l0_reverse", &[4 * HIDDEN, FEATURES]),
-    ("lstm1.weight_hh_l0_reverse", &[4 * HIDDEN, HIDDEN]),
-    ("lstm1.bias_ih_l0_reverse", &[4 * HIDDEN]),
-    ("lstm1.bias_hh_l0_reverse", &[4 * HIDDEN]),
-    ("lstm2.weight_ih_l0", &[4 * HIDDEN, 2 * HIDDEN]),
-    ("lstm2.weight_hh_l0", &[4 * HIDDEN, HIDDEN]),
-    ("lstm2.bias_ih_l0", &[4 * HIDDEN]),
-    ("lstm2.bias_hh_l0", &[4 * HIDDEN]),
-    ("lstm2.weight_ih_l0_reverse", &[4 * HIDDEN, 2 * HIDDEN]),
-    ("lstm2.weight_hh_l0_reverse", &[4 * HIDDEN, HIDDEN]),
-    ("lstm2.bias_ih_l0_reverse", &[4 * HIDDEN]),
-    ("lstm2.bias_hh_l0_reverse", &[4 * HIDDEN]),
-    ("fc.weight", &[2, 2 * HIDDEN]),
-    ("fc.bias", &[2]),
-];
+/// The network's tensors: two LSTMs one above the other, and what is around them.
+fn shapes() -> Vec<Shape> {
+    let mut shapes = vec![
+        tensor("input_mean", &[FEATURES]),
+        tensor("input_std", &[FEATURES]),
+        tensor("output_scale", &[1]),
+    ];
+    shapes.extend(bilstm("lstm1", FEATURES, HIDDEN, 1));
+    shapes.extend(bilstm("lstm2", 2 * HIDDEN, HIDDEN, 1));
+    shapes.extend(dense("fc", 2 * HIDDEN, 2));
+    shapes
+}
 
 /// A checkpoint in memory.
 #[derive(Debug, Clone)]
@@ -44,7 +32,7 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError`], which names the file and the tensor.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        Tensors::read(path, &TENSORS).map(Self)
+        Tensors::read(path, &shapes()).map(Self)
     }
 
     /// Reads bytes; `name` is for messages.
@@ -52,7 +40,7 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError`] with that name.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, CheckpointError> {
-        Tensors::parse(name, bytes, &TENSORS).map(Self)
+        Tensors::parse(name, bytes, &shapes()).map(Self)
     }
 
     /// All tensors.

@@ -1,8 +1,10 @@
 //! Curves as SVG: yaw over time, paths seen from above, times between stamps.
 
+use crate::curve::{range, thinned};
 use crate::plot::PlotError;
 use crate::sequence::Sequence;
 use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 const SIZE: (u32, u32) = (1000, 640);
@@ -10,6 +12,8 @@ const TITLE_HEIGHT: u32 = 46;
 const LEGEND_ROW: u32 = 26;
 /// Points of a curve, about one for each pixel.
 const POINTS: usize = 1_000;
+/// Around the curves.
+const AIR: f64 = 0.05;
 const FONT: &str = "sans-serif";
 const GREY: RGBColor = RGBColor(90, 90, 90);
 /// Colours that the colour-blind can tell apart (Okabe and Ito, 2008); black is the truth.
@@ -24,6 +28,9 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(120, 80, 30),
 ];
 
+/// Dashes of the curves when the colours are used up: all of them once more with each.
+const DASHES: [(u32, u32); 2] = [(12, 6), (3, 5)];
+
 type Failure = DrawingAreaErrorKind<std::io::Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -36,6 +43,29 @@ pub struct Curve {
     pub points: Vec<(f64, f64)>,
     /// Drawn in black.
     pub is_truth: bool,
+}
+
+/// How a curve is drawn.
+struct Line {
+    style: ShapeStyle,
+    /// Dash and gap, pixels.
+    dash: Option<(u32, u32)>,
+}
+
+impl Line {
+    /// One for each, no two alike: solid ones, then all colours once more in dashes.
+    fn distinct(curves: &[Curve]) -> Vec<Self> {
+        let dashes = [None].into_iter().chain(DASHES.map(Some));
+        let mut free = dashes.flat_map(|dash| COLORS.map(|color| (color, dash))).cycle();
+        let mut line = |curve: &Curve| {
+            if curve.is_truth {
+                return Self { style: BLACK.stroke_width(3), dash: None };
+            }
+            let (color, dash) = free.next().unwrap_or((GREY, None));
+            Self { style: color.stroke_width(2), dash }
+        };
+        curves.iter().map(&mut line).collect()
+    }
 }
 
 /// What a figure shows.
@@ -81,19 +111,18 @@ fn draw(svg: &mut String, labels: Labels<'_>, curves: &[Curve]) -> Result<(), Fa
     head.draw(&Text::new(labels.title.to_owned(), (20, 14), (FONT, 22).into_font()))?;
     let rows = curves.len().div_ceil(3) as u32;
     let (legend, body) = body.split_vertically(rows * LEGEND_ROW + 6);
-    let mut colors = COLORS.into_iter().cycle();
-    let styles: Vec<(RGBColor, u32)> = curves
-        .iter()
-        .map(|curve| if curve.is_truth { (BLACK, 3) } else { (colors.next().unwrap_or(GREY), 2) })
-        .collect();
-    for (k, (curve, (color, width))) in curves.iter().zip(&styles).enumerate() {
+    let lines: Vec<Line> = Line::distinct(curves);
+    for (k, (curve, line)) in curves.iter().zip(&lines).enumerate() {
         let (x, y) = (30 + 320 * (k as i32 % 3), 4 + LEGEND_ROW as i32 * (k as i32 / 3));
-        let line = [(x, y + 8), (x + 30, y + 8)];
-        legend.draw(&PathElement::new(line, color.stroke_width(*width)))?;
+        let key = [(x, y + 8), (x + 30, y + 8)];
+        match line.dash {
+            None => legend.draw(&PathElement::new(key, line.style))?,
+            Some((dash, gap)) => legend.draw(&DashedPathElement::new(key, dash, gap, line.style))?,
+        }
         legend.draw(&Text::new(curve.label.clone(), (x + 38, y), (FONT, 16).into_font()))?;
     }
-    let mut x = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.0)));
-    let mut y = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.1)));
+    let mut x = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.0)), AIR);
+    let mut y = range(curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.1)), AIR);
     if labels.same_scale {
         (x, y) = square(x, y, body.dim_in_pixel());
     }
@@ -117,11 +146,12 @@ fn draw(svg: &mut String, labels: Labels<'_>, curves: &[Curve]) -> Result<(), Fa
         .x_label_formatter(&number)
         .y_label_formatter(&number)
         .draw()?;
-    for (curve, (color, width)) in curves.iter().zip(styles) {
-        let step = curve.points.len().div_ceil(POINTS).max(1);
-        let last = curve.points.last().copied();
-        let points = curve.points.iter().copied().step_by(step).chain(last);
-        chart.draw_series(LineSeries::new(points, color.stroke_width(width)))?;
+    for (curve, Line { style, dash }) in curves.iter().zip(lines) {
+        let points = thinned(curve.points.iter().copied(), POINTS);
+        match dash {
+            None => chart.draw_series(LineSeries::new(points, style))?,
+            Some((dash, gap)) => chart.draw_series(DashedLineSeries::new(points, dash, gap, style))?,
+        };
     }
     root.present()
 }
@@ -178,16 +208,6 @@ fn number(value: &f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// From the least to the most, with some air.
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
-    if low > high {
-        return (0.0, 1.0);
-    }
-    let air = 0.05 * (high - low).max(1e-6);
-    (low - air, high + air)
-}
-
 /// The wider of two ranges, so that both have the same length for a pixel.
 fn square(x: (f64, f64), y: (f64, f64), (width, height): (u32, u32)) -> ((f64, f64), (f64, f64)) {
     let per_pixel = ((x.1 - x.0) / f64::from(width)).max((y.1 - y.0) / f64::from(height));
@@ -215,6 +235,20 @@ mod tests {
             assert!(svg.contains(word), "{word}");
         }
         assert!(svg.len() < 100_000, "thinned: {}", svg.len());
+    }
+
+    #[test]
+    fn no_two_curves_look_alike() {
+        let curve = |k: u32| Curve {
+            label: format!("method {k}"),
+            points: vec![(0.0, f64::from(k)), (100.0, f64::from(k))],
+            is_truth: false,
+        };
+        let labels = Labels { title: "", x: "", y: "", same_scale: false };
+        let svg = curves(labels, &(0..10).map(curve).collect::<Vec<_>>()).unwrap();
+        // Of two curves in the same colour one is in one piece, the other in dashes.
+        let of_first_color = svg.matches("stroke=\"#0072B2\"").count();
+        assert!(of_first_color > 8, "{of_first_color}");
     }
 
     #[test]

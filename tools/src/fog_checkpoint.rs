@@ -1,57 +1,26 @@
 //! FoGNet's f32 checkpoint, as `tools/train` exports it.
 
-use crate::tensors::{CheckpointError, Tensors};
+use crate::tensors::{CheckpointError, Shape, Tensors, bilstm, dense, tensor};
 use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogNetF32;
 use gyronet::seconds::STEPS;
 use std::path::Path;
 
-/// Tensors and their shapes, as PyTorch names them.
-const TENSORS: [(&str, &[usize]); 43] = [
-    ("input_mean", &[INPUTS]),
-    ("input_std", &[INPUTS]),
-    ("correction_scale", &[1]),
-    ("lstm1.weight_ih_l0", &[4 * HIDDEN1, INPUTS]),
-    ("lstm1.weight_hh_l0", &[4 * HIDDEN1, HIDDEN1]),
-    ("lstm1.bias_ih_l0", &[4 * HIDDEN1]),
-    ("lstm1.bias_hh_l0", &[4 * HIDDEN1]),
-    ("lstm1.weight_ih_l0_reverse", &[4 * HIDDEN1, INPUTS]),
-    ("lstm1.weight_hh_l0_reverse", &[4 * HIDDEN1, HIDDEN1]),
-    ("lstm1.bias_ih_l0_reverse", &[4 * HIDDEN1]),
-    ("lstm1.bias_hh_l0_reverse", &[4 * HIDDEN1]),
-    ("lstm1.weight_ih_l1", &[4 * HIDDEN1, 2 * HIDDEN1]),
-    ("lstm1.weight_hh_l1", &[4 * HIDDEN1, HIDDEN1]),
-    ("lstm1.bias_ih_l1", &[4 * HIDDEN1]),
-    ("lstm1.bias_hh_l1", &[4 * HIDDEN1]),
-    ("lstm1.weight_ih_l1_reverse", &[4 * HIDDEN1, 2 * HIDDEN1]),
-    ("lstm1.weight_hh_l1_reverse", &[4 * HIDDEN1, HIDDEN1]),
-    ("lstm1.bias_ih_l1_reverse", &[4 * HIDDEN1]),
-    ("lstm1.bias_hh_l1_reverse", &[4 * HIDDEN1]),
-    ("lstm2.weight_ih_l0", &[4 * HIDDEN2, 2]),
-    ("lstm2.weight_hh_l0", &[4 * HIDDEN2, HIDDEN2]),
-    ("lstm2.bias_ih_l0", &[4 * HIDDEN2]),
-    ("lstm2.bias_hh_l0", &[4 * HIDDEN2]),
-    ("lstm2.weight_ih_l0_reverse", &[4 * HIDDEN2, 2]),
-    ("lstm2.weight_hh_l0_reverse", &[4 * HIDDEN2, HIDDEN2]),
-    ("lstm2.bias_ih_l0_reverse", &[4 * HIDDEN2]),
-    ("lstm2.bias_hh_l0_reverse", &[4 * HIDDEN2]),
-    ("lstm2.weight_ih_l1", &[4 * HIDDEN2, 2 * HIDDEN2]),
-    ("lstm2.weight_hh_l1", &[4 * HIDDEN2, HIDDEN2]),
-    ("lstm2.bias_ih_l1", &[4 * HIDDEN2]),
-    ("lstm2.bias_hh_l1", &[4 * HIDDEN2]),
-    ("lstm2.weight_ih_l1_reverse", &[4 * HIDDEN2, 2 * HIDDEN2]),
-    ("lstm2.weight_hh_l1_reverse", &[4 * HIDDEN2, HIDDEN2]),
-    ("lstm2.bias_ih_l1_reverse", &[4 * HIDDEN2]),
-    ("lstm2.bias_hh_l1_reverse", &[4 * HIDDEN2]),
-    ("fc1.weight", &[1, 2 * HIDDEN1]),
-    ("fc1.bias", &[1]),
-    ("fc2.weight", &[1, 2 * HIDDEN2]),
-    ("fc2.bias", &[1]),
-    ("fc3.weight", &[1, STEPS]),
-    ("fc3.bias", &[1]),
-    ("fc4.weight", &[1, 2]),
-    ("fc4.bias", &[1]),
-];
+/// The network's tensors, layer by layer.
+fn shapes() -> Vec<Shape> {
+    let mut shapes = vec![
+        tensor("input_mean", &[INPUTS]),
+        tensor("input_std", &[INPUTS]),
+        tensor("correction_scale", &[1]),
+    ];
+    shapes.extend(bilstm("lstm1", INPUTS, HIDDEN1, 2));
+    shapes.extend(dense("fc1", 2 * HIDDEN1, 1));
+    shapes.extend(bilstm("lstm2", 2, HIDDEN2, 2));
+    shapes.extend(dense("fc2", 2 * HIDDEN2, 1));
+    shapes.extend(dense("fc3", STEPS, 1));
+    shapes.extend(dense("fc4", 2, 1));
+    shapes
+}
 
 /// Whether a checkpoint is FoGNet's, by the tensors in it.
 ///
@@ -71,7 +40,7 @@ impl FogCheckpoint {
     /// # Errors
     /// [`CheckpointError`], which names the file and the tensor.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        Tensors::read(path, &TENSORS).map(Self)
+        Tensors::read(path, &shapes()).map(Self)
     }
 
     /// Reads bytes; `name` is for messages.
@@ -79,7 +48,7 @@ impl FogCheckpoint {
     /// # Errors
     /// [`CheckpointError`] with that name.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, CheckpointError> {
-        Tensors::parse(name, bytes, &TENSORS).map(Self)
+        Tensors::parse(name, bytes, &shapes()).map(Self)
     }
 
     /// All tensors.

@@ -2,13 +2,32 @@
 
 mod commands;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 /// Learned yaw-rate correction on a host: the very code that is flashed, on recorded drives.
+///
+/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header; columns in any order, others
+/// are passed over:
+///
+///   t_s                    time, s
+///   acc_x, acc_y, acc_z    specific force, m/s^2 (x forward, y left, z up)
+///   gyr_x, gyr_y, gyr_z    angular rate, rad/s
+///   ref_gyr_z              true yaw rate, rad/s; optional, for errors
+///   wheel1_rate ..4        wheels, rad/s; optional (front right, rear right, front left, rear left)
+///
+/// Its first 3 s must stand still.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(
+    name = "gyronet",
+    version,
+    arg_required_else_help = true,
+    verbatim_doc_comment,
+    after_help = "\
+Exit status: 0 done; 1 failed, or a check did not hold (the reason is on standard error); 2 wrong arguments.
+Colours and progress appear on a terminal only; NO_COLOR=1 turns colours off."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -31,6 +50,7 @@ enum Command {
     BenchTarget(commands::bench_target::Args),
     Device(commands::device::Args),
     Size(commands::size::Args),
+    Completions(commands::completions::Args),
     Soak(commands::soak::Args),
 }
 
@@ -50,6 +70,7 @@ fn main() -> ExitCode {
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
         Command::Device(args) => commands::device::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
+        Command::Completions(args) => commands::completions::run(args, Cli::command()),
         Command::Soak(args) => commands::soak::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
@@ -59,6 +80,7 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     // Nothing is left to do where even stderr is gone.
-    let _ = writeln!(std::io::stderr(), "error: {error}");
+    let mark = console::style("error:").for_stderr().red().bold();
+    let _ = writeln!(std::io::stderr(), "{mark} {error}");
     ExitCode::FAILURE
 }

@@ -9,6 +9,7 @@ use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::ImuSample;
 use serde::ser::{Serialize, SerializeMap, Serializer};
+use std::time::{Duration, Instant};
 
 /// One way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -147,6 +148,8 @@ pub struct Rates {
     pub reference: Option<Vec<f64>>,
     /// The drive as the board would run it.
     pub drive: Drive,
+    /// What that run took on this machine.
+    pub run_time: Duration,
 }
 
 /// How often [`Rates::new`] goes through a recording.
@@ -164,8 +167,10 @@ impl Rates {
         integer: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
     ) -> Result<Self, DriveError> {
+        let start = Instant::now();
         let drive =
             Drive::run(recording, &PipelineConfig::DEFAULT, WheelRates::new(recording), integer, &mut tick)?;
+        let run_time = start.elapsed();
         let float =
             Drive::run(recording, &PipelineConfig::DEFAULT, WheelRates::new(recording), float, &mut tick)?;
         let newest =
@@ -193,7 +198,7 @@ impl Rates {
         let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
         let seconds = compared().map(|step| (step.time.0 - first) as f64 * 1e-6).collect();
         let reference = compared().map(|step| recording.rows[step.row].reference).collect();
-        Ok(Self { seconds, rates, reference, drive })
+        Ok(Self { seconds, rates, reference, drive, run_time })
     }
 }
 

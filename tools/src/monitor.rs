@@ -7,6 +7,8 @@ pub mod line;
 pub mod source;
 mod view;
 
+pub use view::fault_names;
+
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
@@ -21,7 +23,7 @@ const MAX_DELTA: u8 = 10;
 const PACE_SECONDS: f64 = 1.0;
 
 /// What happened to the messages so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Counts {
     /// Frames that are ours.
     pub frames: u64,
@@ -185,7 +187,7 @@ impl Monitor {
         let verdict = self.bosch[index].process(message.counter);
         if self.account(Ok(verdict)) && index == 0 {
             let good = message.rate_status == bosch::SignalStatus::OK;
-            self.state.drop_in = good.then(|| f64::from(message.rate) * 0.005 - 163.84);
+            self.state.drop_in = good.then(|| message.rate_deg_per_sec());
         }
     }
 

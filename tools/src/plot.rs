@@ -1,5 +1,6 @@
 //! One picture of a drive: the yaw of each method, and below it what each is off by.
 
+use crate::curve::{range, thinned};
 use crate::methods::{Method, Rates};
 use crate::metrics::DT;
 use plotters::coord::Shift;
@@ -60,8 +61,10 @@ fn draw(svg: &mut String, title: &str, rates: &Rates) -> Result<(), Failure> {
 
     let yaw = STYLES.map(|(method, ..)| integral(&rates.rates[method]));
     let truth = rates.reference.as_deref().map(integral);
-    let curve =
-        |values: &[f64], color, width| Curve { points: thinned(&rates.seconds, values), color, width };
+    let curve = |values: &[f64], color, width| {
+        let points = rates.seconds.iter().copied().zip(values.iter().copied());
+        Curve { points: thinned(points, POINTS).collect(), color, width }
+    };
     let curves = |values: &[Vec<f64>]| -> Vec<Curve> {
         let styled = values.iter().zip(STYLES);
         styled.map(|(values, (_, color, width))| curve(values, color, width)).collect()
@@ -166,20 +169,9 @@ fn integral(rates: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Every n-th point, and the last one.
-fn thinned(seconds: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
-    let step = values.len().div_ceil(POINTS).max(1);
-    let points = seconds.iter().copied().zip(values.iter().copied());
-    let last = points.clone().next_back();
-    points.step_by(step).chain(last).collect()
-}
-
-/// Smallest and largest value with some air around them.
-fn span<'a>(curves: impl Iterator<Item = &'a Curve> + Clone) -> (f64, f64) {
-    let values = || curves.clone().flat_map(|curve| curve.points.iter().map(|point| point.1));
-    let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(f64::MIN, f64::max));
-    let air = 0.06 * (high - low).max(1e-6);
-    (low - air, high + air)
+/// How high and low curves reach.
+fn span<'a>(curves: impl Iterator<Item = &'a Curve>) -> (f64, f64) {
+    range(curves.flat_map(|curve| curve.points.iter().map(|point| point.1)), 0.06)
 }
 
 /// The pieces of a curve between two heights, cut exactly at them.
@@ -231,13 +223,5 @@ mod tests {
         assert_eq!(pieces.len(), 2);
         assert_eq!(pieces[0].last(), Some(&(1.5, 3.0)));
         assert_eq!(pieces[1], [(2.25, 3.0), (3.0, 0.0)]);
-    }
-
-    #[test]
-    fn thinning_keeps_the_ends() {
-        let seconds: Vec<f64> = (0..10_000).map(f64::from).collect();
-        let points = thinned(&seconds, &seconds);
-        assert!(points.len() <= POINTS + 1);
-        assert_eq!((points[0], points[points.len() - 1]), ((0.0, 0.0), (9_999.0, 9_999.0)));
     }
 }

@@ -22,6 +22,7 @@ use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config, OutputRate};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::{Micros, WheelSpeed, Yaw};
+use serde::Serialize;
 use std::fmt;
 
 /// Ticks of SampleTimeFine in a sample.
@@ -36,7 +37,7 @@ const INITIALISED: u32 = 100 * RATE_HZ;
 const YAW_TOLERANCE: f64 = 1e-6;
 
 /// What came of it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Soak {
     /// Samples sent.
     pub samples: u32,

@@ -5,13 +5,17 @@
 //! under `-icount shift=0`, where an instruction takes a nanosecond: good to 6 instructions.
 
 use std::ffi::OsStr;
+use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 /// SysTick of the emulated STM32F405, ticks per 1000 instructions (168 MHz, 1 instruction/ns).
 const TICKS_PER_1000: u64 = 168;
-/// The marker regions end here, and so does a hung image.
-const TIMEOUT_S: &str = "600";
+/// A hung image ends here, and a build that gets nowhere.
+const LIMIT: Duration = Duration::from_secs(900);
+const POLL: Duration = Duration::from_millis(5);
 /// The images that count, one after the other.
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
 /// The emulated board.
@@ -37,6 +41,12 @@ pub enum BenchError {
         program: String,
         /// Its error output.
         output: String,
+    },
+    /// A program did not end.
+    #[error("{program} did not end within {LIMIT:?}")]
+    TooLong {
+        /// The program.
+        program: String,
     },
     /// The image printed something else than expected.
     #[error("the bench image printed an unexpected line: {0}")]
@@ -105,6 +115,39 @@ impl Counts {
 #[must_use]
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Where cargo builds: the folder that this program lies in if cargo has built it there, so that
+/// `cargo fw` and what follows share one build; else that of the workspace.
+#[must_use]
+pub fn target_folder() -> PathBuf {
+    let program = std::env::current_exe().ok();
+    let folder = program.as_deref().and_then(|program| program.ancestors().nth(2));
+    // Cargo marks its folder so.
+    let cargo = folder.filter(|folder| folder.join("CACHEDIR.TAG").is_file());
+    cargo.map_or_else(|| workspace().join("target"), Path::to_owned)
+}
+
+/// Whether rustc has a standard library for the target.
+///
+/// # Errors
+/// What is missing, as a sentence.
+pub fn target_installed() -> Result<(), String> {
+    if !workspace().join("memory.x").is_file() {
+        return Err("the repository that this program was built in is gone".into());
+    }
+    let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
+    let output = Command::new(rustc)
+        .args(["--print", "target-libdir", "--target", TARGET])
+        .current_dir(workspace())
+        .output()
+        .map_err(|error| format!("rustc cannot be run: {error}"))?;
+    let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+    if output.status.success() && Path::new(&folder).is_dir() {
+        Ok(())
+    } else {
+        Err(format!("the Rust target {TARGET} is not installed (rustup target add {TARGET})"))
+    }
 }
 
 /// Builds an image of the firmware under `folder` and returns where it lies.
@@ -176,8 +219,8 @@ fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
 /// # Errors
 /// [`BenchError`], also when the image reports a failure.
 pub fn emulate(image: &Path, arguments: &[&str]) -> Result<(String, String), BenchError> {
-    let mut qemu = Command::new("timeout");
-    qemu.args([TIMEOUT_S, "qemu-system-arm", "-machine", MACHINE, "-nographic", "-monitor", "none"]);
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args(["-machine", MACHINE, "-nographic", "-monitor", "none"]);
     qemu.args(["-serial", "none", "-semihosting-config", "enable=on,target=native"]);
     run(qemu.args(arguments).arg("-kernel").arg(image))
 }
@@ -191,11 +234,33 @@ fn field(line: &str, key: &str) -> Option<u64> {
 /// Runs a program to its end; its output, or its error output as an error.
 fn run(command: &mut Command) -> Result<(String, String), BenchError> {
     let program = command.get_program().to_string_lossy().into_owned();
-    let output = command.output().map_err(|source| BenchError::Start { program: program.clone(), source })?;
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    if output.status.success() {
-        Ok((text(&output.stdout), text(&output.stderr)))
-    } else {
-        Err(BenchError::Failed { program, output: text(&output.stderr) })
-    }
+    let start = |source| BenchError::Start { program: program.clone(), source };
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().map_err(start)?;
+    let (stdout, stderr) = (collect(child.stdout.take()), collect(child.stderr.take()));
+    let until = Instant::now() + LIMIT;
+    let status = loop {
+        if let Some(status) = child.try_wait().map_err(start)? {
+            break status;
+        }
+        if Instant::now() > until {
+            // It may have ended by itself by now.
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(BenchError::TooLong { program });
+        }
+        std::thread::sleep(POLL);
+    };
+    let [stdout, stderr] = [stdout, stderr].map(|thread| thread.join().unwrap_or_default());
+    if status.success() { Ok((stdout, stderr)) } else { Err(BenchError::Failed { program, output: stderr }) }
+}
+
+/// Reads to the end, beside what else there is to do: a full pipe would hold the program.
+fn collect(source: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        // What cannot be read is missing from the message, no more.
+        let _ = source.map(|mut source| source.read_to_end(&mut bytes));
+        String::from_utf8_lossy(&bytes).into_owned()
+    })
 }

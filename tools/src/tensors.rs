@@ -32,7 +32,7 @@ pub enum CheckpointError {
         /// The file.
         name: String,
         /// The tensor.
-        tensor: &'static str,
+        tensor: String,
     },
     /// A tensor has another shape or element type than GyroNet's.
     #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
@@ -40,7 +40,7 @@ pub enum CheckpointError {
         /// The file.
         name: String,
         /// The tensor.
-        tensor: &'static str,
+        tensor: String,
         /// Type and shape as found.
         found: String,
         /// Shape as needed.
@@ -52,19 +52,47 @@ pub enum CheckpointError {
         /// The file.
         name: String,
         /// The tensor.
-        tensor: &'static str,
+        tensor: String,
         /// Element.
         at: usize,
     },
 }
 
-/// Names and shapes of a network's tensors, as PyTorch has them.
-pub(crate) type Shapes = [(&'static str, &'static [usize])];
+/// Name and shape of a tensor, as PyTorch has them.
+pub(crate) type Shape = (String, Vec<usize>);
+
+/// A vector, or a matrix by rows.
+pub(crate) fn tensor(name: &str, shape: &[usize]) -> Shape {
+    (name.to_owned(), shape.to_vec())
+}
+
+/// The tensors of a bidirectional LSTM: `units` in each direction, gates i, f, g, o below each other;
+/// a layer above another sees both directions of it.
+pub(crate) fn bilstm(name: &str, inputs: usize, units: usize, layers: usize) -> Vec<Shape> {
+    let directions = (0..layers).flat_map(|layer| ["", "_reverse"].map(|direction| (layer, direction)));
+    let tensors = directions.flat_map(|(layer, direction)| {
+        let inputs = if layer == 0 { inputs } else { 2 * units };
+        let shape =
+            |what: &str, shape: &[usize]| tensor(&format!("{name}.{what}_l{layer}{direction}"), shape);
+        [
+            shape("weight_ih", &[4 * units, inputs]),
+            shape("weight_hh", &[4 * units, units]),
+            shape("bias_ih", &[4 * units]),
+            shape("bias_hh", &[4 * units]),
+        ]
+    });
+    tensors.collect()
+}
+
+/// The tensors of a fully connected layer.
+pub(crate) fn dense(name: &str, inputs: usize, outputs: usize) -> [Shape; 2] {
+    [tensor(&format!("{name}.weight"), &[outputs, inputs]), tensor(&format!("{name}.bias"), &[outputs])]
+}
 
 /// The tensors of a network in memory.
 #[derive(Debug, Clone)]
 pub struct Tensors {
-    tensors: BTreeMap<&'static str, Vec<f32>>,
+    tensors: BTreeMap<String, Vec<f32>>,
     /// What `tools/train` wrote about its making: JSON, or empty.
     pub provenance: String,
     /// SHA-256 of the file.
@@ -81,25 +109,27 @@ impl Tensors {
         Ok(file.names().into_iter().map(ToString::to_string).collect())
     }
 
-    pub(crate) fn read(path: &Path, shapes: &Shapes) -> Result<Self, CheckpointError> {
+    pub(crate) fn read(path: &Path, shapes: &[Shape]) -> Result<Self, CheckpointError> {
         let bytes =
             std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
         Self::parse(&path.display().to_string(), &bytes, shapes)
     }
 
-    pub(crate) fn parse(name: &str, bytes: &[u8], shapes: &Shapes) -> Result<Self, CheckpointError> {
+    pub(crate) fn parse(name: &str, bytes: &[u8], shapes: &[Shape]) -> Result<Self, CheckpointError> {
         let format = |source| CheckpointError::Format { name: name.to_owned(), source };
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
         let file = SafeTensors::deserialize(bytes).map_err(format)?;
         let provenance =
             header.metadata().as_ref().and_then(|map| map.get("provenance")).cloned().unwrap_or_default();
         let mut tensors = BTreeMap::new();
-        for &(tensor, shape) in shapes {
-            let name = || name.to_owned();
-            let view = file.tensor(tensor).map_err(|_| CheckpointError::Missing { name: name(), tensor })?;
+        for (tensor, shape) in shapes {
+            let (name, tensor) = (|| name.to_owned(), tensor.clone());
+            let view = file
+                .tensor(&tensor)
+                .map_err(|_| CheckpointError::Missing { name: name(), tensor: tensor.clone() })?;
             if view.dtype() != Dtype::F32 || view.shape() != shape {
                 let found = format!("{:?} {:?}", view.dtype(), view.shape());
-                return Err(CheckpointError::Shape { name: name(), tensor, found, expected: shape.to_vec() });
+                return Err(CheckpointError::Shape { name: name(), tensor, found, expected: shape.clone() });
             }
             let values: Vec<f32> =
                 view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();

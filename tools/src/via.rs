@@ -130,5 +130,11 @@ impl Part {
     }
 }
 
+/// The message that an Xsens MTi would send for each row of a recording.
+#[must_use]
+pub fn mti_bytes(recording: &Recording) -> Vec<Vec<u8>> {
+    xsens::messages(recording).collect()
+}
+
 /// What a part delivered for each row, and the bytes that it took.
 type Sent = (Vec<ImuSample>, u64);

@@ -9,6 +9,8 @@ use gyronet::wheels::{StandstillRule, Wheels};
 pub const RADIUS: f64 = 0.289;
 /// Front right, rear right, front left, rear left, as places of [`WheelSample::speeds`].
 pub const PLACES: [usize; WHEELS] = [1, 3, 0, 2];
+const FRONT: [usize; 2] = [0, 2];
+const REAR: [usize; 2] = [1, 3];
 /// A gyro on a standing wheel shows up to 0.04 rad/s; what is too slow to tell is not moving.
 const RULE: StandstillRule =
     StandstillRule { timeout_us: 100_000, still_speed: speed(WHEEL_STANDS), still_for_us: 1_000_000 };
@@ -45,6 +47,35 @@ impl WheelRates {
     }
 }
 
+/// Speed of the vehicle at each row of a recording, for dead reckoning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Speeds {
+    /// Wheels that it is the mean of.
+    pub wheels: usize,
+    /// At each row, m/s, forward positive; a wheel's last known rate holds on.
+    pub metre_per_sec: Vec<f64>,
+}
+
+impl Speeds {
+    /// Of the rear wheels, which do not steer; of the front ones where no other is recorded. `None`
+    /// of a recording without wheels.
+    #[must_use]
+    pub fn new(recording: &Recording) -> Option<Self> {
+        let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
+        let axle = |axle: [usize; 2]| axle.into_iter().filter(recorded).collect::<Vec<usize>>();
+        let wheels = [REAR, FRONT].map(axle).into_iter().find(|wheels| !wheels.is_empty())?;
+        let mut last = [0.0; WHEELS];
+        let speed = |row: &Row| {
+            for wheel in &wheels {
+                last[*wheel] = row.wheels[*wheel].unwrap_or(last[*wheel]);
+            }
+            RADIUS * wheels.iter().map(|wheel| last[*wheel]).sum::<f64>() / wheels.len() as f64
+        };
+        let metre_per_sec = recording.rows.iter().map(speed).collect();
+        Some(Self { wheels: wheels.len(), metre_per_sec })
+    }
+}
+
 /// Speed over ground of a wheel that turns at `rate` rad/s.
 const fn speed(rate: f64) -> WheelSpeed {
     // A cast saturates.
@@ -72,6 +103,20 @@ mod tests {
         assert!(seen[..100].iter().all(|s| *s == Standstill::Unknown));
         assert!(seen[100..400].iter().all(|s| *s == Standstill::Still));
         assert!(seen[400..].iter().all(|s| *s == Standstill::Moving));
+    }
+
+    #[test]
+    fn the_rear_wheels_say_how_fast() {
+        let text = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel1_rate,wheel2_rate,wheel4_rate\n".to_owned();
+        let row = |k: usize| {
+            let (one, two, four) =
+                if k < 400 { ("0", "0", "0") } else { ("9", "2", if k == 400 { "4" } else { "" }) };
+            format!("{:.2},0,0,9.8,0,0,0,{one},{two},{four}\n", 0.01 * k as f64)
+        };
+        let text = (0..402).map(row).fold(text, |text, row| text + &row);
+        let speeds = Speeds::new(&Recording::parse("a.csv", text.as_bytes()).unwrap()).unwrap();
+        assert_eq!((speeds.wheels, speeds.metre_per_sec[399]), (2, 0.0));
+        assert_eq!(speeds.metre_per_sec[400..], [3.0 * RADIUS; 2]);
     }
 
     #[test]

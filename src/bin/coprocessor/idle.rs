@@ -1,6 +1,6 @@
 //! What is done when nothing else is to do: the service line, and the weights' own checksum.
 
-use crate::flash::{Records, Slots};
+use crate::chip::flash::{Records, Slots};
 use crate::queue::Queue;
 use crate::{board, clock, serial};
 use embedded_io::{Write, WriteReady};

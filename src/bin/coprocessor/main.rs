@@ -1,4 +1,4 @@
-//! The coprocessor's firmware for the STM32F405: sensor bytes in, CAN frames out.
+//! The coprocessor's firmware, for the STM32F405 or the part in `chip`: sensor bytes in, CAN frames out.
 //!
 //! | pin | function |
 //! |---|---|
@@ -11,7 +11,7 @@
 //! | priority | task | when | what |
 //! |---|---|---|---|
 //! | 4 | `imu_line`, `tick` | a byte, 1 ms | a byte into its queue; board time |
-//! | 3 | `slcan_line`, `service_line`, `can_frames` | a byte, a frame | into and out of their queues |
+//! | 3 | `slcan_line`, `service_line`, `bus::receive` | a byte, a frame | into and out of their queues |
 //! | 2 | `output` | pended by both | samples, pipeline, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
 //! | 0 | `idle` | the rest | service line, weights against their checksum |
@@ -26,16 +26,21 @@ fn main() {
     eprintln!("this is a firmware image: build it with `cargo fw`");
 }
 
+#[cfg(all(target_os = "none", feature = "rtt"))]
+use defmt_rtt as _;
+
 #[cfg(target_os = "none")]
 mod board;
-#[cfg(target_os = "none")]
-mod bus;
+#[cfg(all(target_os = "none", feature = "firmware"))]
+#[path = "stm32f405/mod.rs"]
+mod chip;
+#[cfg(all(target_os = "none", not(feature = "firmware")))]
+#[path = "stm32h743/mod.rs"]
+mod chip;
 #[cfg(target_os = "none")]
 mod clock;
 #[cfg(target_os = "none")]
 mod crash;
-#[cfg(target_os = "none")]
-mod flash;
 #[cfg(target_os = "none")]
 mod idle;
 #[cfg(target_os = "none")]
@@ -46,8 +51,6 @@ mod queue;
 mod serial;
 #[cfg(target_os = "none")]
 mod start;
-#[cfg(target_os = "none")]
-mod watchdog;
 
 /// Vector and priority of each task below: RTIC has them in instructions alone, the bound of the
 /// stack wants them as data. A test holds them against the running image.
@@ -56,7 +59,8 @@ mod watchdog;
 #[used]
 #[unsafe(link_section = ".priorities")]
 static PRIORITIES: [[u8; 2]; 7] = {
-    use stm32f4::stm32f405::Interrupt;
+    use crate::board::CAN_PRIORITY;
+    use crate::chip::{CAN_INTERRUPT, pac::Interrupt};
     const SYSTICK: u8 = 15;
     const FIRST: u8 = 16;
     [
@@ -64,7 +68,7 @@ static PRIORITIES: [[u8; 2]; 7] = {
         [SYSTICK, 4],
         [FIRST + Interrupt::USART2 as u8, 3],
         [FIRST + Interrupt::USART6 as u8, 3],
-        [FIRST + Interrupt::CAN1_RX0 as u8, 3],
+        [FIRST + CAN_INTERRUPT as u8, CAN_PRIORITY],
         [FIRST + Interrupt::UART4 as u8, 2],
         [FIRST + Interrupt::UART5 as u8, 1],
     ]
@@ -73,16 +77,16 @@ static PRIORITIES: [[u8; 2]; 7] = {
 // The vectors of UART4 and UART5, which this board does not use, are pended by hand.
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
-#[rtic::app(device = stm32f4::stm32f405, peripherals = true)]
+#[rtic::app(device = crate::chip::pac, peripherals = true)]
 mod app {
+    use crate::chip::pac::Interrupt;
     use crate::idle::Idle;
-    use crate::output::{FRAMES, Output, WindowTask};
-    use crate::{board, bus, clock, serial, start};
+    use crate::output::{Output, WindowTask};
+    use crate::{board, clock, serial, start};
     use core::mem::MaybeUninit;
     use gyronet::health::supervisor::Task;
     use gyronet::model::GyroNet;
     use gyronet::service::message::AllCounters;
-    use stm32f4::stm32f405::Interrupt;
 
     /// What idle tells of, and what it has found out.
     #[shared]
@@ -96,7 +100,6 @@ mod app {
         imu: serial::Handler<{ board::IMU_QUEUE }>,
         slcan: serial::Handler<{ board::SLCAN_QUEUE }>,
         service: serial::Handler<{ board::SERVICE_QUEUE }>,
-        can: Option<bus::Receiver>,
         sender: &'static mut Output,
         network: WindowTask,
         rest: &'static mut Idle,
@@ -118,9 +121,9 @@ mod app {
         let sender =
             start::place(cx.local.sender_place, || output.connect(ports, board.time, board.watchdog));
         let rest = start::place(cx.local.rest_place, || Idle::new(device, service));
-        let board::Handlers { imu, slcan, service, can } = handlers;
+        let board::Handlers { imu, slcan, service } = handlers;
         let shared = Shared { counters: AllCounters::default(), weights_damaged: false };
-        (shared, Local { imu, slcan, service, can, sender, network, rest })
+        (shared, Local { imu, slcan, service, sender, network, rest })
     }
 
     #[task(binds = USART1, priority = 4, local = [imu])]
@@ -144,15 +147,6 @@ mod app {
     #[task(binds = USART6, priority = 3, local = [service])]
     fn service_line(cx: service_line::Context) {
         cx.local.service.serve();
-    }
-
-    #[task(binds = CAN1_RX0, priority = 3, local = [can])]
-    fn can_frames(cx: can_frames::Context) {
-        let Some(receiver) = cx.local.can else { return };
-        while let Some((frame, _lost)) = receiver.receive() {
-            // A wheel's speed that finds no room is followed by a newer one.
-            let _ = frame.map(|frame| FRAMES.push(frame));
-        }
     }
 
     #[task(binds = UART4, priority = 2, local = [sender], shared = [counters, weights_damaged])]

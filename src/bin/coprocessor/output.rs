@@ -6,11 +6,11 @@
 //! counts and flags.
 
 use crate::board::SUPERVISOR;
-use crate::bus::Bus;
+use crate::chip::bus::Bus;
+use crate::chip::watchdog::Watchdog;
 use crate::clock::BoardTime;
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::queue::Queue;
-use crate::watchdog::Watchdog;
 use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;

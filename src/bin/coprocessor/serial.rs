@@ -1,45 +1,18 @@
 //! Serial lines: a handler at the register's end, queues, a port at the other.
-#![allow(unsafe_code, reason = "the data register and the interrupt mask; each block says why it is sound")]
+#![allow(unsafe_code, reason = "the interrupt mask; the block says why it is sound")]
 
 use crate::board::SENDING;
+use crate::chip::usart::Usart;
 use crate::queue::Queue;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use cortex_m::peripheral::NVIC;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
-use stm32f4::stm32f405::{Interrupt, NVIC, usart1::RegisterBlock};
 
 /// Polls before a flush gives up: about ten byte times at 115200.
 const FLUSH_POLLS: u32 = 100_000;
 /// Bytes that a handler takes from or gives the line in one turn. A real one has one and takes two
 /// at most; the emulated one has what the host has sent, takes all and never asks for more.
 const BURST: usize = SENDING;
-
-/// Where a line's registers are, and its interrupt.
-#[derive(Clone, Copy)]
-pub struct Usart {
-    /// A USART of this part.
-    pub registers: *const RegisterBlock,
-    /// Its interrupt.
-    pub interrupt: Interrupt,
-}
-
-// SAFETY: an address that is always there. The handler alone reads and writes data; others only
-// read the status, or set a bit that the handler clears.
-unsafe impl Send for Usart {}
-
-impl Usart {
-    fn registers(&self) -> &RegisterBlock {
-        // SAFETY: see above.
-        unsafe { &*self.registers }
-    }
-
-    /// Lets it run at the rate that is nearest to `baud`; 8N1, both ways.
-    pub fn start(self, clock_hz: u32, baud: u32) {
-        let divider = ((clock_hz + baud / 2) / baud) as u16;
-        // SAFETY: any 16-bit value is a valid divider (RM0090 30.3.4).
-        self.registers().brr().write(|w| unsafe { w.bits(divider) });
-        self.registers().cr1().write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
-    }
-}
 
 /// What a line has done wrong since the start. The handler alone counts.
 pub struct Faults {
@@ -76,10 +49,9 @@ impl<const N: usize> Handler<N> {
     }
 
     fn take(&mut self) {
-        let registers = self.usart.registers();
         for _ in 0..BURST {
-            let status = registers.sr().read();
-            if status.rxne().bit_is_clear() && status.ore().bit_is_clear() {
+            let status = self.usart.status();
+            if !status.received {
                 return;
             }
             if self.received.is_full() {
@@ -92,28 +64,25 @@ impl<const N: usize> Handler<N> {
                 }
                 return;
             }
-            if status.ore().bit_is_set() || status.fe().bit_is_set() || status.nf().bit_is_set() {
+            if status.damaged {
                 count(&self.faults.lost);
             }
-            // Status before data: that clears the errors (RM0090 30.6.1).
-            let _ = self.received.push(registers.dr().read().dr().bits() as u8);
+            let _ = self.received.push(self.usart.read());
         }
         // More may wait. A real line would interrupt again by itself.
         NVIC::pend(self.usart.interrupt);
     }
 
     fn give(&mut self) {
-        let registers = self.usart.registers();
         for _ in 0..BURST {
-            if registers.sr().read().txe().bit_is_clear() {
+            if !self.usart.status().room {
                 return;
             }
             let Some(byte) = self.sending.pop() else { break };
-            // SAFETY: the data register takes any byte.
-            registers.dr().write(|w| unsafe { w.bits(byte.into()) });
+            self.usart.write(byte);
         }
         if self.sending.is_empty() {
-            registers.cr1().modify(|_, w| w.txeie().disabled());
+            self.usart.wants_room(false);
         }
     }
 }
@@ -169,7 +138,7 @@ impl<const N: usize> Port<N> {
     /// Has the handler send what waits. Also where the line is held: what a flooded line has to say
     /// must get out, or nobody takes what waits.
     fn kick(&self) {
-        self.usart.registers().cr1().modify(|_, w| w.txeie().enabled());
+        self.usart.wants_room(true);
         self.wake();
     }
 }
@@ -212,7 +181,7 @@ impl<const N: usize> Write for Port<N> {
     }
 
     fn flush(&mut self) -> Result<(), ErrorKind> {
-        let sent = |_| self.sending.is_empty() && self.usart.registers().sr().read().tc().bit_is_set();
+        let sent = |_| self.sending.is_empty() && self.usart.status().sent;
         if (0..FLUSH_POLLS).any(sent) { Ok(()) } else { Err(ErrorKind::TimedOut) }
     }
 }

@@ -1,7 +1,7 @@
 //! Makes what the tasks own, where it stays.
 
 use crate::board::Board;
-use crate::flash::{Flash, Records, Slots};
+use crate::chip::flash::{Flash, Records, Slots};
 use crate::idle::Stored;
 use crate::output::Unconnected;
 use core::mem::MaybeUninit;

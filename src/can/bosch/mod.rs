@@ -57,7 +57,7 @@ impl SignalStatus {
     pub const INITIALISING: Self = Self(4);
 }
 
-/// TX1 as values.
+/// TX1, the yaw message, as codes: 0.005 deg/s and 0.127465e-3 g each, zero at 0x8000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tx1 {
@@ -108,13 +108,7 @@ impl Tx1 {
     /// The eight bytes.
     #[must_use]
     pub fn emit(&self) -> [u8; 8] {
-        let [yaw0, yaw1] = self.yaw_rate.to_le_bytes();
-        let [ay0, ay1] = self.lateral_acceleration.to_le_bytes();
-        let status = self.yaw_rate_status.0 << 4;
-        let counter = (self.counter & 0x0F) | self.lateral_acceleration_status.0 << 4;
-        let mut bytes = [yaw0, yaw1, status, self.temperature, ay0, ay1, counter, 0];
-        bytes[7] = CRC.checksum(&bytes[..7]);
-        bytes
+        Message::from(*self).emit()
     }
 
     /// The frame, in a driver's own type; `None` only if that type cannot hold eight bytes.
@@ -128,20 +122,14 @@ impl Tx1 {
     /// # Errors
     /// [`Tx1Error`] for a wrong length or checksum.
     pub fn parse(bytes: &[u8]) -> Result<Self, Tx1Error> {
-        let &[yaw0, yaw1, status, temperature, ay0, ay1, counter, received] = bytes else {
-            return Err(Tx1Error::Length(bytes.len()));
-        };
-        let computed = CRC.checksum(&bytes[..7]);
-        if computed != received {
-            return Err(Tx1Error::Crc { computed, received });
-        }
+        let message = Message::parse(bytes)?;
         Ok(Self {
-            yaw_rate: u16::from_le_bytes([yaw0, yaw1]),
-            yaw_rate_status: SignalStatus(status >> 4),
-            temperature,
-            lateral_acceleration: u16::from_le_bytes([ay0, ay1]),
-            lateral_acceleration_status: SignalStatus(counter >> 4),
-            counter: counter & 0x0F,
+            yaw_rate: message.rate,
+            yaw_rate_status: message.rate_status,
+            temperature: message.temperature,
+            lateral_acceleration: message.acceleration,
+            lateral_acceleration_status: message.acceleration_status,
+            counter: message.counter,
         })
     }
 

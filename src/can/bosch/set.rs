@@ -11,7 +11,7 @@
 //! again), so a drop-in must too.
 
 use super::{
-    CRC, SignalStatus, TX1_ID, Tx1, Tx1Error, YawRateSignal, encode_acceleration, encode_temperature,
+    CRC, SignalStatus, TX1_ID, Tx1, Tx1Error, YawRateSignal, ZERO, encode_acceleration, encode_temperature,
 };
 use crate::units::{AngularRate, CentiCelsius, SpecificForce};
 use embedded_can::{Frame, StandardId};
@@ -50,7 +50,7 @@ pub const LAYOUTS: [Layout; 3] = [
     },
 ];
 
-/// One message of the set as codes.
+/// One message of the set as codes: 0.005 deg/s and 0.127465e-3 g each, zero at 0x8000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
@@ -118,6 +118,18 @@ impl Message {
             acceleration_status: SignalStatus(counter >> 4),
             counter: counter & 0x0F,
         })
+    }
+
+    /// The rate in deg/s.
+    #[must_use]
+    pub fn rate_deg_per_sec(&self) -> f64 {
+        f64::from(i32::from(self.rate) - ZERO) * 0.005
+    }
+
+    /// The acceleration in g (0.127465e-3 g a code).
+    #[must_use]
+    pub fn acceleration_g(&self) -> f64 {
+        f64::from(i32::from(self.acceleration) - ZERO) * 0.000_127_465
     }
 
     /// The frame under a layout's identifier, in a driver's own type; `None` only if that type

@@ -29,7 +29,7 @@ const MAX_BUS_LOAD: u32 = 800;
 /// Most messages that a configuration can have.
 pub const MAX_MESSAGES: usize = 7;
 
-/// Settings that have been checked.
+/// What is sent, how often and how protected: [`Settings`] that have been checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
@@ -66,7 +66,7 @@ impl Config {
         if per_mille > MAX_BUS_LOAD { Err(ConfigError::Overload { per_mille }) } else { Ok(config) }
     }
 
-    /// What was checked.
+    /// The settings that were checked.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings

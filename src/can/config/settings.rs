@@ -54,7 +54,7 @@ pub struct BoschSettings {
     pub tx1_only: bool,
 }
 
-/// Our own yaw messages.
+/// Our own yaw messages: rate, angle, detail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct YawSettings {
@@ -74,7 +74,7 @@ pub struct Vdc2Settings {
     pub source: u8,
 }
 
-/// Everything that can be set.
+/// What is sent on the bus, and how; [`super::Config::new`] checks it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {

@@ -95,12 +95,12 @@ pub const FIFO_16_BIT: u8 = 0x07;
 /// [`FIFO_CONFIG1`]: the same with 20 bits.
 pub const FIFO_20_BIT: u8 = 0x17;
 
-/// The anti-alias filter for 258 Hz.
+/// The anti-alias filter for 258 Hz: its three numbers, from the data sheet's table of bandwidths.
 pub mod aaf_258_hz {
-    /// DELT.
+    /// For [`super::GYRO_CONFIG_STATIC3`].
     pub const DELT: u8 = 6;
-    /// DELTSQR.
+    /// The square of it, for the two registers behind.
     pub const DELTSQR: u16 = 36;
-    /// BITSHIFT.
+    /// For the high nibble of [`super::GYRO_CONFIG_STATIC5`].
     pub const BITSHIFT: u8 = 10;
 }

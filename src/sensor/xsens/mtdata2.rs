@@ -16,17 +16,17 @@ pub const MAX_EMITTED: usize = 96;
 pub mod id {
     /// What is left of an identifier without them.
     pub const MASK: u16 = 0xFFF0;
-    /// u16.
+    /// Counts messages: u16, wraps.
     pub const PACKET_COUNTER: u16 = 0x1020;
-    /// u32, 10 kHz ticks.
+    /// The part's time: u32, 10 kHz ticks, wraps.
     pub const SAMPLE_TIME_FINE: u16 = 0x1060;
-    /// deg C.
+    /// Temperature, deg C.
     pub const TEMPERATURE: u16 = 0x0810;
-    /// x, y, z, m/s^2.
+    /// Specific force: x, y, z, m/s^2.
     pub const ACCELERATION: u16 = 0x4020;
-    /// x, y, z, rad/s.
+    /// Angular rate: x, y, z, rad/s.
     pub const RATE_OF_TURN: u16 = 0x8020;
-    /// u32.
+    /// Self-test, filter, clipping: u32.
     pub const STATUS_WORD: u16 = 0xE020;
 }
 

@@ -5,19 +5,14 @@ use gyronet_tools::image_size::ImageSize;
 use gyronet_tools::parser_load::ParserLoad;
 use gyronet_tools::target_bench::{self, Count, Counts};
 
-/// Counts instructions and modelled Cortex-M4 cycles of every kernel, network and sensor parser,
-/// in QEMU.
+/// Count instructions and modelled cycles on the target, in QEMU.
 ///
-/// Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
+/// Of every kernel, network and sensor parser, on a Cortex-M4F. Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
 /// `name instructions=N cycles=N stack=BYTES`, then sizes, then what the parsers cost for a byte
 /// and of the processor's time. Cycles are modelled (zero wait states), not
 /// measured on silicon. Exit status 1 when the count of a window depends on its input.
 #[derive(Debug, clap::Args)]
-pub struct Args {
-    /// Print as JSON.
-    #[arg(long)]
-    json: bool,
-}
+pub struct Args {}
 
 /// CMSIS-NN s8 on the same networks: instructions and modelled cycles (gcc 12.2 -O3).
 const CMSIS_NN_S8: [(&str, u64, u64); 3] = [
@@ -27,16 +22,16 @@ const CMSIS_NN_S8: [(&str, u64, u64); 3] = [
 ];
 
 /// Runs the command.
-pub fn run(args: &Args, _common: Common) -> super::Result {
+pub fn run(_: &Args, common: Common) -> super::Result {
     let workspace = target_bench::workspace();
-    let folder = workspace.join("target/images");
+    let folder = target_bench::target_folder();
     let mut counts = Counts::default();
     for image in target_bench::IMAGES {
         let image = target_bench::build(&workspace, image, &folder)?;
         counts.extend(target_bench::measure(&workspace, &image)?);
     }
     let coprocessor = ImageSize::read(&target_bench::build(&workspace, "coprocessor", &folder)?)?;
-    if args.json {
+    if common.json {
         println!("{}", json(&counts, &coprocessor));
     } else {
         print(&counts, &coprocessor);

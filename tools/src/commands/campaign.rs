@@ -1,7 +1,7 @@
 //! `gyronet campaign`: faults on purpose.
 
 use super::networks::Weights;
-use super::{Common, WriteError, progress};
+use super::{Common, WriteError, print_json, progress};
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_tools::bundled;
 use gyronet_tools::campaign::drive::Drive;
@@ -16,12 +16,17 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Damage drives on purpose, as bytes on the board's lines, and see what a receiver is told.
+/// Damage drives on purpose and see what a receiver is told.
 ///
 /// The bundled simulated drive, and recordings where they are given, go through the bytes of four
 /// parts and through SLCAN; faults are drawn by a seed, single and in pairs. Exit status 1 when
 /// one goes undetected that is not on the named list, or anything panics.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet campaign --quick                              # half a minute
+  gyronet campaign trial08_100hz.csv --plot faults.svg  # 20,000 runs, a recording beside the simulated drive
+  gyronet campaign --upsets                             # flipped bits instead")]
 pub struct Args {
     /// Recordings to damage beside the simulated drive.
     #[arg(value_name = "DRIVE.csv")]
@@ -39,9 +44,6 @@ pub struct Args {
     /// and so many of the weights.
     #[arg(long, value_name = "BITS", num_args = 0..=1, default_missing_value = "100000")]
     upsets: Option<usize>,
-    /// Print JSON instead of the table.
-    #[arg(long)]
-    json: bool,
     /// Draw the runs of single faults as SVG here.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -69,9 +71,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let names: Vec<String> = drives.iter().map(|drive| drive.name.clone()).collect();
     let report = Report::new(plan.seed, &names, &runs);
     let mut out = std::io::stdout().lock();
-    if args.json {
-        serde_json::to_writer_pretty(&mut out, &report).map_err(std::io::Error::from)?;
-        writeln!(out)?;
+    if common.json {
+        print_json(&mut out, &report)?;
     } else {
         write!(out, "{report}")?;
     }
@@ -105,9 +106,9 @@ fn upset(bits: usize, args: &Args, drive: &Drive, common: Common) -> super::Resu
     let estimate = flip(Place::Estimate, &scene, &mut network, drawn, || bar.inc(1));
     bar.finish_and_clear();
     let mut out = std::io::stdout().lock();
-    if args.json {
+    if common.json {
         let all = serde_json::json!({ "weights": weights, "window": window, "estimate": estimate });
-        writeln!(out, "{all:#}")?;
+        print_json(&mut out, &all)?;
     } else {
         write!(out, "{weights}")?;
         writeln!(out, "a window in RAM: {window}")?;

@@ -1,27 +1,42 @@
 //! `gyronet demo`: one drive, everything that comes of it.
 
-use super::{Common, WriteError, networks, progress, replay};
+use super::{Common, WriteError, networks, paint, print_json, progress, replay};
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
+use gyronet_tools::demo::Demo;
+use gyronet_tools::demo::board::{Agreement, BoardError, Difference, Figures, Outcome};
 use gyronet_tools::evaluate::{DriveErrors, EvaluateError, Report};
 use gyronet_tools::methods::{self, Rates};
 use gyronet_tools::recording::Recording;
-use gyronet_tools::{bundled, plot};
+use gyronet_tools::{bundled, plot, target_bench};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Run a drive through every method: print the errors, write the CAN log and a picture.
+/// Show everything on one drive: a table of errors, a page, a CAN log.
 ///
-/// Without a file it takes the simulated drive that comes with the binary.
+/// The page (demo.html) needs nothing but a browser: yaw, errors and path to zoom into, the
+/// table of methods, decoded CAN messages, time and memory. Without FILE the simulated drive
+/// that comes with the binary is taken.
+///
+/// Where qemu-system-arm is installed the firmware image is built (minutes, the first time) and
+/// run on the first 10 s of the drive; exit status 1 if one byte is not as on this machine.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet demo                                  # the simulated drive
+  gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns
+  gyronet demo drive.csv --json --no-board")]
 pub struct Args {
-    /// Recording; the errors are printed where it has the true yaw rate in ref_gyr_z.
+    /// A recorded drive (CSV, 100 Hz): ref_gyr_z in it gives errors, wheelN_rate a path.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
-    /// Folder for can.log and yaw.svg [default: target/demo].
+    /// Folder for demo.html, yaw.svg and can.log [default: target/demo].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Do not run the firmware image, although QEMU is there.
+    #[arg(long)]
+    no_board: bool,
     #[command(flatten)]
     networks: networks::Files,
 }
@@ -43,8 +58,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let rates = Rates::new(&recording, &mut checkpoint.network(), &mut integer, || bar.inc(1));
     bar.finish_and_clear();
     let rates = rates?;
-    let report = match DriveErrors::new(&recording, &rates) {
-        Ok(errors) => Some(Report::new(vec![errors])),
+    let errors = match DriveErrors::new(&recording, &rates) {
+        Ok(errors) => Some(errors),
         // A drive without a reference still has its log and its picture.
         Err(EvaluateError::NoReference { .. }) => None,
         Err(error) => return Err(error.into()),
@@ -52,22 +67,85 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
     let folder = args.out.clone().unwrap_or_else(default_folder);
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
-    let (log, picture) = (folder.join("can.log"), folder.join("yaw.svg"));
+    let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
     let frames = replay::write_file(&rates.drive, &mut Feeds::new(Config::DEFAULT), &log)?;
     std::fs::write(&picture, plot::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
+    let board = board(args, common, &recording, &mut integer)?;
+    let simulated = args.file.is_none();
+    let demo = Demo::new(&recording, simulated, &rates, errors.as_ref(), (Config::DEFAULT, frames), board);
+    std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
 
     let mut out = std::io::stdout().lock();
-    if args.file.is_none() {
-        writeln!(out, "SIMULATED drive: it shows the way of the data, not how good GyroNet is on a car.")?;
+    if common.json {
+        let mut json = serde_json::to_value(demo.summary())?;
+        json["files"] = serde_json::json!({ "page": page, "picture": picture, "log": log });
+        print_json(&mut out, &json)?;
+        return verdict(&demo);
+    }
+    if simulated {
+        let mark = console::style("SIMULATED drive:").yellow().bold();
+        writeln!(out, "{mark} it shows the way of the data, not how good GyroNet is on a car.")?;
         writeln!(out, "For a real one: gyronet demo FILE.csv\n")?;
     }
-    match report {
-        Some(report) => write!(out, "{report}")?,
+    match &errors {
+        Some(errors) => write!(out, "{}", paint::report(&Report::new(vec![errors.clone()])))?,
         None => writeln!(out, "{}: no reference yaw rate, so no errors\n", recording.name())?,
     }
     writeln!(out, "{frames} CAN frames: {}", log.display())?;
     writeln!(out, "picture: {}", picture.display())?;
-    Ok(())
+    match &demo.board {
+        Outcome::NotRun { why } => writeln!(out, "firmware image: not run: {why}")?,
+        Outcome::Run {
+            agreement: Agreement { frames, payload_bytes, difference: None, seconds, .. },
+            ..
+        } => writeln!(
+            out,
+            "firmware image in QEMU: {frames} frames, {payload_bytes} payload bytes, all as here ({seconds:.1} s)"
+        )?,
+        Outcome::Run { agreement: Agreement { difference: Some(difference), .. }, .. } => {
+            let Difference { number, board, host } = difference;
+            writeln!(out, "firmware image in QEMU: frame {number} is {board}, here {host}")?;
+        }
+    }
+    writeln!(out, "page: {}", page.display())?;
+    verdict(&demo)
+}
+
+fn verdict(demo: &Demo<'_>) -> super::Result {
+    if demo.board.differs() {
+        Err("the firmware image sends other bytes than the library".into())
+    } else {
+        Ok(())
+    }
+}
+
+/// The firmware image on the beginning of the drive, where it can be run here.
+fn board(
+    args: &Args,
+    common: Common,
+    recording: &Recording,
+    network: &mut GyroNet<'_>,
+) -> Result<Outcome, BoardError> {
+    if args.no_board {
+        return Ok(Outcome::NotRun { why: "--no-board".into() });
+    }
+    if args.networks.weights.is_some() {
+        return Ok(Outcome::NotRun {
+            why: "the image carries weights of its own, not those of --weights".into(),
+        });
+    }
+    if let Some(missing) = Outcome::missing() {
+        return Ok(missing);
+    }
+    let waiting =
+        progress::waiting(common, "the firmware image: building (minutes, the first time), running in QEMU");
+    let build =
+        |image| target_bench::build(&target_bench::workspace(), image, &target_bench::target_folder());
+    let (image, bench) = (build("coprocessor")?, build("bench")?);
+    let agreement = Agreement::new(&image, recording, network)?;
+    let figures = Figures::new(&image, &bench)?;
+    waiting.finish_and_clear();
+    Ok(Outcome::Run { agreement, figures })
 }
 
 /// `target/demo` of the workspace when cargo runs the binary, else of the working directory.

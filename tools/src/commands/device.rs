@@ -14,28 +14,31 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Asks and configures a board over its service line.
+/// Ask and configure a board over its service line.
 ///
 /// A new configuration and new weights hold from the next start on (`device restart`).
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet device --port /dev/ttyUSB1 info
+  gyronet device --port /dev/ttyUSB1 set latitude_deg=48.1 mounting.roll_deg=1.5
+  gyronet device --port /dev/ttyUSB1 calibrate static --store
+  gyronet device --port localhost:4000 weights gyronet.blob      # then: restart")]
 pub struct Args {
-    /// Serial port, or host:port (the emulator, a serial server).
-    #[arg(long, global = true)]
+    /// Serial port, or host:port (the emulator, a serial server); always wanted.
+    #[arg(long, global = true, value_name = "PORT|HOST:PORT")]
     port: Option<String>,
-    /// Print as JSON.
-    #[arg(long, global = true)]
-    json: bool,
     #[command(subcommand)]
     action: Action,
 }
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Versions, reset, clock, flash, weights, status.
+    /// Print versions, cause of the last reset, clock, flash, weights, status.
     Info,
-    /// Prints the configuration.
+    /// Print the configuration.
     Get,
-    /// Changes the configuration: NAME=VALUE as `get` prints them, or a whole file.
+    /// Change the configuration: NAME=VALUE as `get` prints them, or a whole file.
     Set {
         /// For example `latitude_deg=48.1 mounting.roll_deg=1.5`; values as in JSON.
         settings: Vec<String>,
@@ -43,7 +46,7 @@ enum Action {
         #[arg(long)]
         file: Option<PathBuf>,
     },
-    /// Calibrates the sensor while the vehicle stands, and prints what was found.
+    /// Calibrate the sensor while the vehicle stands (3 s), and print what was found.
     Calibrate {
         /// What to find, or `show` what is known.
         #[arg(value_enum)]
@@ -52,16 +55,16 @@ enum Action {
         #[arg(long)]
         store: bool,
     },
-    /// Prints what has happened since the start.
+    /// Print what has happened since the start.
     Log,
-    /// Prints everything that is counted.
+    /// Print everything that is counted.
     Counters,
-    /// Uploads a weight file, has it checked, and used from the next start on.
+    /// Upload a weight file; the board checks it, and uses it from the next start on.
     Weights {
         /// As `gyronet quantize` writes it.
         file: PathBuf,
     },
-    /// Starts the board anew.
+    /// Start the board anew.
     Restart,
 }
 
@@ -85,9 +88,12 @@ type Board = Device<Line>;
 
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let port = args.port.as_deref().ok_or("which board? Name its service line with --port")?;
+    let Some(port) = args.port.as_deref() else {
+        let why = "which board? Name its service line: --port /dev/ttyUSB1, or --port host:port\n";
+        clap::Error::raw(clap::error::ErrorKind::MissingRequiredArgument, why).exit();
+    };
     let mut device = Device::new(Line::open(port)?, port);
-    let json = args.json;
+    let json = common.json;
     match &args.action {
         Action::Info => {
             let Reply::Info(info) = device.ask(&Request::Info)? else { return mismatch() };
@@ -123,8 +129,7 @@ fn done(json: bool, what: &str) {
 }
 
 fn print_json(value: &impl Serialize) -> super::Result {
-    println!("{}", serde_json::to_string_pretty(value)?);
-    Ok(())
+    super::print_json(&mut std::io::stdout().lock(), value)
 }
 
 /// JSON, or a line for each value.

@@ -1,6 +1,6 @@
 //! `gyronet evaluate`: yaw errors of each method on recorded drives.
 
-use super::{Common, networks, progress};
+use super::{Common, networks, paint, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet_tools::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::{DriveErrors, Report};
@@ -9,28 +9,30 @@ use gyronet_tools::recording::Recording;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Compare the yaw errors of raw gyro, static initialisation, FIR, GyroNet f32 and GyroNet
-/// integer on recorded drives.
+/// Measure the yaw error of every method on recorded drives.
 ///
-/// A drive is a CSV at 100 Hz with the columns t_s, acc_x/y/z, gyr_x/y/z and ref_gyr_z, and
-/// stands still for its first 3 s; wheelN_rate stand in for the vehicle's bus. Printed for each
-/// drive, and as a mean: the mean error of the yaw change over 1 s, and the error of the yaw at
-/// the end. The network rows are settled estimates after static initialisation; the last two
-/// are what the board sends: at once (Bosch, VDC2), and in its own yaw messages.
+/// Methods: the raw gyro, static initialisation, a low-pass filter, GyroNet in f32 and in integers.
+/// Printed for each drive, and as a mean: the mean error of the yaw change over 1 s (rad), that
+/// over static initialisation's, and the error of the yaw at the end (rad). The network rows are
+/// settled estimates after static initialisation; the last two are what the board sends: with
+/// the sample (Bosch TX1, J1939 VDC2), and in its own yaw messages some samples later. The wheels
+/// of a drive stand in for the vehicle's bus.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet evaluate trial09.csv trial11.csv
+  gyronet evaluate drive.csv --weights mine.blob --json
+  gyronet evaluate drive.csv --ablation         # what each part is worth")]
 pub struct Args {
-    /// Recordings.
+    /// Recorded drives with ref_gyr_z.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Print JSON instead of a table.
-    #[arg(long)]
-    json: bool,
     /// What each part of the compensation is worth, how often the errors stay inside one, two
     /// and three sigma, and what the reference shows at standstill.
-    #[arg(long, conflicts_with_all = ["json", "lags"])]
+    #[arg(long, conflicts_with = "lags")]
     ablation: bool,
-    /// The default at every lag.
-    #[arg(long, conflicts_with = "json")]
+    /// The error of the rate for navigation at every lag, 0 to 110 ms (default of the board: 70).
+    #[arg(long)]
     lags: bool,
     #[command(flatten)]
     networks: networks::Files,
@@ -57,20 +59,25 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let report = Report::new(drives);
     let mut out = std::io::stdout().lock();
-    if args.json {
-        serde_json::to_writer_pretty(&mut out, &report).map_err(std::io::Error::from)?;
-        writeln!(out)?;
-    } else {
-        write!(out, "{report}")?;
+    if common.json {
+        return print_json(&mut out, &report);
     }
-    Ok(())
+    Ok(write!(out, "{}", paint::report(&report))?)
+}
+
+/// One drive's scores.
+#[derive(serde::Serialize)]
+struct Scored {
+    name: String,
+    scores: Vec<Score>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference_at_standstill: Option<Floor>,
 }
 
 fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
     let weights = args.networks.weights()?;
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
-    let mut out = std::io::stdout().lock();
     for file in &args.files {
         let recording = Recording::read(file)?;
         let bar = progress::bar(common, variants.len() * recording.rows.len(), recording.name());
@@ -80,18 +87,27 @@ fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
         if scores.is_empty() {
             return Err(format!("{}: no reference yaw rate, which evaluation needs", recording.path).into());
         }
-        writeln!(out, "{}", recording.name())?;
-        print(&mut out, &scores)?;
-        if let Some(Floor { seconds, mean_1s_rad, bias_rad_per_s }) = ablation::floor(&recording) {
+        let (name, reference_at_standstill) = (recording.name().to_owned(), ablation::floor(&recording));
+        drives.push(Scored { name, scores, reference_at_standstill });
+    }
+    let scores: Vec<Vec<Score>> = drives.iter().map(|drive| drive.scores.clone()).collect();
+    let mean = ablation::mean(&scores).filter(|_| drives.len() > 1);
+    let mut out = std::io::stdout().lock();
+    if common.json {
+        return print_json(&mut out, &serde_json::json!({ "drives": drives, "mean": mean }));
+    }
+    for Scored { name, scores, reference_at_standstill } in &drives {
+        writeln!(out, "{name}")?;
+        print(&mut out, scores)?;
+        if let Some(Floor { seconds, mean_1s_rad, bias_rad_per_s }) = reference_at_standstill {
             writeln!(
                 out,
                 "  reference at standstill: {mean_1s_rad:.6} rad in 1 s over {seconds} s, mean {bias_rad_per_s:+.6} rad/s"
             )?;
         }
         writeln!(out)?;
-        drives.push(scores);
     }
-    if let ([_, _, ..], Some(mean)) = (drives.as_slice(), ablation::mean(&drives)) {
+    if let Some(mean) = mean {
         writeln!(out, "mean of {} drives", drives.len())?;
         print(&mut out, &mean)?;
     }

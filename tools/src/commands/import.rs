@@ -1,6 +1,6 @@
 //! `gyronet import`: a sequence of a data set as one drive.
 
-use super::{Common, WriteError, progress};
+use super::{Common, WriteError, print_json, progress, remark};
 use gyronet_tools::figures;
 use gyronet_tools::sequence::{self, Sequence};
 use gyronet_tools::simulate::layout::Layout;
@@ -9,14 +9,19 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Read a sequence of KAIST Complex Urban or NCLT, say what is in it, and write it as one CSV that
-/// the other subcommands run.
+/// Read a sequence of KAIST Urban or NCLT: what is in it; a CSV of it.
+///
+/// The CSV is one that the other subcommands run.
 ///
 /// KAIST: sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and
 /// global_pose.csv. NCLT: ms25.csv, kvh.csv, wheels.csv and groundtruth_*.csv. Missing files,
 /// wrong columns, text for numbers and time going backwards are errors; rows with NaN, repeated
 /// stamps, gaps and encoder resets are counted and said.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet import kaist urban14 --out urban14.csv
+  gyronet import nclt 2012-01-08 --stamps stamps.svg")]
 pub struct Args {
     /// Whose layout it has.
     #[arg(value_name = "LAYOUT")]
@@ -41,6 +46,20 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let sequence = read(&args.folder, common)?;
     let mut out = std::io::stdout().lock();
+    if common.json {
+        let [imu, fog, wheels, truth] = &sequence.files;
+        print_json(
+            &mut out,
+            &serde_json::json!({
+                "name": sequence.name,
+                "simulated": sequence.simulated,
+                "seconds": sequence.seconds(),
+                "files": { "imu": imu, "fog": fog, "wheels": wheels, "truth": truth },
+                "steps_in_gap": sequence.in_gap,
+            }),
+        )?;
+        return write(args, common, &sequence);
+    }
     let simulated = if sequence.simulated.is_some() { " (simulated)" } else { "" };
     writeln!(out, "{}{simulated}: {:.2} s on the 100 Hz grid", sequence.name, sequence.seconds())?;
     for (file, in_gap) in sequence.files.iter().zip(sequence.in_gap) {
@@ -50,17 +69,22 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         writeln!(out)?;
     }
+    write(args, common, &sequence)?;
+    Ok(remark(common, format_args!("{:.2} s", started.elapsed().as_secs_f64()))?)
+}
+
+/// The files that are asked for.
+fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
     if let Some(path) = &args.out {
         sequence.needs_gyro()?;
         let error = WriteError::to(path);
         let file = File::create(path).map_err(&error)?;
-        let rows = sequence::write_csv(&sequence, BufWriter::new(file)).map_err(&error)?;
-        writeln!(out, "{}: {rows} rows", path.display())?;
+        let rows = sequence::write_csv(sequence, BufWriter::new(file)).map_err(&error)?;
+        remark(common, format_args!("{}: {rows} rows", path.display()))?;
     }
     if let Some(path) = &args.stamps {
-        std::fs::write(path, figures::stamps(&sequence)?).map_err(WriteError::to(path))?;
+        std::fs::write(path, figures::stamps(sequence)?).map_err(WriteError::to(path))?;
     }
-    writeln!(out, "{:.2} s", started.elapsed().as_secs_f64())?;
     Ok(())
 }
 

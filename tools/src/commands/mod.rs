@@ -3,12 +3,14 @@
 pub mod bench_target;
 pub mod bus;
 pub mod campaign;
+pub mod completions;
 pub mod demo;
 pub mod device;
 pub mod evaluate;
 pub mod import;
 pub mod monitor;
 mod networks;
+mod paint;
 mod progress;
 pub mod quantize;
 pub mod replay;
@@ -21,12 +23,27 @@ pub mod tables;
 /// that names the file.
 pub type Result = std::result::Result<(), Box<dyn std::error::Error>>;
 
+/// For programs: as JSON, with a line end.
+fn print_json(out: &mut impl std::io::Write, value: &impl serde::Serialize) -> Result {
+    serde_json::to_writer_pretty(&mut *out, value).map_err(std::io::Error::from)?;
+    Ok(writeln!(out)?)
+}
+
+/// A line for people beside the results, on standard error; not with --quiet.
+fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
+    use std::io::Write;
+    if common.quiet { Ok(()) } else { writeln!(std::io::stderr(), "{line}") }
+}
+
 /// What holds for all subcommands.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Common {
-    /// Draw no progress bar.
+    /// Print results and errors only: no progress, no remarks.
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// Print results as JSON, on standard output.
+    #[arg(long, global = true)]
+    pub json: bool,
 }
 
 /// A file that could not be written, named.

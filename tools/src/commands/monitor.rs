@@ -18,19 +18,24 @@ const LINE: Duration = Duration::from_secs(1);
 /// --once gives up after so long.
 const ONCE: Duration = Duration::from_secs(10);
 
-/// Read our messages, check them as an ECU would, and show what they say: yaw rate, yaw, source,
-/// quality, faults, and what was lost, repeated or damaged on the way.
+/// Show what a receiver of our CAN messages sees.
 ///
-/// On a terminal a live picture; elsewhere a line a second. A log is read to its end, then
-/// summed up.
+/// The messages are checked as an ECU would: yaw rate, yaw, source, quality, faults, and what was
+/// lost, repeated or damaged on the way. On a terminal a live picture; elsewhere, and with --json, a
+/// line a second. A log is read to its end, then summed up. Ctrl-C ends with the sum, exit status 0.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet monitor /dev/ttyUSB0
+  gyronet monitor localhost:3000 --for 60 --csv yaw.csv
+  gyronet monitor can.log --json")]
 pub struct Args {
     /// Serial port with SLCAN (/dev/ttyUSB0, COM3), TCP socket with SLCAN (host:port), or a
     /// candump log.
     #[arg(value_name = "PORT|HOST:PORT|FILE")]
     source: String,
-    /// Bit/s of a serial port.
-    #[arg(long, default_value_t = 921_600)]
+    /// Rate of a serial port, bit/s.
+    #[arg(long, value_name = "BIT/S", default_value_t = 921_600)]
     baud: u32,
     /// Write each set of messages as a line of a table.
     #[arg(long, value_name = "FILE")]
@@ -58,7 +63,7 @@ enum MonitorError {
 }
 
 /// Runs the subcommand.
-pub fn run(args: &Args, _: Common) -> super::Result {
+pub fn run(args: &Args, common: Common) -> super::Result {
     let config = Config::DEFAULT;
     let mut source = Source::open(&args.source, args.baud, config.settings().bits_per_second)?;
     let mut table = args.csv.as_deref().map(Table::create).transpose()?;
@@ -67,7 +72,7 @@ pub fn run(args: &Args, _: Common) -> super::Result {
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
 
     let mut monitor = Monitor::new(&config);
-    let mut view = View::new(source.is_log());
+    let mut view = View::new(source.is_log() || common.quiet, common.json);
     let start = Instant::now();
     let limit = if args.once { Some(ONCE) } else { args.duration };
     let mut sets = 0_u64;
@@ -96,7 +101,7 @@ pub fn run(args: &Args, _: Common) -> super::Result {
         return Err(MonitorError::Nothing(args.source.clone()).into());
     }
     table.map_or(Ok(()), Table::finish)?;
-    view.finish(&monitor)?;
+    view.finish(&monitor, start.elapsed().as_secs_f64())?;
     Ok(())
 }
 
@@ -127,15 +132,17 @@ impl Table {
 struct View {
     term: Option<Term>,
     silent: bool,
+    json: bool,
     drawn: usize,
     last: Instant,
 }
 
 impl View {
     /// A log is over before anybody could watch it: it has its summary only.
-    fn new(silent: bool) -> Self {
+    fn new(silent: bool, json: bool) -> Self {
         let term = Term::stdout();
-        Self { term: term.is_term().then_some(term), silent, drawn: 0, last: Instant::now() }
+        let live = term.is_term() && !json;
+        Self { term: live.then_some(term), silent, json, drawn: 0, last: Instant::now() }
     }
 
     fn show(&mut self, monitor: &Monitor, elapsed: f64) -> io::Result<()> {
@@ -155,11 +162,15 @@ impl View {
                 self.drawn = lines.len();
                 term.write_line(&lines.join("\n"))
             }
+            None if self.json => writeln!(io::stdout().lock(), "{}", monitor.json(elapsed)),
             None => writeln!(io::stdout().lock(), "{}", monitor.line(elapsed)),
         }
     }
 
-    fn finish(self, monitor: &Monitor) -> io::Result<()> {
+    fn finish(self, monitor: &Monitor, elapsed: f64) -> io::Result<()> {
+        if self.json {
+            return writeln!(io::stdout().lock(), "{}", monitor.json(elapsed));
+        }
         if let Some(term) = &self.term {
             term.clear_last_lines(self.drawn)?;
         }

@@ -28,11 +28,10 @@ impl Weights {
 /// Which networks to compare.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Files {
-    /// Weight file of the integer network, instead of the one that comes with the library.
+    /// Weight file of the integer network [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     pub weights: Option<PathBuf>,
-    /// Checkpoint of the f32 network (safetensors), instead of the one that comes with the
-    /// tools.
+    /// Checkpoint of the f32 network, safetensors [default: the one that comes with the tools].
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
 }

@@ -2,6 +2,7 @@
 
 use super::Common;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::time::Duration;
 
 /// A bar of so many samples; invisible with `--quiet` and where nobody watches.
 pub fn bar(common: Common, samples: usize, doing: &str) -> ProgressBar {
@@ -10,5 +11,13 @@ pub fn bar(common: Common, samples: usize, doing: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(samples as u64), target)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
     bar.set_message(doing.to_owned());
+    bar
+}
+
+/// A moving sign that something of unknown length goes on; invisible as the bar is.
+pub fn waiting(common: Common, doing: &str) -> ProgressBar {
+    let bar = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+    bar.set_message(doing.to_owned());
+    bar.enable_steady_tick(Duration::from_millis(100));
     bar
 }

@@ -1,6 +1,6 @@
 //! `gyronet quantize`: an f32 checkpoint becomes a weight file for the integer kernels.
 
-use super::{Common, WriteError};
+use super::{Common, WriteError, print_json};
 use gyronet::fog::FogConfig;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogNet, GyroNet};
@@ -10,46 +10,86 @@ use gyronet_tools::checkpoint::Checkpoint;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::fog_checkpoint::{self, FogCheckpoint};
 use gyronet_tools::fog_drive;
-use gyronet_tools::quantization_error::Both;
+use gyronet_tools::quantization_error::{Both, QuantizationError};
 use gyronet_tools::quantize::{Report, fognet, quantize};
 use gyronet_tools::recording::Recording;
 use gyronet_tools::sequence::Sequence;
 use gyronet_tools::weight_file::WeightFile;
+use serde::Serialize;
+use std::fmt;
+use std::io::Write;
 use std::path::PathBuf;
 
-/// Turns a checkpoint (safetensors, from tools/train) into a weight file: int8 rows, packed in
-/// the order in which the kernels read them, with its provenance and a CRC-32. Which network it
-/// is the checkpoint says.
+/// Turn an f32 checkpoint into a weight file for the board.
+///
+/// The checkpoint (safetensors, from tools/train) says which network it is. The weight file has int8
+/// rows, packed in the order in which the kernels read them, with its provenance and a CRC-32.
 ///
 /// Prints the error that quantisation adds: RMS of integer less f32 output over RMS of the f32
 /// output, on the drives given, or for GyroNet on the simulated drive that comes with this tool.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet quantize gyronet.safetensors --out gyronet.blob --drives trial08.csv
+  gyronet quantize fognet.safetensors --out fognet.blob --drives sequences/train08")]
 pub struct Args {
-    /// The checkpoint.
+    /// The checkpoint, safetensors.
     checkpoint: PathBuf,
     /// The weight file to write.
-    #[arg(long, short)]
+    #[arg(long, short, value_name = "BLOB")]
     out: PathBuf,
     /// Recordings to measure the error on; for FoGNet folders in the layout of KAIST or NCLT.
     #[arg(long, num_args = 1.., value_name = "PATH")]
     drives: Vec<PathBuf>,
 }
 
+/// What quantisation adds on one drive.
+#[derive(Serialize)]
+struct Added {
+    drive: String,
+    windows: u64,
+    relative_rms: f64,
+    /// GyroNet alone has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale_rms: Option<f64>,
+    clamped_inputs: u64,
+}
+
+impl fmt::Display for Added {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { drive, windows, relative_rms, scale_rms, clamped_inputs } = self;
+        write!(f, "{drive}: quantisation adds {:.2} % RMS", 100.0 * relative_rms)?;
+        if let Some(scale) = scale_rms {
+            write!(f, " ({:.2} % to the scale)", 100.0 * scale)?;
+        }
+        write!(f, " over {windows} windows, {clamped_inputs} inputs clamped")
+    }
+}
+
 /// Runs the command.
-pub fn run(args: &Args, _common: Common) -> super::Result {
-    let (bytes, report) =
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let (bytes, report, added) =
         if fog_checkpoint::is_fognet(&args.checkpoint)? { fognet(args)? } else { gyronet(args)? };
     std::fs::write(&args.out, &bytes).map_err(WriteError::to(&args.out))?;
     let Report { rows, raised, largest_raise, bytes } = report;
-    println!(
+    let mut out = std::io::stdout().lock();
+    if common.json {
+        let made = serde_json::json!({
+            "path": args.out, "bytes": bytes, "rows": rows, "raised_rows": raised, "largest_raise": largest_raise,
+            "drives": added,
+        });
+        return print_json(&mut out, &made);
+    }
+    added.iter().try_for_each(|added| writeln!(out, "{added}"))?;
+    writeln!(
+        out,
         "{raised} of {rows} rows have a larger scale to keep their sum in 24 bits, at most {largest_raise:.2}x"
-    );
-    println!("{}: {bytes} bytes", args.out.display());
-    Ok(())
+    )?;
+    Ok(writeln!(out, "{}: {bytes} bytes", args.out.display())?)
 }
 
-/// A weight file and how it was made.
-type Made = Result<(Vec<u8>, Report), Box<dyn std::error::Error>>;
+/// A weight file, how it was made, and what that adds.
+type Made = Result<(Vec<u8>, Report, Vec<Added>), Box<dyn std::error::Error>>;
 
 fn gyronet(args: &Args) -> Made {
     let checkpoint = Checkpoint::read(&args.checkpoint)?;
@@ -60,27 +100,22 @@ fn gyronet(args: &Args) -> Made {
     } else {
         args.drives.iter().map(|path| Recording::read(path)).collect::<Result<_, _>>()?
     };
+    let mut added = Vec::new();
     for drive in &drives {
         let (mut integer, mut reference) = (GyroNet::new(weights.blob()?), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
         Drive::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
         let error = both.error();
-        println!(
-            "{}: quantisation adds {:.2} % RMS ({:.2} % to the scale) over {} windows, {} inputs clamped",
-            drive.name(),
-            100.0 * error.relative_rms(),
-            100.0 * error.scale_rms(),
-            error.windows,
-            error.clamped_inputs
-        );
+        added.push(Added { scale_rms: Some(error.scale_rms()), ..Added::new(drive.name(), &error) });
     }
-    Ok((bytes, report))
+    Ok((bytes, report, added))
 }
 
 fn fognet(args: &Args) -> Made {
     let checkpoint = FogCheckpoint::read(&args.checkpoint)?;
     let (bytes, report) = fognet::quantize(&checkpoint)?;
     let weights = WeightFile::parse_fognet(&args.out.display().to_string(), &bytes)?;
+    let mut added = Vec::new();
     for path in &args.drives {
         let sequence = Sequence::read(path, |_| {})?;
         let mut state = FogNetState::ZERO;
@@ -88,14 +123,20 @@ fn fognet(args: &Args) -> Made {
             (FogNet::new(weights.fog_blob()?, &mut state), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
         fog_drive::run(&sequence, &mut both, FogConfig::DEFAULT, || {});
-        let error = both.error();
-        println!(
-            "{}: quantisation adds {:.2} % RMS over {} windows, {} inputs clamped",
-            sequence.name,
-            100.0 * error.relative_rms(),
-            error.windows,
-            error.clamped_inputs
-        );
+        added.push(Added::new(&sequence.name, &both.error()));
     }
-    Ok((bytes, report))
+    Ok((bytes, report, added))
+}
+
+impl Added {
+    fn new(drive: &str, error: &QuantizationError) -> Self {
+        let QuantizationError { windows, clamped_inputs, .. } = *error;
+        Self {
+            drive: drive.into(),
+            windows,
+            relative_rms: error.relative_rms(),
+            scale_rms: None,
+            clamped_inputs,
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! `gyronet replay`: a recording through the integer pipeline, its CAN frames to a log.
 
 use super::networks::Weights;
-use super::{Common, WriteError, progress};
+use super::{Common, WriteError, print_json, progress};
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
@@ -11,29 +11,36 @@ use gyronet_tools::recording::Recording;
 use gyronet_tools::via::compare::{Bound, Difference, STAND_INS};
 use gyronet_tools::via::{Part, Via};
 use gyronet_tools::wheel_rates::WheelRates;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Run a recorded drive through the pipeline that is flashed, and write the CAN frames that it
-/// emits as a candump log, with the recording's own time stamps.
+/// Write the CAN log of a recorded drive.
 ///
-/// The log goes to stdout unless --out names a file; the summary goes to stderr. can-utils'
-/// canplayer and python-can can play the log.
+/// The drive runs through the pipeline that is flashed; the log has the format of `candump -L` and
+/// the recording's own time stamps, and can-utils' canplayer and python-can can play it. It goes to
+/// standard output unless --out names a file; the summary goes to standard error, or with --json to
+/// standard output if the log does not.
 ///
 /// With --via the samples go through the bytes of a part first: encoded as it would send them,
 /// read back by the parser that the board runs. The summary then says how far the corrected yaw
 /// is from that of the direct replay, next to the bound that follows from the part's rounding;
 /// exit status 1 beyond it.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet replay drive.csv --out can.log
+  gyronet replay drive.csv | head
+  gyronet replay drive.csv --via icm42688 --out can.log")]
 pub struct Args {
-    /// Recording.
+    /// A recorded drive.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where the log goes.
+    /// Where the log goes [default: standard output].
     #[arg(long, value_name = "FILE.log")]
     out: Option<PathBuf>,
-    /// Weight file, instead of the one that comes with the library.
+    /// Weight file [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
     /// Send the recording through the bytes of this part.
@@ -56,20 +63,38 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Some(path) => write_file(&drive, &mut feeds, path)?,
         None => drive.log(&mut feeds, BufWriter::new(io::stdout().lock()))?,
     };
-    let mut err = io::stderr().lock();
-    writeln!(err, "{}: {frames} frames in {:.2} s", recording.path, recording.seconds())?;
-    let statuses = drive.status_counts().map(|(status, count)| format!("{status:?} {count}").to_lowercase());
-    writeln!(err, "status: {}", statuses.join(", "))?;
-    writeln!(err, "events: {}", events(&drive, &feeds))?;
-    if let Some(detour) = detour {
-        write!(err, "{detour}")?;
-        if !detour.bound.holds(&detour.difference) {
-            return Err(
-                format!("the {} changes the yaw by more than its rounding explains", detour.part).into()
-            );
+    if common.json {
+        let summary = serde_json::json!({
+            "recording": recording.path,
+            "seconds": recording.seconds(),
+            "frames": frames,
+            "status": drive.status_counts().map(|(status, count)| (format!("{status:?}").to_lowercase(), count)).into_iter().collect::<BTreeMap<_, _>>(),
+            "events": events(&drive, &feeds).into_iter().collect::<BTreeMap<_, _>>(),
+            "via": detour.as_ref().map(Detour::json),
+        });
+        match args.out {
+            Some(_) => print_json(&mut io::stdout().lock(), &summary)?,
+            None => print_json(&mut io::stderr().lock(), &summary)?,
+        }
+    } else if !common.quiet {
+        let mut err = io::stderr().lock();
+        writeln!(err, "{}: {frames} frames in {:.2} s", recording.path, recording.seconds())?;
+        let statuses =
+            drive.status_counts().map(|(status, count)| format!("{status:?} {count}").to_lowercase());
+        writeln!(err, "status: {}", statuses.join(", "))?;
+        let events: Vec<String> =
+            events(&drive, &feeds).iter().map(|(name, count)| format!("{name} {count}")).collect();
+        writeln!(err, "events: {}", events.join(", "))?;
+        if let Some(detour) = &detour {
+            write!(err, "{detour}")?;
         }
     }
-    Ok(())
+    match detour {
+        Some(detour) if !detour.bound.holds(&detour.difference) => {
+            Err(format!("the {} changes the yaw by more than its rounding explains", detour.part).into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The drive, through a part's bytes where one is named, and what they did to it.
@@ -95,6 +120,26 @@ struct Detour {
     via: Via,
     difference: Difference,
     bound: Bound,
+}
+
+impl Detour {
+    fn json(&self) -> serde_json::Value {
+        let Self { part, via, difference, bound } = self;
+        serde_json::json!({
+            "part": part.to_string(),
+            "samples": via.recording.rows.len(),
+            "bytes": via.bytes,
+            "rate_step_rad_per_s": via.quantisation.rate,
+            "force_step_m_per_s2": via.quantisation.force,
+            "yaw_largest_rad": difference.yaw_largest,
+            "yaw_final_rad": difference.yaw_final,
+            "yaw_bound_rad": bound.yaw(),
+            "rate_rms_rad_per_s": difference.rate_rms,
+            "rate_rms_bound_rad_per_s": bound.rate_rms,
+            "rows": difference.rows,
+            "unpaired": difference.unpaired,
+        })
+    }
 }
 
 impl std::fmt::Display for Detour {
@@ -134,7 +179,7 @@ pub(super) fn write_file(drive: &Drive, feeds: &mut Feeds, path: &Path) -> Resul
 }
 
 /// All counters that are not zero.
-fn events(drive: &Drive, feeds: &Feeds) -> String {
+fn events(drive: &Drive, feeds: &Feeds) -> Vec<(&'static str, u32)> {
     let c = &drive.counters;
     let all = [
         ("samples", c.samples),
@@ -149,7 +194,5 @@ fn events(drive: &Drive, feeds: &Feeds) -> String {
         ("late", c.late),
         ("out of range", feeds.out_of_range()),
     ];
-    let seen: Vec<String> =
-        all.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{name} {count}")).collect();
-    seen.join(", ")
+    all.into_iter().filter(|(_, count)| *count > 0).collect()
 }

@@ -1,14 +1,15 @@
 //! `gyronet simulate`: a drive that nobody drove.
 
-use super::{Common, WriteError, progress};
+use super::{Common, WriteError, print_json, progress, remark};
 use gyronet_tools::simulate::layout::{self, Layout, Set, Spec};
 use gyronet_tools::simulate::{Config, csv};
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// Write a simulated drive: a car that stands, pulls away, bends, turns and stops, seen by a
-/// MEMS part whose errors are known.
+/// Write a drive that nobody drove, with known errors.
+///
+/// A car that stands, pulls away, bends, turns and stops, seen by a MEMS part whose errors are known.
 ///
 /// Without --layout: one CSV with the columns that the other subcommands read, with the true
 /// rates in ref_gyr_*. With --layout: whole sequences of a drive through a town, in the folders
@@ -16,11 +17,15 @@ use std::path::{Path, PathBuf};
 /// simulated.json says that they are simulated. The same seed gives the same files on every
 /// machine.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet simulate --seconds 600 --seed 7 --out drive.csv
+  gyronet simulate --layout kaist --set test --out sequences      # four of 20 min")]
 pub struct Args {
     /// Where the drive goes: a file; with --layout a folder.
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
-    /// Length of a CSV drive, s.
+    /// Length of a CSV drive, s (10 to 36000).
     #[arg(long, default_value_t = 90, conflicts_with = "layout",
         value_parser = clap::value_parser!(u32).range(10..=36_000))]
     seconds: u32,
@@ -34,7 +39,7 @@ pub struct Args {
     /// devices, transfer has others.
     #[arg(long, requires = "layout", conflicts_with_all = ["seed", "minutes", "device"])]
     set: Option<Set>,
-    /// Length of a sequence, min.
+    /// Length of a sequence, min (1 to 600).
     #[arg(long, default_value_t = 20, requires = "layout", value_parser = clap::value_parser!(u32).range(1..=600))]
     minutes: u32,
     /// Seed of the parts: scale, misalignment, lasting bias.
@@ -44,24 +49,39 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let Some(layout) = args.layout else { return drive(args) };
+    let Some(layout) = args.layout else { return drive(args, common) };
     if let Some(set) = args.set {
-        for spec in set.specs(layout) {
-            sequence(&spec, &args.out.join(&spec.name), common)?;
-        }
-        return Ok(());
+        let specs = set.specs(layout).into_iter().map(|spec| (args.out.join(&spec.name), spec));
+        return sequences(specs.collect(), common);
     }
     let name = args.out.file_name().and_then(|name| name.to_str()).unwrap_or("simulated").to_owned();
     let seconds = 60 * args.minutes;
-    sequence(&Spec { layout, name, seconds, device: args.device, run: args.seed }, &args.out, common)
+    let spec = Spec { layout, name, seconds, device: args.device, run: args.seed };
+    sequences(vec![(args.out.clone(), spec)], common)
 }
 
-fn drive(args: &Args) -> super::Result {
+fn drive(args: &Args, common: Common) -> super::Result {
     let config = Config { seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };
     let error = WriteError::to(&args.out);
     let file = File::create(&args.out).map_err(&error)?;
     let samples = csv::write(&config, BufWriter::new(file)).map_err(&error)?;
-    writeln!(std::io::stderr(), "{}: {samples} samples, seed {}", args.out.display(), args.seed)?;
+    let (path, seed) = (args.out.display(), args.seed);
+    if common.json {
+        let written = serde_json::json!({ "path": args.out, "samples": samples, "seed": seed });
+        return print_json(&mut std::io::stdout().lock(), &written);
+    }
+    Ok(remark(common, format_args!("{path}: {samples} samples, seed {seed}"))?)
+}
+
+fn sequences(all: Vec<(PathBuf, Spec)>, common: Common) -> super::Result {
+    for (folder, spec) in &all {
+        sequence(spec, folder, common)?;
+    }
+    let written = |(folder, spec): &(PathBuf, Spec)| serde_json::json!({ "path": folder, "spec": spec });
+    if common.json {
+        let all: Vec<_> = all.iter().map(written).collect();
+        print_json(&mut std::io::stdout().lock(), &all)?;
+    }
     Ok(())
 }
 
@@ -77,6 +97,5 @@ fn sequence(spec: &Spec, folder: &Path, common: Common) -> super::Result {
     bar.finish_and_clear();
     written.map_err(WriteError::to(folder))?;
     let Spec { seconds, device, run, .. } = spec;
-    writeln!(std::io::stderr(), "{}: {seconds} s, device {device}, seed {run}", folder.display())?;
-    Ok(())
+    Ok(remark(common, format_args!("{}: {seconds} s, device {device}, seed {run}", folder.display()))?)
 }

@@ -6,36 +6,33 @@ use gyronet_tools::image_stack::{Handler, ImageStack, Way};
 use gyronet_tools::target_bench;
 use std::path::PathBuf;
 
-/// Measures flash, static RAM and the worst stack of the firmware image against their budgets.
+/// Measure the firmware image: flash, static RAM and the worst stack, bytes.
 ///
 /// The stack is an upper bound from the machine code: handlers of all priorities, one inside the
 /// other. Exit status 1 when a budget is exceeded.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Measure this ELF file; else the image is built.
-    #[arg(long)]
+    /// Measure this ELF file [default: the image is built].
+    #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
-    /// Print as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 /// Both networks and everything else, as designed: flash, static RAM, stack.
 const BUDGETS: [u64; 3] = [640 << 10, 48 << 10, 8 << 10];
 
 /// Runs the command.
-pub fn run(args: &Args, _common: Common) -> super::Result {
+pub fn run(args: &Args, common: Common) -> super::Result {
     let workspace = target_bench::workspace();
     let elf = match &args.elf {
         Some(elf) => elf.clone(),
-        None => target_bench::build(&workspace, "coprocessor", &workspace.join("target/images"))?,
+        None => target_bench::build(&workspace, "coprocessor", &target_bench::target_folder())?,
     };
     let size = ImageSize::read(&elf)?;
     let stack = ImageStack::read(&std::fs::read(&elf)?)?;
     let measured = [size.flash, size.static_ram, stack.worst().into()];
     let names = ["flash", "static_ram", "stack"];
     let rows = || names.into_iter().zip(measured).zip(BUDGETS);
-    if args.json {
+    if common.json {
         let rows = rows().map(|((name, bytes), budget)| {
             (name.to_owned(), serde_json::json!({ "bytes": bytes, "budget": budget }))
         });

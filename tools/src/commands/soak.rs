@@ -1,20 +1,23 @@
 //! `gyronet soak`: hours of a drive, every clock and counter wrapping.
 
 use super::networks::Weights;
-use super::{Common, progress};
+use super::{Common, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet::sample::RATE_HZ;
 use gyronet_tools::soak;
 
-/// Run hours of a simulated drive through the whole way of the data, from a part's bytes to a
-/// receiver of the CAN frames.
+/// Run hours of a simulated drive from bytes to bytes, every counter wrapping.
 ///
-/// Every clock and counter on the way wraps. Prints what was counted; exit status 1 where a
+/// From a part's bytes to a receiver of the CAN frames. Every clock and counter on the way wraps. Prints what was counted; exit status 1 where a
 /// sample or frame is lost, a clock or the yaw drifts, or memory grows.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet soak                  # 24 hours, in minutes
+  gyronet soak --hours 2 --json")]
 pub struct Args {
-    /// Length of the drive.
-    #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=200))]
+    /// Length of the drive, hours (1 to 200).
+    #[arg(long, value_name = "HOURS", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=200))]
     hours: u32,
 }
 
@@ -26,7 +29,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let bar = progress::bar(common, minutes as usize, "minutes");
     let soak = soak::run(minutes * 60 * RATE_HZ, &mut network, || bar.inc(1));
     bar.finish_and_clear();
-    println!("{soak}");
     let faults = soak.faults();
+    if common.json {
+        print_json(&mut std::io::stdout().lock(), &serde_json::json!({ "soak": soak, "faults": faults }))?;
+    } else {
+        println!("{soak}");
+    }
     if faults.is_empty() { Ok(()) } else { Err(faults.join("; ").into()) }
 }

@@ -1,7 +1,7 @@
 //! `gyronet tables`: the paper's evaluation on the sequences at hand.
 
 use super::networks::Weights;
-use super::{Common, WriteError, import, progress};
+use super::{Common, WriteError, import, print_json, progress, remark};
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogNet, GyroNet};
 use gyronet_tools::bundled;
@@ -14,27 +14,30 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Compute the paper's Tables I, II, III, V, VI and VII, as far as the sequences at hand have
-/// figures for them, beside what the paper prints; draw its Figs. 6, 7, 9, 10 and 11.
+/// Compute the paper's tables and figures on sequences of KAIST Urban or NCLT.
+///
+/// Tables I, II, III, V, VI and VII, as far as the sequences have figures for them, beside what the
+/// paper prints; Figs. 6, 7, 9, 10 and 11.
 ///
 /// Sequences are folders in the layout of KAIST Complex Urban or NCLT, real ones or those of
 /// `gyronet simulate --layout`; figures of simulated ones are marked so. The vehicle stands still
 /// for the first 3 s, or what needs static initialisation is left out and the reason said.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet simulate --layout kaist --set test --out sequences && gyronet tables sequences --out report
+  gyronet tables urban14 urban15 --json")]
 pub struct Args {
     /// Sequences, or folders that hold some.
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
-    /// Print JSON instead of tables: every method's errors on each sequence, and their means.
-    #[arg(long)]
-    json: bool,
     /// Write report.html (one page with all tables and pictures) and each picture as SVG here.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Weight file of GyroNet, instead of the one that comes with the library.
+    /// Weight file of GyroNet [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
-    /// Weight file of FoGNet, instead of the one that comes with the library.
+    /// Weight file of FoGNet [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     fog_weights: Option<PathBuf>,
 }
@@ -79,9 +82,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let results = Results::new(all);
     let tables = table::tables(&results);
     let mut out = std::io::stdout().lock();
-    if args.json {
-        serde_json::to_writer_pretty(&mut out, &results).map_err(std::io::Error::from)?;
-        writeln!(out)?;
+    if common.json {
+        print_json(&mut out, &results)?;
     } else {
         tables.iter().try_for_each(|table| writeln!(out, "{table}"))?;
     }
@@ -97,6 +99,5 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             write(format!("{sequence}-{}.svg", picture.kind), &picture.svg)?;
         }
     }
-    writeln!(std::io::stderr(), "{}", folder.join("report.html").display())?;
-    Ok(())
+    Ok(remark(common, format_args!("{}", folder.join("report.html").display()))?)
 }

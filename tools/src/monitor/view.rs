@@ -17,7 +17,8 @@ const FAULTS: [(Faults, &str); 8] = [
 ];
 
 /// What is wrong, by name; `none` where nothing is.
-fn names(faults: Faults) -> String {
+#[must_use]
+pub fn fault_names(faults: Faults) -> String {
     let present = FAULTS.iter().filter(|(fault, _)| faults.0 & fault.0 != 0).map(|(_, name)| *name);
     let names: Vec<&str> = present.collect();
     if names.is_empty() { "none".into() } else { names.join("+") }
@@ -47,12 +48,27 @@ impl Monitor {
             "{time:.6},{},{},{source},{quality},{},{},{},{},{},{lost},{repeated},{out_of_sequence},{damaged},{unreadable}",
             known(rate, 6),
             known(yaw, 8),
-            names(faults),
+            fault_names(faults),
             known(correction, 4),
             known(sigma, 5),
             known(latency, 1),
             known(drop_in, 3),
         )
+    }
+
+    /// The newest values and all counts as one line of JSON; names and units as in
+    /// [`Monitor::HEADING`], null where not known.
+    #[must_use]
+    pub fn json(&self, time: f64) -> serde_json::Value {
+        let (source, quality) = self.judgement();
+        let State { rate, yaw, faults, correction, sigma, latency, drop_in, vdc2, .. } = self.state;
+        let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
+        serde_json::json!({
+            "time": time, "rate": rate, "yaw": yaw, "source": source, "quality": quality,
+            "faults": fault_names(faults), "correction": correction, "sigma": sigma, "latency": latency,
+            "drop_in": drop_in, "vdc2": vdc2, "frames": frames, "foreign": foreign, "lost": lost,
+            "repeated": repeated, "out_of_sequence": out_of_sequence, "damaged": damaged, "unreadable": unreadable,
+        })
     }
 
     /// The newest values as one line for people.
@@ -65,7 +81,7 @@ impl Monitor {
              repeated {repeated}, out of sequence {out_of_sequence}, damaged {damaged}, unreadable {unreadable}",
             number(self.state.rate, 6),
             number(self.state.yaw, 6),
-            names(self.state.faults),
+            fault_names(self.state.faults),
             number(self.frames_per_second, 1),
         )
     }
@@ -95,7 +111,7 @@ impl fmt::Display for Monitor {
         }
         value("latency", latency, 1, "ms")?;
         writeln!(f, "{:<16}{source:>14}, {quality}", "source")?;
-        writeln!(f, "{:<16}{:>14}", "faults", names(faults))?;
+        writeln!(f, "{:<16}{:>14}", "faults", fault_names(faults))?;
         let pace = number(self.frames_per_second, 1);
         writeln!(f, "{:<16}{frames:>14}, {foreign} of others, {pace} a second", "messages")?;
         writeln!(f, "{:<16}{lost:>14}, repeated {repeated}, out of sequence {out_of_sequence}", "lost")?;

@@ -19,8 +19,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     // What the first of the part's 32-bit ticks leaves out of the recording's time: whole wraps.
     let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
     let epoch = first - first % (TICK_US << 32);
-    for (number, row) in recording.rows.iter().enumerate() {
-        let frame = message(number, &row.sample).emit();
+    for (row, frame) in recording.rows.iter().zip(messages(recording)) {
         bytes += frame.len() as u64;
         frame.iter().for_each(|byte| mti.push(*byte));
         let delivered = mti.next_sample().ok_or_else(|| "no frame was found".to_owned());
@@ -29,6 +28,12 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
         samples.push(ImuSample { time: Micros(sample.time.0 + epoch), ..sample });
     }
     Ok((samples, bytes))
+}
+
+/// The bytes of each row's message.
+pub fn messages(recording: &Recording) -> impl Iterator<Item = Vec<u8>> {
+    let rows = recording.rows.iter().enumerate();
+    rows.map(|(number, row)| message(number, &row.sample).emit().to_vec())
 }
 
 /// The message of a sample. Its codes came from f32 and go back to the same ones.

@@ -5,10 +5,11 @@
 //! until then frames wait in their queue, where old ones give way.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
+use crate::output::FRAMES;
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId, nb::Can};
 use gyronet::can::DataFrame;
 use gyronet::can::wheel::WheelSettings;
-use stm32f4::stm32f405 as pac;
+use stm32f4::stm32f405::{self as pac, interrupt};
 
 /// Polls before the controller is taken for missing; it answers within a frame's time.
 const POLLS: u32 = 10_000;
@@ -20,12 +21,9 @@ const MAILBOXES: usize = 3;
 /// The sending half.
 pub struct Bus(pac::CAN1);
 
-/// The receiving half, for its handler.
-pub struct Receiver(());
-
 impl Bus {
     /// Brings the controller up; `None` where there is none.
-    pub fn start(can: pac::CAN1, wheels: Option<&WheelSettings>) -> Option<(Self, Receiver)> {
+    pub fn start(can: pac::CAN1, wheels: Option<&WheelSettings>) -> Option<Self> {
         can.mcr().write(|w| w.inrq().set_bit());
         (0..POLLS).any(|_| can.msr().read().inak().bit_is_set()).then_some(())?;
         let [before, after] = SEGMENTS;
@@ -38,7 +36,7 @@ impl Bus {
         // Oldest frame first; bus-off ends by itself. The controller joins the bus when it has
         // seen it idle; there is nothing to wait for.
         can.mcr().write(|w| w.abom().set_bit().txfp().set_bit());
-        Some((Self(can), Receiver(())))
+        Some(Self(can))
     }
 
     /// Whether the controller has taken itself off the bus.
@@ -105,30 +103,36 @@ impl Can for Bus {
     }
 }
 
-impl Receiver {
-    /// The oldest data frame that has come, and whether one was lost before it.
-    pub fn receive(&mut self) -> Option<(Option<DataFrame>, bool)> {
-        // SAFETY: the sending half touches none of these registers after `Bus::start`.
-        let can = unsafe { &*pac::CAN1::ptr() };
-        let state = can.rfr(0).read();
-        if state.fmp().bits() == 0 {
-            return None;
-        }
-        let (mailbox, lost) = (can.rx(0), state.fovr().bit_is_set());
-        let head = mailbox.rir().read();
-        let id = match head.ide().bit_is_set() {
-            true => ExtendedId::new(head.bits() >> 3).map(Id::Extended),
-            false => StandardId::new((head.bits() >> 21) as u16).map(Id::Standard),
-        };
-        let [a, b, c, d] = mailbox.rdlr().read().bits().to_le_bytes();
-        let [e, f, g, h] = mailbox.rdhr().read().bits().to_le_bytes();
-        let length = usize::from(mailbox.rdtr().read().dlc().bits()).min(8);
-        let data = [a, b, c, d, e, f, g, h];
-        let frame = id
-            .filter(|_| head.rtr().bit_is_clear())
-            .and_then(|id| DataFrame::new(id, data.get(..length).unwrap_or_default()));
-        // Written as a whole: the other bits are cleared by ones, and only those that were read.
-        can.rfr(0).write(|w| w.fovr().bit(lost).rfom().set_bit());
-        Some((frame, lost))
+#[interrupt]
+fn CAN1_RX0() {
+    while let Some((frame, _lost)) = receive() {
+        // A wheel's speed that finds no room is followed by a newer one.
+        let _ = frame.map(|frame| FRAMES.push(frame));
     }
+}
+
+/// The oldest data frame that has come, and whether one was lost before it.
+fn receive() -> Option<(Option<DataFrame>, bool)> {
+    // SAFETY: the sending half touches none of these registers after `Bus::start`.
+    let can = unsafe { &*pac::CAN1::ptr() };
+    let state = can.rfr(0).read();
+    if state.fmp().bits() == 0 {
+        return None;
+    }
+    let (mailbox, lost) = (can.rx(0), state.fovr().bit_is_set());
+    let head = mailbox.rir().read();
+    let id = match head.ide().bit_is_set() {
+        true => ExtendedId::new(head.bits() >> 3).map(Id::Extended),
+        false => StandardId::new((head.bits() >> 21) as u16).map(Id::Standard),
+    };
+    let [a, b, c, d] = mailbox.rdlr().read().bits().to_le_bytes();
+    let [e, f, g, h] = mailbox.rdhr().read().bits().to_le_bytes();
+    let length = usize::from(mailbox.rdtr().read().dlc().bits()).min(8);
+    let data = [a, b, c, d, e, f, g, h];
+    let frame = id
+        .filter(|_| head.rtr().bit_is_clear())
+        .and_then(|id| DataFrame::new(id, data.get(..length).unwrap_or_default()));
+    // Written as a whole: the other bits are cleared by ones, and only those that were read.
+    can.rfr(0).write(|w| w.fovr().bit(lost).rfom().set_bit());
+    Some((frame, lost))
 }

@@ -1,0 +1,53 @@
+//! What PyTorch made of some windows, layer by layer, as `tools/train` exports it.
+
+use crate::recordings::workspace;
+use safetensors::{Dtype, SafeTensors};
+
+/// Windows in each file.
+pub const WINDOWS: usize = 8;
+/// f32 sums of a few hundred products of order 1, twice over, in another order than PyTorch's. A
+/// normalised input of 20 has an LSB of 2e-6; all else stays within 1.
+const TOLERANCE: f32 = 1e-5;
+
+/// A file of golden tensors.
+#[derive(Debug)]
+pub struct Golden(Vec<u8>);
+
+impl Golden {
+    /// Of a network, `gyronet` or `fognet`.
+    ///
+    /// # Panics
+    /// Unless it is in the repository.
+    #[must_use]
+    pub fn read(network: &str) -> Self {
+        let path = workspace().join(format!("tools/weights/{network}.golden.safetensors"));
+        Self(std::fs::read(path).expect("the committed tensors"))
+    }
+
+    /// The values of a tensor, row-major.
+    ///
+    /// # Panics
+    /// Unless it is there, in f32 and of this shape.
+    #[must_use]
+    pub fn tensor(&self, name: &str, shape: &[usize]) -> Vec<f32> {
+        let file = SafeTensors::deserialize(&self.0).expect("safetensors");
+        let view = file.tensor(name).expect(name);
+        assert_eq!((view.dtype(), view.shape()), (Dtype::F32, shape), "{name}");
+        view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+    }
+
+    /// Holds a layer's outputs against the tensor of its name.
+    ///
+    /// # Panics
+    /// Where they differ by more than rounding explains, or the tensor is all zeros.
+    pub fn compare(&self, name: &str, shape: &[usize], ours: &[f32]) {
+        let theirs = self.tensor(name, shape);
+        assert_eq!(ours.len(), theirs.len(), "{name}");
+        let largest = |values: &mut dyn Iterator<Item = f32>| values.fold(0.0f32, |max, v| max.max(v.abs()));
+        let difference = largest(&mut ours.iter().zip(&theirs).map(|(ours, theirs)| ours - theirs));
+        let value = largest(&mut theirs.iter().copied());
+        println!("{name}: largest difference {difference:.2e}, largest value {value:.3}");
+        assert!(difference <= TOLERANCE, "{name}");
+        assert!(value > 0.0, "{name} says nothing");
+    }
+}

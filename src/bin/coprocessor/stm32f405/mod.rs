@@ -1,0 +1,75 @@
+//! An STM32F405 (RM0090): its clocks, pins and peripherals.
+
+pub mod bus;
+mod clocks;
+pub mod flash;
+pub mod usart;
+pub mod watchdog;
+
+pub use clocks::Clocks;
+pub use stm32f4::stm32f405 as pac;
+
+use crate::start::WHEELS;
+use bus::Bus;
+use gyronet::service::event::ResetCause;
+use watchdog::Watchdog;
+
+/// Raised by frames that have come.
+pub const CAN_INTERRUPT: pac::Interrupt = pac::Interrupt::CAN1_RX0;
+
+/// What the part has started, and says of itself.
+pub struct Chip {
+    pub clocks: Clocks,
+    /// Where the controller answers and the clock is exact enough for it.
+    pub can: Option<Bus>,
+    pub watchdog: Watchdog,
+    /// `None`: nothing answers where a part would say what it is, which is so in the emulator.
+    pub device_id: Option<u32>,
+    pub reset: ResetCause,
+}
+
+impl Chip {
+    /// Starts clocks, pins, CAN and watchdog.
+    pub fn start(p: pac::Peripherals) -> Self {
+        let clocks = Clocks::start(&p.RCC, &p.FLASH, &p.PWR);
+        p.RCC.ahb1enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
+        p.RCC.apb1enr().modify(|_, w| w.usart2en().enabled().can1en().enabled());
+        p.RCC.apb2enr().modify(|_, w| w.usart1en().enabled().usart6en().enabled());
+        pins(&p.GPIOA, &p.GPIOB, &p.GPIOC);
+        let can = if clocks.exact() { Bus::start(p.CAN1, Some(&WHEELS)) } else { None };
+        let id = p.DBGMCU.idcode().read().bits();
+        let watchdog = Watchdog::start(p.IWDG, &p.DBGMCU);
+        Self { clocks, can, watchdog, device_id: (id != 0).then_some(id), reset: reset_cause(&p.RCC) }
+    }
+}
+
+fn pins(a: &pac::GPIOA, b: &pac::GPIOB, c: &pac::GPIOC) {
+    a.afrl().modify(|_, w| w.afrl2().af7().afrl3().af7());
+    a.afrh().modify(|_, w| w.afrh9().af7().afrh10().af7());
+    b.afrh().modify(|_, w| w.afrh8().af9().afrh9().af9());
+    c.afrl().modify(|_, w| w.afrl6().af8().afrl7().af8());
+    a.moder().modify(|_, w| {
+        w.moder2().alternate().moder3().alternate().moder9().alternate().moder10().alternate()
+    });
+    // A line that hangs open reads as idle.
+    a.pupdr().modify(|_, w| w.pupdr3().pull_up().pupdr10().pull_up());
+    b.moder().modify(|_, w| w.moder8().alternate().moder9().alternate());
+    c.moder().modify(|_, w| w.moder6().alternate().moder7().alternate());
+    c.pupdr().modify(|_, w| w.pupdr7().pull_up());
+}
+
+/// Reads the reset flags and clears them for the next time. The pin's is set by every reset, and
+/// a brown-out's by power-on, so the most telling one comes first.
+fn reset_cause(rcc: &pac::RCC) -> ResetCause {
+    let flags = rcc.csr().read();
+    let causes = [
+        (flags.wdgrstf().bit_is_set() || flags.wwdgrstf().bit_is_set(), ResetCause::Watchdog),
+        (flags.sftrstf().bit_is_set(), ResetCause::Software),
+        (flags.lpwrrstf().bit_is_set(), ResetCause::LowPower),
+        (flags.porrstf().bit_is_set(), ResetCause::PowerOn),
+        (flags.borrstf().bit_is_set(), ResetCause::BrownOut),
+        (flags.padrstf().bit_is_set(), ResetCause::Pin),
+    ];
+    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    causes.into_iter().find_map(|(set, cause)| set.then_some(cause)).unwrap_or(ResetCause::Unknown)
+}

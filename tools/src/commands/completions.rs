@@ -1,0 +1,25 @@
+//! `gyronet completions`: what a shell needs to complete our arguments.
+
+use clap_complete::Shell;
+use std::io::Write;
+
+/// Print completions for a shell.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  source <(gyronet completions bash)                                # this session
+  gyronet completions zsh > ~/.zfunc/_gyronet                       # a folder in fpath
+  gyronet completions fish > ~/.config/fish/completions/gyronet.fish")]
+pub struct Args {
+    /// The shell.
+    #[arg(value_enum, value_name = "SHELL")]
+    shell: Shell,
+}
+
+/// Runs the subcommand. `command` is the whole command line.
+pub fn run(args: &Args, mut command: clap::Command) -> super::Result {
+    let name = command.get_name().to_owned();
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut command, name, &mut script);
+    Ok(std::io::stdout().lock().write_all(&script)?)
+}

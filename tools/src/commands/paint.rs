@@ -1,0 +1,23 @@
+//! Weight and colour for tables on a terminal; plain text elsewhere and with NO_COLOR.
+
+use console::style;
+use gyronet_tools::evaluate::Report;
+use gyronet_tools::methods::Method;
+
+/// A report with its headings and what the board sends standing out.
+pub fn report(report: &Report) -> String {
+    let mut text = String::new();
+    for line in report.to_string().lines() {
+        let line = if !line.starts_with(' ') {
+            style(line).bold()
+        } else if line.trim_start().starts_with("yaw error") {
+            style(line).dim()
+        } else if line.trim_start().starts_with(Method::Default.name()) {
+            style(line).green().bold()
+        } else {
+            style(line)
+        };
+        text += &format!("{line}\n");
+    }
+    text
+}

@@ -1,0 +1,109 @@
+//! Everything that comes of one drive: what `gyronet demo` prints, and its page.
+
+pub mod board;
+mod can_excerpt;
+mod costs;
+mod page;
+mod trajectory;
+
+use crate::evaluate::DriveErrors;
+use crate::methods::{PerMethod, Rates};
+use crate::metrics::YawError;
+use crate::recording::Recording;
+use board::Outcome;
+use gyronet::can::config::Config;
+use serde::Serialize;
+
+pub use can_excerpt::Message;
+pub use costs::Cost;
+pub use trajectory::{Path, Trajectories};
+
+/// What came of a drive.
+#[derive(Debug)]
+pub struct Demo<'a> {
+    /// The drive.
+    pub recording: &'a Recording,
+    /// Nobody drove it.
+    pub simulated: bool,
+    /// Its yaw rates.
+    pub rates: &'a Rates,
+    /// Their errors, where the drive has a reference.
+    pub errors: Option<&'a DriveErrors>,
+    /// Where each method sees the vehicle go, where the drive has wheels.
+    pub trajectories: Option<Trajectories>,
+    /// The messages of one sample.
+    pub excerpt: Vec<Message>,
+    /// Time and memory.
+    pub costs: Vec<Cost>,
+    /// Messages of the whole drive.
+    pub frames: u64,
+    /// The firmware image on the same drive.
+    pub board: Outcome,
+}
+
+/// The same for programs.
+#[derive(Debug, Serialize)]
+pub struct Summary<'a> {
+    name: &'a str,
+    simulated: bool,
+    seconds: f64,
+    samples: usize,
+    missing: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    methods: Option<&'a PerMethod<YawError>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    paths: Option<&'a [Path]>,
+    frames: u64,
+    excerpt: &'a [Message],
+    costs: &'a [Cost],
+    board: &'a Outcome,
+}
+
+impl<'a> Demo<'a> {
+    /// Works out what the rates do not say. `config` is that of the bus.
+    #[must_use]
+    pub fn new(
+        recording: &'a Recording,
+        simulated: bool,
+        rates: &'a Rates,
+        errors: Option<&'a DriveErrors>,
+        (config, frames): (Config, u64),
+        board: Outcome,
+    ) -> Self {
+        Self {
+            recording,
+            simulated,
+            rates,
+            errors,
+            trajectories: Trajectories::new(recording, rates),
+            excerpt: can_excerpt::fastest_turn(&rates.drive, config),
+            costs: costs::all(recording, rates, &config, &board),
+            frames,
+            board,
+        }
+    }
+
+    /// For programs.
+    #[must_use]
+    pub fn summary(&self) -> Summary<'_> {
+        Summary {
+            name: self.recording.name(),
+            simulated: self.simulated,
+            seconds: self.recording.seconds(),
+            samples: self.recording.rows.len(),
+            missing: self.recording.missing,
+            methods: self.errors.map(|errors| &errors.methods),
+            paths: self.trajectories.as_ref().map(|trajectories| trajectories.paths.as_slice()),
+            frames: self.frames,
+            excerpt: &self.excerpt,
+            costs: &self.costs,
+            board: &self.board,
+        }
+    }
+
+    /// The page.
+    #[must_use]
+    pub fn page(&self) -> String {
+        page::page(self)
+    }
+}

@@ -1,0 +1,206 @@
+//! The firmware image in the emulator, on the beginning of the same drive.
+//!
+//! The recording's samples go to the image as the bytes of an Xsens MTi, and its SLCAN lines are
+//! held against the library's for the samples in those bytes. Wheels stay away on both sides: the
+//! emulated board has no CAN.
+
+use crate::drive::{Drive, DriveError};
+use crate::emulator::{self, EmulatorError};
+use crate::image_size::{ImageSize, SizeError};
+use crate::image_stack::{ImageStack, StackError};
+use crate::recording::Recording;
+use crate::target_bench::{self, BenchError};
+use crate::via::{self, Part, ViaError};
+use embedded_can::Frame;
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
+use gyronet::can::{DataFrame, slcan};
+use gyronet::model::WindowNetwork;
+use gyronet::pipeline::PipelineConfig;
+use serde::Serialize;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Samples that the image is given: static initialisation and as much again behind it.
+pub const SAMPLES: usize = 1_000;
+/// For all messages of them: a few seconds, on a busy machine more.
+const LIMIT: Duration = Duration::from_secs(180);
+/// The sensor's line, and the one on which the messages go out.
+const SENSOR: usize = 1;
+const SLCAN: usize = 2;
+
+/// Why nothing can be said of the image.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BoardError {
+    /// The image could not be built or its instructions not counted.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
+    /// The emulator failed.
+    #[error(transparent)]
+    Emulator(#[from] EmulatorError),
+    /// The image could not be read.
+    #[error(transparent)]
+    Size(#[from] SizeError),
+    /// The image could not be read.
+    #[error("{path}: {source}")]
+    Stack {
+        /// The image.
+        path: String,
+        /// Why.
+        source: StackError,
+    },
+    /// The recording does not come back from the sensor's bytes.
+    #[error(transparent)]
+    Via(#[from] ViaError),
+    /// The drive has no corrected rate in so short a time.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Outcome {
+    /// Something is missing on this machine.
+    NotRun {
+        /// What.
+        why: String,
+    },
+    /// It ran.
+    Run {
+        /// Its bytes against the library's.
+        agreement: Agreement,
+        /// What the image takes.
+        figures: Figures,
+    },
+}
+
+/// The image's messages against those of the library for the same bytes of the sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Agreement {
+    /// Samples sent.
+    pub samples: usize,
+    /// Bytes that they took on the sensor's line.
+    pub sent_bytes: u64,
+    /// Messages compared.
+    pub frames: u64,
+    /// Bytes in them, identifiers left out.
+    pub payload_bytes: u64,
+    /// What the emulator took, s.
+    pub seconds: f64,
+    /// The first one, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub difference: Option<Difference>,
+}
+
+/// A message that is not the same.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// Counted from 1.
+    pub number: usize,
+    /// As the board sent it.
+    pub board: String,
+    /// As the library has it.
+    pub host: String,
+}
+
+/// What the image takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Figures {
+    /// Bytes.
+    pub flash: u64,
+    /// Bytes.
+    pub static_ram: u64,
+    /// Bytes.
+    pub stack: u64,
+    /// Of one GyroNet window.
+    pub window_instructions: Option<u64>,
+    /// Modelled, of the same.
+    pub window_cycles: Option<u64>,
+}
+
+impl Outcome {
+    /// Why the image cannot be run on this machine, if so: the emulator, the target's standard
+    /// library or the repository is missing.
+    #[must_use]
+    pub fn missing() -> Option<Self> {
+        let why = match (emulator::available(), target_bench::target_installed()) {
+            (Err(error), _) => format!("wants QEMU: {error}"),
+            (_, Err(why)) => why,
+            (Ok(()), Ok(())) => return None,
+        };
+        Some(Self::NotRun { why })
+    }
+
+    /// Whether it ran, and not as the library does.
+    #[must_use]
+    pub fn differs(&self) -> bool {
+        matches!(self, Self::Run { agreement, .. } if agreement.difference.is_some())
+    }
+}
+
+impl Agreement {
+    /// Runs an image on the first [`SAMPLES`] of a drive. `network` is the one that it carries.
+    ///
+    /// # Errors
+    /// [`BoardError`].
+    pub fn new(
+        image: &Path,
+        recording: &Recording,
+        network: &mut impl WindowNetwork,
+    ) -> Result<Self, BoardError> {
+        let rows = recording.rows.iter().take(SAMPLES).copied().collect();
+        let recording = Recording { rows, ..recording.clone() };
+        let bytes = via::mti_bytes(&recording).concat();
+        let sent = Part::Xsens.send(&recording)?.recording;
+        let drive = Drive::run(&sent, &PipelineConfig::DEFAULT, None, network, || {})?;
+        let mut feeds = Feeds::new(Config::DEFAULT);
+        let frames: Vec<DataFrame> =
+            drive.steps.iter().flat_map(|step| feeds.process::<DataFrame>(&step.vehicle)).collect();
+
+        let start = Instant::now();
+        let mut board = emulator::Board::boot(image, SLCAN, &[])?;
+        board.send(SENSOR, &bytes, LIMIT)?;
+        let lines = board.lines(SLCAN, b'\r', frames.len(), LIMIT)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let host = frames.iter().map(|frame| slcan::emit(frame).unwrap_or_default());
+        let pairs = lines.iter().zip(host).enumerate();
+        let mut unlike = pairs.filter(|(_, (line, host))| host.strip_suffix(b"\r") != Some(line));
+        let difference = unlike.next().map(|(index, (line, host))| Difference {
+            number: index + 1,
+            board: line.escape_ascii().to_string(),
+            host: host.trim_ascii_end().escape_ascii().to_string(),
+        });
+        Ok(Self {
+            samples: sent.rows.len(),
+            sent_bytes: bytes.len() as u64,
+            frames: frames.len() as u64,
+            payload_bytes: frames.iter().map(|frame| frame.data().len() as u64).sum(),
+            seconds,
+            difference,
+        })
+    }
+}
+
+impl Figures {
+    /// Reads the image that is flashed, and counts a window with the image that measures.
+    ///
+    /// # Errors
+    /// [`BoardError`].
+    pub fn new(image: &Path, bench: &Path) -> Result<Self, BoardError> {
+        let ImageSize { flash, static_ram, .. } = ImageSize::read(image)?;
+        let path = || image.display().to_string();
+        let elf = std::fs::read(image).map_err(|source| SizeError::Io { path: path(), source })?;
+        let stack = ImageStack::read(&elf).map_err(|source| BoardError::Stack { path: path(), source })?;
+        let counts = target_bench::measure(&target_bench::workspace(), bench)?;
+        let window = counts.get("gyronet/window");
+        Ok(Self {
+            flash,
+            static_ram,
+            stack: stack.worst().into(),
+            window_instructions: window.map(|count| count.instructions),
+            window_cycles: window.and_then(|count| count.cycles),
+        })
+    }
+}

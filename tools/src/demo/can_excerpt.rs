@@ -1,0 +1,127 @@
+//! The messages of one sample, read as a receiver reads them.
+
+use crate::drive::Drive;
+use embedded_can::{Frame, Id};
+use gyronet::can::bosch::{self, LAYOUTS};
+use gyronet::can::config::Config;
+use gyronet::can::feeds::Feeds;
+use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage, SIGMA_UNKNOWN};
+use gyronet::can::{DataFrame, j1939::Vdc2};
+use serde::Serialize;
+
+/// One message.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Message {
+    /// When its sample was taken, since the recording's first, s.
+    pub time: String,
+    /// As the data base `gyronet.dbc` has it.
+    pub name: String,
+    /// Hexadecimal.
+    pub id: String,
+    /// Hexadecimal.
+    pub data: String,
+    /// What it says.
+    pub says: String,
+}
+
+/// The messages that go out when the vehicle turns fastest.
+#[must_use]
+pub fn fastest_turn(drive: &Drive, config: Config) -> Vec<Message> {
+    let rate = |index: &usize| drive.steps[*index].prompt.rate.0.unsigned_abs();
+    let Some(chosen) = drive.compared().max_by_key(rate) else { return Vec::new() };
+    let first = drive.steps.first().map_or(0, |step| step.time.0);
+    let mut feeds = Feeds::new(config);
+    // What rounding left over from all that went before is in the codes.
+    for step in &drive.steps[..chosen] {
+        let _ = feeds.process::<DataFrame>(&step.vehicle);
+    }
+    let step = &drive.steps[chosen];
+    let time = format!("{:.2}", (step.time.0 - first) as f64 * 1e-6);
+    let frames = feeds.process::<DataFrame>(&step.vehicle);
+    let message = |frame: &DataFrame| {
+        let (name, says) = read(frame, &config)?;
+        let id = match frame.id() {
+            Id::Standard(id) => format!("{:03X}", id.as_raw()),
+            Id::Extended(id) => format!("{:08X}", id.as_raw()),
+        };
+        let data: Vec<String> = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
+        Some(Message { time: time.clone(), name, id, data: data.join(" "), says })
+    };
+    frames.iter().filter_map(message).collect()
+}
+
+/// Name and content of a message.
+fn read(frame: &DataFrame, config: &Config) -> Option<(String, String)> {
+    let data = frame.data();
+    if let Some(number) = LAYOUTS.iter().position(|layout| Id::Standard(layout.id) == frame.id()) {
+        let says = bosch_says(&LAYOUTS[number], &bosch::Message::parse(data).ok()?);
+        return Some((format!("MM5_10_TX{}", number + 1), says));
+    }
+    let Id::Standard(id) = frame.id() else {
+        let rate = Vdc2::parse(data).ok()?.yaw_rate_rad_per_sec()?;
+        return Some(("VDC2".into(), format!("yaw rate {rate:+.4} rad/s")));
+    };
+    let yaw = config.settings().yaw?;
+    let (name, says) = match yaw.ids.iter().position(|own| *own == id.as_raw())? {
+        0 => {
+            let message = RateMessage::parse(data).ok()?;
+            let rate =
+                message.deg_per_sec().map_or("not available".into(), |rate| format!("{rate:+.6} deg/s"));
+            let quality = format!("{:?}", message.quality).to_lowercase();
+            ("GyroNet_Rate", format!("yaw rate {rate}, from {:?}, {quality}", message.source))
+        }
+        1 => {
+            let message = AngleMessage::parse(data).ok()?;
+            let faults = crate::monitor::fault_names(message.faults);
+            ("GyroNet_Angle", format!("yaw {:+.6} deg, faults: {faults}", message.deg()))
+        }
+        _ => {
+            let message = DetailMessage::parse(data).ok()?;
+            let correction = f64::from(message.correction) * 2e-4;
+            let known = message.sigma != SIGMA_UNKNOWN;
+            let sigma = if known { format!("{:.5}", f64::from(message.sigma) * 1e-5) } else { "-".into() };
+            let latency = message.latency_ms().map_or("-".into(), |ms| format!("{ms}"));
+            let says =
+                format!("correction {correction:+.4} deg/s, expected error {sigma} deg/s, {latency} ms old");
+            ("GyroNet_Detail", says)
+        }
+    };
+    Some((name.into(), says))
+}
+
+fn bosch_says(layout: &bosch::Layout, message: &bosch::Message) -> String {
+    let rate = ["roll", "pitch", "yaw"][layout.rate_axis];
+    let force = ["forward", "left", "up"][layout.force_axis];
+    format!(
+        "{rate} rate {:+.3} deg/s, acceleration {force} {:+.4} g, counter {}",
+        message.rate_deg_per_sec(),
+        message.acceleration_g(),
+        message.counter
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+    use gyronet::model::{Blob, GyroNet, weights};
+    use gyronet::pipeline::PipelineConfig;
+
+    #[test]
+    fn the_two_rates_of_one_sample_are_read_from_the_bytes() {
+        let recording = bundled::simulated_drive().unwrap();
+        let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
+        let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut network, || {}).unwrap();
+        let messages = fastest_turn(&drive, Config::DEFAULT);
+        let names: Vec<&str> = messages.iter().map(|message| message.name.as_str()).collect();
+        assert_eq!(
+            names,
+            ["MM5_10_TX1", "MM5_10_TX2", "MM5_10_TX3", "GyroNet_Rate", "GyroNet_Angle", "GyroNet_Detail"]
+        );
+        let fastest =
+            drive.steps[drive.compared()].iter().map(|step| step.prompt.rate).max_by_key(|r| r.0.abs());
+        let degrees = fastest.unwrap().rad_per_sec().to_degrees();
+        let said: f64 = messages[0].says.split(' ').nth(2).unwrap().parse().unwrap();
+        assert!((said - degrees).abs() < 0.01, "{said} {degrees}");
+    }
+}

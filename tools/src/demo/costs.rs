@@ -1,0 +1,125 @@
+//! Time and memory: what this command has measured, and what the emulator has counted for it.
+
+use super::board::{Figures, Outcome};
+use crate::methods::Rates;
+use crate::page::grouped;
+use crate::recording::Recording;
+use gyronet::can::config::Config;
+use gyronet::model::fognet::FogNetState;
+use gyronet::model::gyronet::GyroNetState;
+use gyronet::model::weights;
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::PERIOD_US;
+use serde::Serialize;
+
+/// One figure.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Cost {
+    /// Of what.
+    pub what: &'static str,
+    /// With its unit.
+    pub figure: String,
+    /// Where it comes from.
+    pub how: String,
+}
+
+/// Clock of the STM32F405, MHz.
+const CLOCK_MHZ: f64 = crate::parser_load::CLOCK_HZ * 1e-6;
+
+/// Of a drive, and of the image.
+#[must_use]
+pub fn all(recording: &Recording, rates: &Rates, config: &Config, board: &Outcome) -> Vec<Cost> {
+    let samples = recording.rows.len().max(1) as f64;
+    let micros = rates.run_time.as_secs_f64() * 1e6 / samples;
+    let lag = PipelineConfig::DEFAULT.compensate.lag.samples() as u64 * PERIOD_US / 1_000;
+    let per_second: u32 = config.messages().iter().map(|message| 1_000 / u32::from(message.period_ms)).sum();
+    let load = config.bus_load_per_mille();
+    let bytes = |count: usize| format!("{} bytes", grouped(count as u64));
+    let mut costs = vec![
+        Cost {
+            what: "one sample on this machine, network included",
+            figure: format!("{micros:.1} us"),
+            how: format!(
+                "measured, one thread: {:.0} times faster than the drive",
+                PERIOD_US as f64 / micros
+            ),
+        },
+        Cost {
+            what: "from sample to message",
+            figure: format!("0 and {lag} ms"),
+            how: "the rate sent at once, and the one for navigation".into(),
+        },
+        Cost {
+            what: "CAN",
+            figure: format!("{per_second} messages a second"),
+            how: format!(
+                "{}.{} % of {} kbit/s with as many stuff bits as there can be",
+                load / 10,
+                load % 10,
+                config.settings().bits_per_second / 1_000
+            ),
+        },
+        Cost {
+            what: "GyroNet, weights",
+            figure: bytes(weights::DEFAULT.0.len()),
+            how: "size of the file".into(),
+        },
+        Cost {
+            what: "GyroNet, working memory",
+            figure: bytes(size_of::<GyroNetState>()),
+            how: "size of its state on this machine".into(),
+        },
+        Cost {
+            what: "FoGNet, weights",
+            figure: bytes(weights::FOGNET.0.len()),
+            how: "size of the file".into(),
+        },
+        Cost {
+            what: "FoGNet, working memory",
+            figure: bytes(size_of::<FogNetState>()),
+            how: "size of its state on this machine".into(),
+        },
+    ];
+    match board {
+        Outcome::Run { figures, .. } => costs.extend(of_image(figures)),
+        Outcome::NotRun { why } => costs.push(Cost {
+            what: "firmware image: flash, RAM, stack, instructions",
+            figure: "not measured".into(),
+            how: why.clone(),
+        }),
+    }
+    costs
+}
+
+fn of_image(figures: &Figures) -> Vec<Cost> {
+    let bytes = |count: u64| format!("{} bytes", grouped(count));
+    let mut costs = vec![
+        Cost { what: "image, flash", figure: bytes(figures.flash), how: "from the ELF file".into() },
+        Cost {
+            what: "image, static RAM",
+            figure: bytes(figures.static_ram),
+            how: "from the ELF file".into(),
+        },
+        Cost {
+            what: "image, stack at worst",
+            figure: bytes(figures.stack),
+            how: "bound from the machine code, every interrupt inside another".into(),
+        },
+    ];
+    if let Some(instructions) = figures.window_instructions {
+        let hop = PipelineConfig::DEFAULT.compensate.mode.hop();
+        costs.push(Cost {
+            what: "GyroNet window on a Cortex-M4F",
+            figure: format!("{} instructions", grouped(instructions)),
+            how: format!("counted in QEMU; one for every {hop} samples"),
+        });
+    }
+    if let Some(cycles) = figures.window_cycles {
+        costs.push(Cost {
+            what: "the same in time",
+            figure: format!("{:.1} ms", cycles as f64 / (CLOCK_MHZ * 1e3)),
+            how: format!("{} cycles, modelled (zero wait states), at {CLOCK_MHZ:.0} MHz", grouped(cycles)),
+        });
+    }
+    costs
+}

@@ -1,0 +1,231 @@
+//! The page of a drive.
+
+use super::board::Outcome;
+use super::trajectory::Trajectories;
+use super::{Cost, Demo, Message};
+use crate::methods::Method;
+use crate::metrics::DT;
+use crate::page::chart::{Chart, Curve};
+use crate::page::{document, escaped, grouped, table};
+use gyronet::sample::RATE_HZ;
+
+/// Whose curves are drawn, from back to front.
+const DRAWN: [Method; 6] =
+    [Method::Raw, Method::Fir, Method::Static, Method::Prompt, Method::GyronetInt, Method::Default];
+/// The class and the name of the reference.
+const REFERENCE: &str = "reference";
+
+pub fn page(demo: &Demo<'_>) -> String {
+    let name = demo.recording.name();
+    let mut body = format!("<h1>{}</h1>\n", escaped(name));
+    body += &format!(
+        "<p class=\"lead\">{} s at {RATE_HZ} Hz through the integer pipeline that is flashed, and what it is compared \
+         with. Written by <code>gyronet demo</code> {}.</p>\n",
+        format_args!("{:.0}", demo.recording.seconds()),
+        env!("CARGO_PKG_VERSION"),
+    );
+    if demo.simulated {
+        body += "<p class=\"simulated\"><b>Simulated drive.</b> It shows the way of the data, not how good GyroNet is \
+                 on a car: these weights know one car's vibration. For a real one: <code>gyronet demo \
+                 FILE.csv</code>.</p>\n";
+    }
+    body += &facts(demo);
+    body += "<h2>Yaw</h2>\n";
+    body += &yaw(demo);
+    if let Some(trajectories) = &demo.trajectories {
+        body += "<h2>Path</h2>\n";
+        body += &paths(trajectories);
+    }
+    body += "<h2>Methods</h2>\n";
+    body += &methods(demo);
+    body += "<h2>On the bus</h2>\n";
+    body += &excerpt(demo);
+    body += "<h2>On the board</h2>\n";
+    body += &board(&demo.board);
+    body += "<h2>Time and memory</h2>\n";
+    body += &costs(&demo.costs);
+    document(&format!("gyronet demo: {name}"), &body)
+}
+
+/// The few figures that matter most.
+fn facts(demo: &Demo<'_>) -> String {
+    let mut facts = Vec::new();
+    if let Some(errors) = demo.errors {
+        let [still, sent] = [Method::Static, Method::Default].map(|method| errors.methods[method]);
+        let mrad = |rad: f64| format!("{:.3} <small>mrad</small>", 1e3 * rad);
+        facts.push(("yaw error in 1 s, static initialisation", mrad(still.mean_1s_rad)));
+        facts.push(("the same, sent for navigation", mrad(sent.mean_1s_rad)));
+        facts.push(("ratio of the two", format!("{:.2}", sent.mean_1s_rad / still.mean_1s_rad)));
+    }
+    facts.push(("CAN messages", grouped(demo.frames)));
+    let verdict = match &demo.board {
+        Outcome::NotRun { .. } => "not run".to_owned(),
+        outcome if outcome.differs() => "<span class=\"differs\">other bytes</span>".to_owned(),
+        Outcome::Run { .. } => "<span class=\"agrees\">same bytes</span>".to_owned(),
+    };
+    facts.push(("firmware image in QEMU", verdict));
+    let rows = facts.iter().map(|(name, figure)| format!("<div><dt>{name}</dt><dd>{figure}</dd></div>\n"));
+    format!("<dl class=\"facts\">\n{}</dl>\n", rows.collect::<String>())
+}
+
+/// Yaw and, with a reference, what each method is off by.
+fn yaw(demo: &Demo<'_>) -> String {
+    let rates = demo.rates;
+    let points = |values: Vec<f64>| rates.seconds.iter().copied().zip(values).collect::<Vec<(f64, f64)>>();
+    let truth = rates.reference.as_deref().map(integral);
+    let mut angles: Vec<Curve> = Vec::new();
+    let mut errors: Vec<Curve> = Vec::new();
+    for method in DRAWN {
+        let yaw = integral(&rates.rates[method]);
+        // What still has its bias may run off the errors' scale.
+        let in_scale = !matches!(method, Method::Raw | Method::Fir);
+        let curve = |note, values, in_scale| Curve {
+            class: method.key(),
+            label: method.name().into(),
+            note,
+            points: points(values),
+            in_scale,
+        };
+        if let Some(truth) = &truth {
+            let off: Vec<f64> = yaw.iter().zip(truth).map(|(yaw, truth)| 1e3 * (yaw - truth)).collect();
+            let note = format!("ends {:+.1} mrad off", off.last().copied().unwrap_or(0.0));
+            errors.push(curve(note, off, in_scale));
+        }
+        angles.push(curve(String::new(), yaw.iter().map(|rad| rad.to_degrees()).collect(), true));
+    }
+    if let Some(truth) = &truth {
+        let degrees = truth.iter().map(|rad| rad.to_degrees()).collect();
+        let (label, note) = (REFERENCE.into(), String::new());
+        angles.push(Curve { class: REFERENCE, label, note, points: points(degrees), in_scale: true });
+    }
+    let mut html =
+        Chart { title: "Angle", axes: "deg, over time in s", same_scale: false, curves: angles }.html();
+    if truth.is_some() {
+        html += &Chart {
+            title: "Error against the reference",
+            axes: "mrad, over time in s",
+            same_scale: false,
+            curves: errors,
+        }
+        .html();
+    }
+    html += "<p class=\"note\">Drag over a chart to zoom in, tap a name to hide its curve. From the end of static \
+             initialisation on (3 s at rest).";
+    html += match truth {
+        Some(_) => {
+            " The errors' scale is that of the corrected methods; what keeps its bias runs off it.</p>\n"
+        }
+        None => {
+            " The drive has no reference yaw rate (<code>ref_gyr_z</code>), so there are no errors.</p>\n"
+        }
+    };
+    html
+}
+
+fn paths(trajectories: &Trajectories) -> String {
+    let Trajectories { paths, wheels, metres } = trajectories;
+    let mut curves: Vec<Curve> = paths
+        .iter()
+        .map(|path| Curve {
+            class: path.method.map_or(REFERENCE, Method::key),
+            label: path.method.map_or(REFERENCE, Method::name).into(),
+            note: path.error_m.map(|metres| format!("{metres:.2} m off, RMS")).unwrap_or_default(),
+            points: path.points.iter().map(|[x, y]| (*x, *y)).collect(),
+            in_scale: path.method != Some(Method::Raw),
+        })
+        .collect();
+    // The reference behind what is held against it.
+    curves.sort_by_key(|curve| (curve.in_scale, curve.class != REFERENCE));
+    let chart =
+        Chart { title: "Seen from above", axes: "m, from where it started", same_scale: true, curves }.html();
+    let of_wheels = if *wheels == 1 { "one wheel".into() } else { format!("the mean of {wheels} wheels") };
+    format!(
+        "{chart}<p class=\"note\">Dead reckoning over {metres:.0} m: each method's yaw rate with the speed of \
+         {of_wheels}, the same for all, as recorded (radius 0.289 m). The reference is the reference's yaw rate with the \
+         same speed.</p>\n"
+    )
+}
+
+fn methods(demo: &Demo<'_>) -> String {
+    let Some(errors) = demo.errors else {
+        return "<p>No reference yaw rate, so no errors.</p>\n".into();
+    };
+    let still = errors.methods[Method::Static].mean_1s_rad;
+    let rows = errors.methods.each().map(|(method, error)| {
+        let ratio = error.mean_1s_rad / still;
+        vec![
+            method.name().to_owned(),
+            format!("{:.6}", error.mean_1s_rad),
+            format!("{ratio:.3}"),
+            format!("{:.6}", error.final_rad),
+        ]
+    });
+    let header = ["yaw error", "in 1 s, rad", "to static init", "final, rad"];
+    format!(
+        "{}<p class=\"note\">Mean error of the yaw change over 1 s, and error of the yaw at the end, over {:.1} s. The \
+         network rows are settled estimates after static initialisation; the last two are what the board sends: with \
+         the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
+        table("methods", &header, rows),
+        errors.seconds
+    )
+}
+
+fn excerpt(demo: &Demo<'_>) -> String {
+    let Some(Message { time, .. }) = demo.excerpt.first() else { return String::new() };
+    let mut html = format!(
+        "<p>What goes out {time} s into the drive, when the vehicle turns fastest; <code>tools/gyronet.dbc</code> has \
+         every signal, <code>can.log</code> all {} messages.</p>\n<div class=\"scroll\"><table class=\"frames\">\n\
+         <thead><tr><th>identifier</th><th>message</th><th>bytes</th><th>says</th></tr></thead>\n<tbody>\n",
+        grouped(demo.frames)
+    );
+    for Message { name, id, data, says, .. } in &demo.excerpt {
+        html += &format!(
+            "<tr><td class=\"data\">{id}</td><td>{name}</td><td class=\"data\">{data}</td><td>{}</td></tr>\n",
+            escaped(says)
+        );
+    }
+    html + "</tbody></table></div>\n"
+}
+
+fn board(outcome: &Outcome) -> String {
+    let agreement = match outcome {
+        Outcome::NotRun { why } => return format!("<p>Not run: {}.</p>\n", escaped(why)),
+        Outcome::Run { agreement, .. } => agreement,
+    };
+    let drive = format!(
+        "The firmware image for the STM32F405 ran in QEMU on the first {:.0} s of this drive, as {} bytes of an Xsens MTi \
+         on its serial line, without wheels: {} messages with {} payload bytes came back in {:.1} s.",
+        agreement.samples as f64 * DT,
+        grouped(agreement.sent_bytes),
+        grouped(agreement.frames),
+        grouped(agreement.payload_bytes),
+        agreement.seconds,
+    );
+    match &agreement.difference {
+        None => format!(
+            "<p>{drive} <b class=\"agrees\">Every identifier and every byte is the same as from the library on this \
+             machine.</b></p>\n"
+        ),
+        Some(difference) => format!(
+            "<p>{drive} <b class=\"differs\">Message {} differs:</b> <code>{}</code> from the board, <code>{}</code> from \
+             the library.</p>\n",
+            difference.number,
+            escaped(&difference.board),
+            escaped(&difference.host)
+        ),
+    }
+}
+
+fn costs(costs: &[Cost]) -> String {
+    let rows = costs.iter().map(|cost| vec![cost.what.to_owned(), cost.figure.clone(), cost.how.clone()]);
+    table("costs", &["what", "figure", "from where"], rows)
+}
+
+/// Angle after each sample, rad.
+fn integral(rates: &[f64]) -> Vec<f64> {
+    let step = |angle: &mut f64, rate: &f64| {
+        *angle += rate * DT;
+        Some(*angle)
+    };
+    rates.iter().scan(0.0, step).collect()
+}

@@ -1,0 +1,98 @@
+//! Where each method sees the vehicle go: its yaw rate and the speeds of the wheels.
+
+use crate::methods::{Method, Rates};
+use crate::metrics::DT;
+use crate::recording::Recording;
+use crate::trajectory_error::{Point, TrajectoryError};
+use crate::wheel_rates::Speeds;
+use gyronet::odometry::Track;
+use serde::Serialize;
+
+/// Those whose paths are drawn.
+const METHODS: [Method; 3] = [Method::Raw, Method::Static, Method::Default];
+
+/// A path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Path {
+    /// Whose; the reference's is `None`.
+    #[serde(serialize_with = "key")]
+    pub method: Option<Method>,
+    /// m, from where static initialisation ended; turned by right angles so that the way lies
+    /// across a page.
+    #[serde(skip)]
+    pub points: Vec<Point>,
+    /// Distance to the reference's path, RMS, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_m: Option<f64>,
+}
+
+fn key<S: serde::Serializer>(method: &Option<Method>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(method.map_or("reference", Method::key))
+}
+
+/// The paths of a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectories {
+    /// The reference's first, where there is one.
+    pub paths: Vec<Path>,
+    /// Wheels that the speed is the mean of.
+    pub wheels: usize,
+    /// The way, m.
+    pub metres: f64,
+}
+
+impl Trajectories {
+    /// `None` of a drive without wheels.
+    #[must_use]
+    pub fn new(recording: &Recording, rates: &Rates) -> Option<Self> {
+        let Speeds { wheels, metre_per_sec } = Speeds::new(recording)?;
+        let drive = &rates.drive;
+        let ways: Vec<f64> =
+            drive.steps[drive.compared()].iter().map(|step| metre_per_sec[step.row] * DT).collect();
+        let path = |rates: &[f64]| {
+            let mut track = Track::default();
+            let step = |(way, rate): (&f64, &f64)| {
+                track.step([*way; 2], rate * DT);
+                track.position
+            };
+            ways.iter().zip(rates).map(step).collect::<Vec<Point>>()
+        };
+        let truth = rates.reference.as_deref().map(path);
+        let mut paths = Vec::new();
+        for method in METHODS {
+            let points = path(&rates.rates[method]);
+            let error = truth.as_ref().and_then(|truth| TrajectoryError::new(&points, truth));
+            paths.push(Path { method: Some(method), error_m: error.map(|error| error.rmse_m), points });
+        }
+        paths.splice(0..0, truth.map(|points| Path { method: None, points, error_m: None }));
+        lay_across(&mut paths);
+        Some(Self { paths, wheels, metres: ways.iter().map(|way| way.abs()).sum() })
+    }
+}
+
+/// Turns all paths by the same right angles: the farthest point of the first one to the right.
+fn lay_across(paths: &mut [Path]) {
+    let Some(first) = paths.first() else { return };
+    let reach =
+        |turn: fn(Point) -> Point| first.points.iter().map(|point| turn(*point)[0]).fold(0.0, f64::max);
+    let turns: [fn(Point) -> Point; 4] =
+        [|[x, y]| [x, y], |[x, y]| [y, -x], |[x, y]| [-x, -y], |[x, y]| [-y, x]];
+    let Some(turn) = turns.into_iter().max_by(|a, b| reach(*a).total_cmp(&reach(*b))) else { return };
+    for point in paths.iter_mut().flat_map(|path| &mut path.points) {
+        *point = turn(*point);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_turned_not_mirrored() {
+        let points = vec![[0.0, 0.0], [1.0, -9.0], [3.0, -9.0]];
+        let mut paths = [Path { method: None, points, error_m: None }];
+        lay_across(&mut paths);
+        // Left turns stay left turns.
+        assert_eq!(paths[0].points, [[0.0, 0.0], [9.0, 1.0], [9.0, 3.0]]);
+    }
+}

@@ -1,0 +1,250 @@
+//! The emulated board: QEMU's `netduinoplus2`, an STM32F405 with its serial lines on TCP.
+//!
+//! This side listens on ports that the system picks, and QEMU connects to them before the
+//! machine starts: no port is guessed, and nothing that the board sends is lost. What is sent to
+//! a receiver that the image has not switched on yet would be lost, as on a desk; so
+//! [`Board::send`] first looks at its enable bits through QEMU's test port. Every wait has a
+//! limit, and QEMU is killed when the [`Board`] goes. Bytes travel at the host's pace, not at a
+//! baud rate.
+
+mod process;
+
+use process::{Line, Process};
+use std::io::{self, Write};
+use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const PROGRAM: &str = "qemu-system-arm";
+/// How long QEMU may take to connect its lines, and the image to switch a receiver on.
+const START: Duration = Duration::from_secs(20);
+const POLL: Duration = Duration::from_millis(5);
+/// How long a client is given to speak first.
+const HELLO: Duration = Duration::from_secs(2);
+
+/// Control register 1 of USART 1 to 6 (RM0090, table 1 and 30.6.4), and its bits UE and RE.
+const CR1: [u32; 6] = [0x4001_100C, 0x4000_440C, 0x4000_480C, 0x4000_4C0C, 0x4000_500C, 0x4001_140C];
+const RECEIVER_ENABLED: u32 = 1 << 13 | 1 << 2;
+/// Status register, which lies before it; its bit TXE. The emulated one takes a word beyond ten
+/// bits as a mask, any other as a value with TXE set.
+const SR_BEFORE_CR1: u32 = 0x0C;
+const ALL_BUT_TXE: u32 = !(1 << 7);
+
+/// The emulator does not do what it should.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EmulatorError {
+    /// It is not there, or cannot be started.
+    #[error("{PROGRAM} cannot be run: {0}")]
+    Start(io::Error),
+    /// No socket for one of its lines.
+    #[error("a socket on the loopback: {0}")]
+    Socket(#[from] io::Error),
+    /// It failed, or the image did.
+    #[error("{PROGRAM}: {what}\nits standard error:\n{errors}")]
+    Failed {
+        /// What was awaited.
+        what: String,
+        /// What QEMU, and the image through semihosting, said.
+        errors: String,
+    },
+}
+
+/// What comes of the emulator.
+pub type Result<T> = std::result::Result<T, EmulatorError>;
+
+/// Whether QEMU is there.
+///
+/// # Errors
+/// [`EmulatorError::Start`].
+pub fn available() -> Result<()> {
+    let version = Command::new(PROGRAM).arg("--version").stdout(Stdio::null()).status();
+    version.map(drop).map_err(EmulatorError::Start)
+}
+
+/// Whole lines without their ends.
+fn split(bytes: &[u8], end: u8) -> Vec<Vec<u8>> {
+    let mut lines: Vec<Vec<u8>> = bytes.split(|byte| *byte == end).map(<[u8]>::to_vec).collect();
+    lines.pop();
+    lines
+}
+
+/// An emulated board that runs an image.
+#[derive(Debug)]
+pub struct Board {
+    process: Process,
+    registers: Line,
+    usarts: Vec<Line>,
+}
+
+impl Board {
+    /// Starts QEMU with an image and its first `usarts` serial lines (1 to 6) connected;
+    /// `arguments` are added to QEMU's.
+    ///
+    /// # Errors
+    /// [`EmulatorError`], with QEMU's own words.
+    pub fn boot(image: &Path, usarts: usize, arguments: &[&str]) -> Result<Self> {
+        let listen = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
+        let port = |listener: &TcpListener| listener.local_addr().map(|address| address.port());
+        let registers = listen()?;
+        let listeners: Vec<TcpListener> = (0..usarts).map(|_| listen()).collect::<io::Result<_>>()?;
+        let mut command = Command::new(PROGRAM);
+        command
+            .args(["-machine", "netduinoplus2", "-nographic"])
+            // An instruction takes a nanosecond: the board's time does not depend on how busy the host is.
+            .args(["-icount", "shift=0"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .args(["-monitor", "none", "-qtest-log", "/dev/null"])
+            .args(["-qtest", &format!("tcp:127.0.0.1:{}", port(&registers)?)])
+            .args(arguments);
+        // A multiplexer of one: it keeps up to 32 bytes, so that QEMU need not be woken for each of
+        // them, which takes longer the busier the host is. Its escape character is none of a byte.
+        command.args(["-echr", "256"]);
+        for (n, listener) in listeners.iter().enumerate() {
+            let socket =
+                format!("socket,id=line{n},host=127.0.0.1,port={},nodelay=on,mux=on", port(listener)?);
+            command.args(["-chardev", &socket, "-serial", &format!("chardev:line{n}")]);
+        }
+        if usarts == 0 {
+            command.args(["-serial", "none"]);
+        }
+        command.arg("-kernel").arg(image);
+        let mut process = Process::start(command)?;
+        let registers = process.accept(&registers)?;
+        let usarts = listeners.iter().map(|listener| process.accept(listener)).collect::<Result<_>>()?;
+        Ok(Self { process, registers, usarts })
+    }
+
+    /// Sends bytes into USART `n` (1 to 6) once its receiver is on, waiting while the board
+    /// takes none.
+    ///
+    /// # Errors
+    /// When the receiver stays off, or takes no byte for `limit`.
+    pub fn send(&mut self, n: usize, bytes: &[u8], limit: Duration) -> Result<()> {
+        let until = Instant::now() + START;
+        while self.word(CR1[n - 1])? & RECEIVER_ENABLED != RECEIVER_ENABLED {
+            self.process.sleep(until, format!("the image does not switch USART{n}'s receiver on"))?;
+        }
+        let mut stream = &self.usarts[n - 1].stream;
+        stream.set_write_timeout(Some(limit))?;
+        let sent = stream.write_all(bytes);
+        sent.map_err(|error| self.process.failed(format!("USART{n} does not take the bytes: {error}")))
+    }
+
+    /// Everything that USART `n` has sent since the start, once it holds `count` lines (ends of
+    /// line `end`). Each line without its end; an unfinished one is left out.
+    ///
+    /// # Errors
+    /// When they do not come within `limit`; the message says how many did.
+    pub fn lines(&self, n: usize, end: u8, count: usize, limit: Duration) -> Result<Vec<Vec<u8>>> {
+        let ends = |bytes: &[u8]| bytes.iter().filter(|byte| **byte == end).count();
+        let (bytes, enough) = self.usarts[n - 1].received.wait(limit, |bytes| ends(bytes) >= count);
+        if !enough {
+            let sent = ends(&bytes);
+            return Err(self
+                .process
+                .failed(format!("USART{n} sent {sent} lines in {limit:?} instead of {count}")));
+        }
+        Ok(split(&bytes, end))
+    }
+
+    /// The same, once they are what is awaited.
+    ///
+    /// # Errors
+    /// When they are not within `limit`.
+    pub fn lines_until(
+        &self,
+        n: usize,
+        end: u8,
+        limit: Duration,
+        enough: impl Fn(&[Vec<u8>]) -> bool,
+    ) -> Result<Vec<Vec<u8>>> {
+        let (bytes, is_enough) = self.usarts[n - 1].received.wait(limit, |bytes| enough(&split(bytes, end)));
+        if !is_enough {
+            return Err(self.process.failed(format!("USART{n} did not send in {limit:?} what is awaited")));
+        }
+        Ok(split(&bytes, end))
+    }
+
+    /// USART `n` takes no more bytes from the image (its transmit register stays full), or does
+    /// again.
+    ///
+    /// # Errors
+    /// When QEMU does not answer.
+    pub fn stall(&mut self, n: usize, stalled: bool) -> Result<()> {
+        let value = if stalled { ALL_BUT_TXE } else { 0 };
+        self.ask(&format!("writel {:#x} {value:#x}", CR1[n - 1] - SR_BEFORE_CR1)).map(drop)
+    }
+
+    /// An address at which one TCP client can talk to USART `n`, and reads everything that it
+    /// has sent since the start. It comes once the client has said something, or said nothing for
+    /// a while: pyserial throws away what is there when it opens a line.
+    ///
+    /// # Errors
+    /// When the system gives no port.
+    pub fn serve(&mut self, n: usize) -> Result<SocketAddr> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+        let address = listener.local_addr()?;
+        let Line { stream, received } = &self.usarts[n - 1];
+        let (mut board, received) = (stream.try_clone()?, Arc::clone(received));
+        // Both threads end with the client or, at the latest, with the board's end of the line.
+        std::thread::spawn(move || {
+            let Ok((client, _)) = listener.accept() else { return };
+            let Ok(mut from_client) = client.try_clone() else { return };
+            let _ = client.set_read_timeout(Some(HELLO));
+            let _ = client.peek(&mut [0]);
+            let _ = client.set_read_timeout(None);
+            std::thread::spawn(move || std::io::copy(&mut from_client, &mut board));
+            received.copy_to(&client);
+            let _ = client.shutdown(Shutdown::Both);
+        });
+        Ok(address)
+    }
+
+    /// A word of the board's memory or registers.
+    ///
+    /// # Errors
+    /// When QEMU does not answer.
+    pub fn word(&mut self, address: u32) -> Result<u32> {
+        let answer = self.ask(&format!("readl {address:#x}"))?;
+        let word = answer.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
+        word.ok_or_else(|| self.process.failed(format!("the test port answers {answer:?}")))
+    }
+
+    /// What QEMU's test port answers to a command, behind its "OK".
+    fn ask(&mut self, command: &str) -> Result<String> {
+        let Line { stream, received } = &mut self.registers;
+        let asked = received.wait(Duration::ZERO, |_| true).0.len();
+        if let Err(error) = stream.write_all(format!("{command}\n").as_bytes()) {
+            return Err(self.process.failed(format!("the test port does not listen: {error}")));
+        }
+        let answer = |bytes: &[u8]| {
+            let text = String::from_utf8_lossy(bytes.get(asked..)?).into_owned();
+            Some(text.strip_prefix("OK")?.strip_suffix('\n')?.trim().to_owned())
+        };
+        let (bytes, _) = received.wait(START, |bytes| answer(bytes).is_some());
+        answer(&bytes).ok_or_else(|| self.process.failed(format!("the test port does not answer {command}")))
+    }
+
+    /// Waits until QEMU ends by itself (semihosting) and returns its exit code.
+    ///
+    /// # Errors
+    /// When it does not within `limit`, or is killed by a signal.
+    pub fn exit_code(&mut self, limit: Duration) -> Result<i32> {
+        let until = Instant::now() + limit;
+        loop {
+            if let Ok(Some(status)) = self.process.child.try_wait() {
+                return status.code().ok_or_else(|| self.process.failed(format!("ended with {status}")));
+            }
+            self.process.sleep(until, format!("did not end within {limit:?}"))?;
+        }
+    }
+
+    /// What QEMU, and the image through semihosting, have written to standard error.
+    #[must_use]
+    pub fn errors(&self) -> String {
+        self.process.errors()
+    }
+}

@@ -1,0 +1,77 @@
+//! One HTML page with everything in it: nothing is loaded from elsewhere, and all of it can be
+//! read without a script; the script adds zooming.
+
+pub mod chart;
+
+use std::fmt::{Display, Write};
+
+const STYLE: &str = include_str!("page/style.css");
+const SCRIPT: &str = include_str!("page/zoom.js");
+
+/// A whole page around its body.
+#[must_use]
+pub fn document(title: &str, body: &str) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n<style>\n{STYLE}</style></head>\n\
+         <body>\n{body}<script>\n{SCRIPT}</script>\n</body></html>\n",
+        escaped(title)
+    )
+}
+
+/// Rows of cells below a heading each; the first column is text, the others are figures.
+#[must_use]
+pub fn table<C: Display>(class: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<C>>) -> String {
+    let mut html = format!("<div class=\"scroll\"><table class=\"{class}\"><thead><tr>");
+    for column in header {
+        html += &format!("<th>{}</th>", escaped(column));
+    }
+    html += "</tr></thead>\n<tbody>\n";
+    for row in rows {
+        html += "<tr>";
+        for cell in row {
+            // Writing to a string does not fail.
+            let _ = write!(html, "<td>{}</td>", escaped(&cell.to_string()));
+        }
+        html += "</tr>\n";
+    }
+    html + "</tbody></table></div>\n"
+}
+
+/// Text as HTML has it.
+#[must_use]
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// A count with its thousands apart: 1,162,256.
+#[must_use]
+pub fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_cannot_become_markup() {
+        let page = document("<b>", &table("t", &["a&b"], [vec!["<script>"]]));
+        assert!(page.contains("<title>&lt;b&gt;</title>") && page.contains("a&amp;b"));
+        assert_eq!(page.matches("<script>").count(), 1, "our own");
+    }
+
+    #[test]
+    fn thousands() {
+        assert_eq!([0, 999, 1_000, 1_162_256].map(grouped), ["0", "999", "1,000", "1,162,256"]);
+    }
+}

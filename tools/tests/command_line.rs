@@ -1,0 +1,129 @@
+//! The command line as a whole: help, exit statuses, colours, completions.
+
+use std::process::{Command, Output};
+
+fn gyronet(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gyronet")).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Names of the subcommands, from the help itself.
+fn subcommands() -> Vec<String> {
+    let help = text(&gyronet(&["--help"]).stdout);
+    let (_, list) = help.split_once("Commands:\n").unwrap();
+    let (list, _) = list.split_once("\n\n").unwrap();
+    list.lines().map(|line| line.split_whitespace().next().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn every_help_begins_with_one_line_and_ends_with_examples() {
+    let names = subcommands();
+    assert!(names.len() >= 13, "{names:?}");
+    for name in names.iter().filter(|name| *name != "help") {
+        let output = gyronet(&[name, "--help"]);
+        let help = text(&output.stdout);
+        assert_eq!(output.status.code(), Some(0), "{name}");
+        let first = help.lines().next().unwrap();
+        assert!(first.len() <= 80 && help.contains(&format!("Usage: gyronet {name}")), "{name}: {first}");
+        let without_files = ["bus", "bench-target", "size"];
+        assert!(help.contains("Examples:") || without_files.contains(&name.as_str()), "{name}");
+    }
+    assert!(text(&gyronet(&["--help"]).stdout).contains("Exit status: 0 done; 1 failed"));
+}
+
+#[test]
+fn wrong_arguments_are_status_2_and_failures_1() {
+    for wrong in [
+        &["nonsense"][..],
+        &["evaluate"],
+        &["replay", "a.csv", "--via", "nothing"],
+        &["simulate", "--out", "a.csv", "--seconds", "1"],
+        &["device", "info"],
+        &["evaluate", "a.csv", "--lags", "--ablation"],
+    ] {
+        let output = gyronet(wrong);
+        assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", text(&output.stderr));
+        assert!(output.stdout.is_empty() && text(&output.stderr).contains("error"), "{wrong:?}");
+    }
+    for missing in [
+        &["demo", "/nowhere/drive.csv"][..],
+        &["evaluate", "/nowhere/drive.csv"],
+        &["replay", "/nowhere/drive.csv"],
+        &["simulate", "--out", "/nowhere/drive.csv"],
+        &["import", "kaist", "/nowhere"],
+        &["tables", "/nowhere"],
+        &["quantize", "/nowhere/a.safetensors", "--out", "/nowhere/a.blob"],
+        &["monitor", "/nowhere/can.log"],
+        &["size", "--elf", "/nowhere/image"],
+        &["device", "--port", "/nowhere/tty", "info"],
+    ] {
+        let output = gyronet(missing);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{missing:?}: {error}");
+        assert!(error.starts_with("error: ") && error.contains("/nowhere"), "{missing:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{missing:?}: {error}");
+    }
+}
+
+#[test]
+fn json_is_json_and_quiet_is_quiet() {
+    let drive = format!("{}/quiet.csv", env!("CARGO_TARGET_TMPDIR"));
+    let log = format!("{}/quiet.log", env!("CARGO_TARGET_TMPDIR"));
+    for (arguments, field) in [
+        (&["simulate", "--seconds", "12", "--out", &drive][..], "samples"),
+        (&["evaluate", &drive], "drives"),
+        (&["evaluate", "--lags", &drive], "drives"),
+        (&["replay", &drive, "--out", &log], "frames"),
+        (&["monitor", &log], "rate"),
+    ] {
+        let output = gyronet(&[arguments, &["--json"]].concat());
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(!json[field].is_null(), "{arguments:?}: {json}");
+        let output = gyronet(&[arguments, &["--quiet"]].concat());
+        assert!(output.status.success() && output.stderr.is_empty(), "{arguments:?}");
+    }
+    let json: serde_json::Value = serde_json::from_slice(&gyronet(&["bus", "--json"]).stdout).unwrap();
+    assert_eq!(json[0]["messages"][0]["id"], "174");
+}
+
+#[test]
+fn colours_are_for_terminals() {
+    let colored = |variable: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gyronet"));
+        command.args(["size", "--elf", "/nowhere/image"]).env_remove("NO_COLOR");
+        let output = command.env(variable, "1").output().unwrap();
+        output.stderr.contains(&0x1b)
+    };
+    assert!(colored("CLICOLOR_FORCE"));
+    assert!(!colored("NO_COLOR") && !colored("ANYTHING"));
+}
+
+#[test]
+fn shells_complete_every_subcommand() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let output = gyronet(&["completions", shell]);
+        let script = text(&output.stdout);
+        assert!(output.status.success(), "{shell}");
+        for name in subcommands() {
+            assert!(script.contains(&name), "{shell}: {name}");
+        }
+    }
+}
+
+#[test]
+fn bash_completes() {
+    if Command::new("bash").arg("--version").output().is_err() {
+        eprintln!("SKIPPED bash_completes: no bash");
+        return;
+    }
+    let script = "source /dev/stdin\nCOMP_WORDS=(gyronet ev); COMP_CWORD=1\n_gyronet gyronet ev gyronet\necho \"${COMPREPLY[@]}\"";
+    let completions = gyronet(&["completions", "bash"]).stdout;
+    let path = format!("{}/completions.bash", env!("CARGO_TARGET_TMPDIR"));
+    std::fs::write(&path, completions).unwrap();
+    let script = script.replace("/dev/stdin", &path);
+    let output = Command::new("bash").args(["--norc", "-c", &script]).output().unwrap();
+    assert_eq!(text(&output.stdout).trim(), "evaluate", "{}", text(&output.stderr));
+}

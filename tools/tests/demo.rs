@@ -1,0 +1,65 @@
+//! The command `gyronet demo`: its page, its JSON, its log.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Runs the demo without the board, which other tests run.
+fn demo(name: &str, arguments: &[&str]) -> (PathBuf, String) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let output = Command::new(env!("CARGO_BIN_EXE_gyronet"))
+        .args(["demo", "--no-board", "--out"])
+        .arg(&folder)
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    (folder, String::from_utf8(output.stdout).unwrap())
+}
+
+#[test]
+fn the_page_needs_nothing_else_and_says_what_the_json_says() {
+    let (folder, json) = demo("demo-page", &["--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
+    for outside in ["http://", "https://", "src=", "href=", "@import", "url("] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    for section in ["Yaw", "Path", "Methods", "On the bus", "On the board", "Time and memory"] {
+        assert!(page.contains(&format!("<h2>{section}</h2>")), "{section}");
+    }
+    assert!(page.contains("Simulated drive."));
+    assert_eq!(page.matches("<svg").count(), 3);
+    // Six methods and the reference, six errors, three paths and the reference.
+    assert_eq!(page.matches("<polyline").count(), 17);
+    let ours = &json["methods"]["default"];
+    for (figure, decimals) in [("mean_1s_rad", 6), ("final_rad", 6)] {
+        let figure = ours[figure].as_f64().unwrap();
+        assert!(page.contains(&format!("<td>{figure:.decimals$}</td>")), "{figure}");
+    }
+    // Every message of the excerpt is in the log.
+    let log = std::fs::read_to_string(folder.join("can.log")).unwrap();
+    let messages = json["excerpt"].as_array().unwrap();
+    assert_eq!(messages.len(), 6);
+    for message in messages {
+        let [id, data] = ["id", "data"].map(|field| message[field].as_str().unwrap());
+        assert!(page.contains(data) && log.contains(&format!("{id}#{}", data.replace(' ', ""))), "{message}");
+    }
+    assert_eq!(json["frames"], log.lines().count());
+    assert_eq!(json["board"]["why"], "--no-board");
+}
+
+#[test]
+fn a_drive_without_reference_and_wheels_has_no_errors_and_no_path() {
+    let mut csv = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
+    for k in 0..600 {
+        csv += &format!("{:.2},0.0{},0,9.8,0,0,0.001\n", 0.01 * f64::from(k), k % 7);
+    }
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bare <drive>.csv");
+    std::fs::write(&file, csv).unwrap();
+    let (folder, text) = demo("demo-bare", &[file.to_str().unwrap()]);
+    assert!(text.contains("bare <drive>: no reference yaw rate, so no errors"), "{text}");
+    assert!(!text.contains('\u{1b}'), "no colours without a terminal");
+    let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
+    assert!(page.contains("<h1>bare &lt;drive&gt;</h1>") && !page.contains("<h2>Path</h2>"));
+    assert_eq!(page.matches("<svg").count(), 1);
+}
