@@ -2,6 +2,7 @@
 
 use super::fault::{Axes, Fault, Kind, Line};
 use super::part::Part;
+use crate::via::icm42688::WRAP_US;
 
 /// A fault that may go undetected.
 #[derive(Debug, Clone, Copy)]
@@ -41,6 +42,18 @@ pub const EXCEPTIONS: &[Exception] = &[
         why: "the part's clock is the only one that the pipeline integrates by; bound 0.7 rad/s times the drift",
         bound: |fault, _| {
             (fault.kind == Kind::ClockDrift).then(|| FASTEST * fault.size.abs() * 1e-6 + MARGIN)
+        },
+    },
+    Exception {
+        name: "clock jump of less than a sample",
+        why: "a stamp that is so much earlier may be jitter: what is sent is as much older, until a second of it \
+              tells; bound 0.7 rad/s times the jump",
+        bound: |fault, part| {
+            // An ICM's stamps wrap: a jump by nearly a whole turn of them is a small one.
+            let wraps = if part == Part::Icm42688 { WRAP_US as f64 } else { f64::INFINITY };
+            let turns = (fault.size / wraps).round();
+            let jump = if turns == 0.0 { fault.size } else { fault.size - turns * wraps };
+            (fault.kind == Kind::ClockJump && jump.abs() < 1e4).then(|| FASTEST * jump.abs() * 1e-6 + MARGIN)
         },
     },
     Exception {
@@ -86,7 +99,8 @@ pub const EXCEPTIONS: &[Exception] = &[
 #[must_use]
 pub fn excepted(faults: &[Fault], part: Part, moved: f64) -> Option<&'static Exception> {
     let covers = |exception: &&Exception| {
-        faults.iter().any(|fault| (exception.bound)(fault, part).is_some_and(|bound| moved <= bound))
+        let bounds: Vec<f64> = faults.iter().filter_map(|fault| (exception.bound)(fault, part)).collect();
+        !bounds.is_empty() && moved <= bounds.iter().sum()
     };
     EXCEPTIONS.iter().find(covers)
 }
