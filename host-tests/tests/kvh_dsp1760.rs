@@ -102,7 +102,7 @@ fn samples_carry_angle_time_and_temperature() {
     let invalid = samples[0].expect("a sample");
     assert_eq!((invalid.increment[2], invalid.temperature), (None, Some(CentiCelsius(-500))));
     assert_eq!(samples[1..], [Ok(FogSample { time: Micros(2_000), ..first })]);
-    assert_eq!((part.counters().gaps, part.counters().lost), (0, 0));
+    assert_eq!((part.counters().gaps, part.counters().lost, part.bad_checksums()), (0, 0, 0));
     assert_eq!(feed_new(&bytes(TIMED))[0].map(|sample| sample.time), Ok(Micros(123_456_789)));
 }
 
@@ -113,6 +113,12 @@ fn resynchronises() {
     for before in [&false_start[..], &other[16..], &[&false_start, &other[16..]].concat()] {
         assert_eq!(feed_new(&[before, &recorded].concat()), feed_new(&recorded), "after {before:02x?}");
     }
+    // A damaged frame is a candidate whose checksum does not fit.
+    let mut damaged = other.clone();
+    damaged[20] ^= 1;
+    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    assert_eq!(feed(part, &[&damaged[..], &recorded].concat()).len(), 1);
+    assert_eq!(part.bad_checksums(), 1);
     // A header inside the payload: an acceleration whose bits are FE 81 FF 55.
     let hidden = Message { acceleration: [f32::from_bits(0xFE81_FF55), 0.0, 0.0], ..message(3, 1e-5) }.emit();
     assert_eq!(feed_new(&[&hidden[10..], &hidden[..], &recorded[..]].concat()).len(), 2);

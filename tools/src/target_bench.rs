@@ -175,7 +175,7 @@ pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
 }
 
 /// Compiles the instruction counter; `None` where there is no C compiler.
-fn plugin(workspace: &Path) -> Option<PathBuf> {
+pub fn plugin(workspace: &Path) -> Option<PathBuf> {
     let folder = workspace.join("target");
     std::fs::create_dir_all(&folder).ok()?;
     let library = folder.join("m4count.so");
@@ -226,7 +226,7 @@ pub fn emulate(image: &Path, arguments: &[&str]) -> Result<(String, String), Ben
 }
 
 /// The number behind `key` in a line.
-fn field(line: &str, key: &str) -> Option<u64> {
+pub(crate) fn field(line: &str, key: &str) -> Option<u64> {
     let (_, rest) = line.split_once(key)?;
     rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
 }

@@ -10,8 +10,8 @@
 //! # What runs when
 //! | priority | task | when | what |
 //! |---|---|---|---|
-//! | 4 | `imu_line`, `tick` | a byte, 1 ms | a byte into its queue; board time |
-//! | 3 | `slcan_line`, `service_line`, `bus::receive` | a byte, a frame | into and out of their queues |
+//! | 4 | `imu_line`, `slcan_line`, `tick` | a byte, 1 ms | a byte into or out of its queue; board time |
+//! | 3 | `service_line`, `bus::receive` | a byte, a frame | into and out of their queues |
 //! | 2 | `output` | pended by both | samples, pipeline, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
 //! | 0 | `idle` | the rest | service line, weights against their checksum |
@@ -66,7 +66,7 @@ static PRIORITIES: [[u8; 2]; 7] = {
     [
         [FIRST + Interrupt::USART1 as u8, 4],
         [SYSTICK, 4],
-        [FIRST + Interrupt::USART2 as u8, 3],
+        [FIRST + Interrupt::USART2 as u8, 4],
         [FIRST + Interrupt::USART6 as u8, 3],
         [FIRST + CAN_INTERRUPT as u8, CAN_PRIORITY],
         [FIRST + Interrupt::UART4 as u8, 2],
@@ -139,7 +139,7 @@ mod app {
         rtic::pend(Interrupt::UART4);
     }
 
-    #[task(binds = USART2, priority = 3, local = [slcan])]
+    #[task(binds = USART2, priority = 4, local = [slcan])]
     fn slcan_line(cx: slcan_line::Context) {
         cx.local.slcan.serve();
     }

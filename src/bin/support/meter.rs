@@ -7,8 +7,15 @@ use cortex_m::peripheral::{DCB, DWT, SYST, syst::SystClkSource};
 use cortex_m_semihosting::hprintln;
 
 const PAINT: u32 = 0xC0DE_57AC;
-/// Words painted below the stack pointer: 24 KiB, which is free in every image here.
-const PAINTED: usize = 6 * 1024;
+
+unsafe extern "C" {
+    /// Where the stack ends (memory.x); below it is no memory.
+    static _stack_end: u32;
+}
+
+fn stack_end() -> usize {
+    (&raw const _stack_end).addr()
+}
 
 pub struct Meter {
     syst: SYST,
@@ -33,7 +40,7 @@ impl Meter {
     #[inline(never)]
     pub fn run(&mut self, name: &str, mut work: impl FnMut()) {
         let frame = 0u32;
-        let bottom = paint();
+        paint();
         let (ticks, cycles) = (SYST::get_current(), DWT::cycle_count());
         // SAFETY: DBG is a hint; without a debugger that listens it does nothing.
         unsafe { asm!(".inst.w 0xF3AF80F1") };
@@ -43,7 +50,7 @@ impl Meter {
         let cycles = DWT::cycle_count().wrapping_sub(cycles);
         let ticks = ticks.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF;
         let wrapped = self.syst.has_wrapped();
-        let stack = core::ptr::from_ref(&frame).addr() - untouched(bottom);
+        let stack = core::ptr::from_ref(&frame).addr() - untouched();
         if self.dwt {
             hprintln!("{} cycles={} stack={}", name, cycles, stack);
         } else {
@@ -52,28 +59,25 @@ impl Meter {
     }
 }
 
-/// Fills what lies below the stack pointer; returns where that begins.
+/// Fills what is left of the stack below the stack pointer.
 #[inline(never)]
-fn paint() -> usize {
+fn paint() {
     let here = 0u32;
     // Some way below this frame, so that the loop does not paint over itself.
     let top = core::ptr::from_ref(&here).addr() - 64;
-    let bottom = top - 4 * PAINTED;
-    for address in (bottom..top).step_by(4) {
-        // SAFETY: RAM between the statics and this frame that nothing lives in: the image's
-        // statics end more than 24 KiB below its stack.
+    for address in (stack_end()..top).step_by(4) {
+        // SAFETY: RAM between the stack's end and this frame, where nothing lives.
         unsafe { core::ptr::with_exposed_provenance_mut::<u32>(address).write_volatile(PAINT) };
     }
-    bottom
 }
 
 /// The lowest address that was written since.
 #[inline(never)]
-fn untouched(bottom: usize) -> usize {
-    let words = (0..PAINTED).take_while(|word| {
-        let address = bottom + 4 * word;
+fn untouched() -> usize {
+    let painted = |address: &usize| {
         // SAFETY: as in `paint`.
-        unsafe { core::ptr::with_exposed_provenance::<u32>(address).read_volatile() == PAINT }
-    });
-    bottom + 4 * words.count()
+        unsafe { core::ptr::with_exposed_provenance::<u32>(*address).read_volatile() == PAINT }
+    };
+    let end = stack_end();
+    end + 4 * (end..).step_by(4).take_while(painted).count()
 }

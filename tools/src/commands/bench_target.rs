@@ -3,14 +3,19 @@
 use super::Common;
 use gyronet_tools::image_size::ImageSize;
 use gyronet_tools::parser_load::ParserLoad;
+use gyronet_tools::schedule::Schedule;
 use gyronet_tools::target_bench::{self, Count, Counts};
+use gyronet_tools::task_bench::{self, Tasks};
+use std::path::Path;
 
 /// Count instructions and modelled cycles on the target, in QEMU.
 ///
 /// Of every kernel, network and sensor parser, on a Cortex-M4F. Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
 /// `name instructions=N cycles=N stack=BYTES`, then sizes, then what the parsers cost for a byte
 /// and of the processor's time. Cycles are modelled (zero wait states), not
-/// measured on silicon. Exit status 1 when the count of a window depends on its input.
+/// measured on silicon. Then every task and interrupt of the flashed image, counted while it runs, and
+/// whether each meets its deadline at 168 MHz. Exit status 1 when the count of a window depends on
+/// its input, or a deadline can be missed.
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
@@ -30,19 +35,41 @@ pub fn run(_: &Args, common: Common) -> super::Result {
         let image = target_bench::build(&workspace, image, &folder)?;
         counts.extend(target_bench::measure(&workspace, &image)?);
     }
-    let coprocessor = ImageSize::read(&target_bench::build(&workspace, "coprocessor", &folder)?)?;
+    let image = target_bench::build(&workspace, "coprocessor", &folder)?;
+    let coprocessor = ImageSize::read(&image)?;
+    let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
     if common.json {
-        println!("{}", json(&counts, &coprocessor));
+        println!("{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)));
     } else {
         print(&counts, &coprocessor);
+        if let Some((tasks, schedule)) = &tasks {
+            println!("{tasks}\n{schedule}");
+        }
         if !counts.exact() {
-            println!("no C compiler or no plugins: instructions from SysTick, +-6; cycles left out");
+            println!(
+                "no C compiler or no plugins: instructions from SysTick, +-6; cycles and deadlines left out"
+            );
         }
     }
     if !counts.constant() {
         return Err("the count of a window depends on its input".into());
     }
+    if tasks.is_some_and(|(_, schedule)| !schedule.met()) {
+        return Err("a task of the image can miss its deadline".into());
+    }
     Ok(())
+}
+
+/// What the image's handlers cost, and whether that is in time.
+type Timing = (Tasks, Schedule);
+
+/// The tasks of the image that is flashed, counted while it runs.
+fn schedule(workspace: &Path, image: &Path) -> Result<Timing, Box<dyn std::error::Error>> {
+    let plugin = target_bench::plugin(workspace).ok_or("the instruction counter cannot be built")?;
+    let tasks = task_bench::measure(image, &plugin)?;
+    let schedule = Schedule::new(&tasks);
+    let schedule = schedule.ok_or("the image has other tasks than the table of deadlines")?;
+    Ok((tasks, schedule))
 }
 
 fn print(counts: &Counts, coprocessor: &ImageSize) {
@@ -77,7 +104,7 @@ fn print(counts: &Counts, coprocessor: &ImageSize) {
     }
 }
 
-fn json(counts: &Counts, coprocessor: &ImageSize) -> serde_json::Value {
+fn json(counts: &Counts, coprocessor: &ImageSize, schedule: Option<&Schedule>) -> serde_json::Value {
     let regions: Vec<_> = counts
         .regions
         .iter()
@@ -99,5 +126,6 @@ fn json(counts: &Counts, coprocessor: &ImageSize) -> serde_json::Value {
         "flash": coprocessor.flash,
         "static_ram": coprocessor.static_ram,
         "kernels": coprocessor.kernels,
+        "tasks": schedule,
     })
 }

@@ -33,7 +33,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if common.json {
         print_json(&mut std::io::stdout().lock(), &serde_json::json!({ "soak": soak, "faults": faults }))?;
     } else {
-        println!("{soak}");
+        if common.json {
+            super::print_json(&mut std::io::stdout(), &soak)?;
+        } else {
+            println!("{soak}");
+        }
     }
     if faults.is_empty() { Ok(()) } else { Err(faults.join("; ").into()) }
 }
