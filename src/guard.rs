@@ -7,8 +7,15 @@
 //! | fault | found when | then | over when |
 //! |---|---|---|---|
 //! | silent | no sample for [`TIMEOUT_US`] | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
-//! | stuck | [`STUCK_AFTER`] samples equal in all axes | [`Status::Stuck`], no window, no initialisation | a sample that differs |
+//! | stuck | [`STUCK_AFTER`] equal samples of gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
+//! | wrong | a reading that is further from the last one than a vehicle goes in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
 //! | saturated | the part says so | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
+
+mod jump;
+mod still;
+
+pub use jump::{JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE};
+pub use still::{AXIS_STUCK_AFTER, STUCK_AFTER};
 
 use crate::align::AlignError;
 use crate::health::{Faults, Quality, Source, Status, WatchCounters, count};
@@ -22,20 +29,16 @@ use crate::vehicle::{PromptSample, VehicleSample, YawSample};
 pub const TIMEOUT_US: u64 = 29_000;
 /// After a start an MTi needs about a second before it speaks.
 pub const START_US: u64 = 2_000_000;
-/// Samples that are equal to the one before in all axes. The least bit of a MEMS part always
-/// moves: a tenth of a second is far beyond chance.
-pub const STUCK_AFTER: u32 = 10;
 /// Samples after saturation that are not trusted: 50 ms, in which the part's filter recovers.
 pub const HOLD: u32 = 5;
-
-type Axes = ([SpecificForce; 3], [AngularRate; 3]);
 
 /// A pipeline and the watch over its sensor.
 #[derive(Debug, Clone)]
 pub struct Guard {
     pipeline: Pipeline,
-    last: Option<Axes>,
-    equal: u32,
+    still: still::Still,
+    jump: jump::Jump,
+    stuck: bool,
     hold: u32,
     /// When the sensor was heard of, by the board's clock.
     heard: Option<Micros>,
@@ -51,8 +54,9 @@ impl Guard {
     pub fn new(config: PipelineConfig) -> Self {
         Self {
             pipeline: Pipeline::new(config),
-            last: None,
-            equal: 0,
+            still: still::Still::new(),
+            jump: jump::Jump::default(),
+            stuck: false,
             hold: 0,
             heard: None,
             due: None,
@@ -82,23 +86,32 @@ impl Guard {
     /// # Errors
     /// [`AlignError`] when its time stamp has no place; it is counted and not used.
     pub fn process(&mut self, mut sample: ImuSample, now: Micros) -> Result<Output, AlignError> {
-        let axes = (sample.specific_force, sample.angular_rate);
-        self.equal = if self.last.replace(axes) == Some(axes) { self.equal.saturating_add(1) } else { 0 };
-        let stuck = self.equal >= STUCK_AFTER;
-        count(&mut self.counters.stuck, u32::from(self.equal == STUCK_AFTER));
+        let stuck = self.still.process(&sample);
+        let began = !core::mem::replace(&mut self.stuck, stuck) && stuck;
+        count(&mut self.counters.stuck, u32::from(began));
         let saturated = sample.clipped;
         self.hold = if saturated { HOLD + 1 } else { self.hold.saturating_sub(1) };
         count(&mut self.counters.held, u32::from(!saturated && self.hold > 0));
-        sample.clipped = saturated || self.hold > 0 || stuck;
+        let clipped = saturated || self.hold > 0;
+        // What is beyond the range is no reading to hold others against.
+        let wrong = !clipped && self.jump.process(&sample);
+        count(&mut self.counters.wrong, u32::from(wrong));
+        sample.clipped = clipped || stuck || wrong;
         // Worked on where it is returned: it is too large to be copied about on a small stack.
         let mut result = self.pipeline.process(sample);
         let Ok(output) = &mut result else { return result };
         self.heard = Some(now);
         self.due = None;
-        if stuck {
+        let told = match (stuck, wrong) {
+            (true, _) => Some(Faults::STUCK),
+            (false, true) => Some(Faults::IMPLAUSIBLE),
+            (false, false) => None,
+        };
+        if let Some(told) = told {
             let faults = &mut output.vehicle.yaw.faults;
-            *faults =
-                faults.without(if saturated { Faults::NONE } else { Faults::CLIPPED }).with(Faults::STUCK);
+            *faults = faults.without(if saturated { Faults::NONE } else { Faults::CLIPPED }).with(told);
+        }
+        if stuck {
             output.prompt.status = Status::Stuck;
         }
         self.newest = Some(output.vehicle);

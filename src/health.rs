@@ -14,7 +14,7 @@ pub mod supervisor;
 /// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is believed | `missing`, `late`, `implausible` |
 /// | ready | `Ready` | a believable window covers the recent samples | gyro less bias and correction | as above | `windows` |
 /// | fault | `Clipped` | the part says that it is saturated | marked failed | 50 ms after the last such sample | `clipped`, `held` |
-/// | fault | `Stuck` | ten samples equal in all axes | marked failed, fault bit `STUCK` | a sample that differs | `stuck` |
+/// | fault | `Stuck` | seven samples equal in gyro, accelerometer or one axis | marked failed, fault bit `STUCK` | a sample that differs | `stuck` |
 /// | fault | `Silent` | 29 ms without a sample, by the board's clock | not available, every 10 ms | the next sample | `silences` |
 ///
 /// From a fault it goes back to init where no bias is known, else to degraded.
@@ -84,13 +84,13 @@ impl Faults {
     pub const CLIPPED: Self = Self(1 << 1);
     /// The part's readings stand still.
     pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate is not believed.
+    /// The network's estimate is not believed, or a reading of the part is not.
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
     /// The weights are damaged.
     pub const WEIGHTS: Self = Self(1 << 5);
-    /// The wheels are silent.
+    /// The wheels are silent, or say that the vehicle stands while the gyro says that it turns.
     pub const WHEELS: Self = Self(1 << 6);
     /// Frames were dropped because the bus did not take them.
     pub const BUS: Self = Self(1 << 7);
@@ -159,6 +159,8 @@ pub struct WatchCounters {
     pub stuck: u32,
     /// Samples not trusted because it had just been saturated.
     pub held: u32,
+    /// Readings further from the last one than a vehicle goes in 10 ms.
+    pub wrong: u32,
 }
 
 /// Adds to a counter without wrapping.

@@ -38,11 +38,13 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
 /// What it sends when the vehicle is level and turns at `yaw_rate`, rad/s, 10 ms after 10 ms.
 #[must_use]
 pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
+    // The least bits of a real part always move.
+    let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let (force, rate) = (5e-4 * sign, 5e-8 * sign);
     let row = Row {
         time: number as f64 * 0.01,
-        // The least bit of a real part always moves.
-        acceleration: [0.0, 0.0, if number.is_multiple_of(2) { 9.81 } else { 9.811 }],
-        rate_of_turn: [0.0, 0.0, yaw_rate],
+        acceleration: [force, force, 9.81 + force],
+        rate_of_turn: [rate, rate, yaw_rate + rate],
         reference: 0.0,
     };
     message(number, &row).emit().to_vec()

@@ -1,7 +1,7 @@
 //! The watch over the sensor, on the host: silence by the board's clock, readings that stand
 //! still, saturation, and the weights' checksum in the background.
 
-use gyronet::guard::{Guard, HOLD, START_US, STUCK_AFTER, TIMEOUT_US};
+use gyronet::guard::{AXIS_STUCK_AFTER, Guard, HOLD, START_US, STUCK_AFTER, TIMEOUT_US};
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::{Blob, BlobError, weights};
@@ -66,7 +66,7 @@ fn samples_that_wait_are_no_silence() {
 }
 
 #[test]
-fn stuck_from_the_tenth_equal_sample_to_the_first_that_differs() {
+fn stuck_from_the_seventh_equal_sample_to_the_first_that_differs() {
     let (mut guard, mut noise) = fed(400);
     let still = idling(399, 0.001, &mut noise);
     let next = |guard: &mut Guard, tick: u64, sample: ImuSample| {
@@ -84,6 +84,24 @@ fn stuck_from_the_tenth_equal_sample_to_the_first_that_differs() {
     let moved = idling(440, 0.001, &mut noise);
     assert_eq!(next(&mut guard, 440, moved).prompt.status, Status::Degraded);
     assert_eq!(guard.counters().stuck, 1);
+}
+
+#[test]
+fn a_gyro_or_one_axis_may_be_stuck_beside_axes_that_move() {
+    for (axes, after) in [(&[0, 1, 2][..], STUCK_AFTER), (&[2], AXIS_STUCK_AFTER), (&[1], AXIS_STUCK_AFTER)] {
+        let (mut guard, mut noise) = fed(400);
+        let still = idling(399, 0.001, &mut noise);
+        for tick in 400..500 {
+            let mut sample = idling(tick, 0.001, &mut noise);
+            for axis in axes {
+                sample.angular_rate[*axis] = still.angular_rate[*axis];
+            }
+            let output = guard.process(sample, at(tick)).expect("in time");
+            let stuck = tick >= 400 + u64::from(after);
+            assert_eq!(output.prompt.status == Status::Stuck, stuck, "axes {axes:?}, sample {tick}");
+        }
+        assert_eq!(guard.counters().stuck, 1);
+    }
 }
 
 #[test]

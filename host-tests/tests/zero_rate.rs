@@ -2,7 +2,7 @@
 
 use gyronet::bias::{Proof, ZeroRate, ZeroRateConfig};
 use gyronet::compensate::Settled;
-use gyronet::health::Status;
+use gyronet::health::{Faults, Status};
 use gyronet::pipeline::{Output, Pipeline, PipelineConfig, YawRate};
 use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
 use gyronet::units::{AngularRate, CentiCelsius, WheelSpeed};
@@ -160,6 +160,22 @@ fn a_turntable_is_a_turn_whatever_the_wheels_say() {
     println!("{turned:.3} of 6 rad, {} seconds contradicted", pipeline.counters().contradicted);
     assert!((turned - 6.0).abs() < 0.05, "{turned} of 6 rad");
     assert!(pipeline.counters().contradicted > 50);
+}
+
+#[test]
+fn locked_wheels_in_a_turn_never_hold_the_rate_at_zero() {
+    // Braking on ice: the wheels stand after 30 s, the vehicle slides on round the bend.
+    let turn = |tick: u64| if tick >= 2_900 { 0.3 } else { 0.0 };
+    let locked = |tick: u64| {
+        let still = tick < 2_900 || (3_000..3_200).contains(&tick);
+        Some(if still { Standstill::Still } else { Standstill::Moving })
+    };
+    let (_, outputs) = run(3_400, turn, locked);
+    for (tick, output) in outputs.iter().enumerate().skip(2_910) {
+        assert!((output.navigation.rate.rad_per_sec() - 0.3).abs() < 0.01, "sample {tick}");
+        let told = output.vehicle.yaw.faults.0 & Faults::WHEELS.0 != 0;
+        assert_eq!(told, (3_001..3_200).contains(&tick), "sample {tick}");
+    }
 }
 
 #[test]

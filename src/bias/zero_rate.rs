@@ -107,6 +107,9 @@ pub struct ZeroRate {
     block: Spread,
     waiting: Option<Measurement>,
     refused: bool,
+    /// Codes x samples turned in this second of standing, by the newest samples.
+    turned: i64,
+    turned_for: u32,
     since_walk: u32,
     temperature: Option<CentiCelsius>,
 }
@@ -127,6 +130,8 @@ impl ZeroRate {
             block: Spread::default(),
             waiting: None,
             refused: false,
+            turned: 0,
+            turned_for: 0,
             since_walk: 0,
             temperature: None,
         }
@@ -163,6 +168,46 @@ impl ZeroRate {
         }
         let block = core::mem::take(&mut self.block);
         Some(self.second(&block))
+    }
+
+    /// Takes the newest sample's rate, less static bias, before it is settled; says once when it
+    /// contradicts the wheels.
+    ///
+    /// A vehicle may slide with its wheels locked. What a second of standing may turn at most must
+    /// not be exceeded by a part of it either: the navigation rate, which is zero while the
+    /// vehicle stands, has not gone out yet for the sample that tells.
+    pub fn watch(&mut self, rate: AngularRate) -> bool {
+        if self.proof != Proof::Wheels {
+            (self.turned, self.turned_for) = (0, 0);
+            return false;
+        }
+        if self.turned_for == RATE_HZ {
+            (self.turned, self.turned_for) = (0, 0);
+        }
+        self.turned += i64::from(rate.0) - i64::from(self.bias().0);
+        self.turned_for += 1;
+        let turned = self.turned as f32 / (AngularRate::PER_RAD_PER_SEC * RATE_HZ as f32);
+        if libm::fabsf(turned) <= self.wheels_gate() {
+            return false;
+        }
+        (self.turned, self.turned_for) = (0, 0);
+        if core::mem::replace(&mut self.refused, true) {
+            return false;
+        }
+        // The next whole second says whether that goes on.
+        self.restart();
+        true
+    }
+
+    /// The wheels say that the vehicle stands, and the gyro says that it turns.
+    #[must_use]
+    pub fn contradicted(&self) -> bool {
+        self.proof == Proof::Wheels && self.refused
+    }
+
+    /// The most that a second of standing may turn, rad.
+    fn wheels_gate(&self) -> f32 {
+        self.config.max_step.max(10.0 * self.sigma())
     }
 
     /// What a gap leaves is no whole second.
@@ -215,7 +260,7 @@ impl ZeroRate {
     }
 
     fn second(&mut self, block: &Spread) -> Second {
-        let ZeroRateConfig { noise, max_step, .. } = self.config;
+        let noise = self.config.noise;
         let measured = Measurement {
             mean: block.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC,
             variance: (block.variance() / block.count() as f32).max(noise * noise),
@@ -223,7 +268,7 @@ impl ZeroRate {
         let step = measured.mean - self.bias - self.offset;
         let Covariance { bias, both, offset } = self.covariance;
         let gate = match self.proof {
-            Proof::Wheels => max_step.max(10.0 * self.sigma()),
+            Proof::Wheels => self.wheels_gate(),
             Proof::Inertial => 3.0 * libm::sqrtf(bias + 2.0 * both + offset + measured.variance),
             Proof::None => 0.0,
         };

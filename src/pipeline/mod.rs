@@ -257,7 +257,7 @@ impl Pipeline {
             self.since_window += 1;
         }
         let settled = self.compensator.settled();
-        self.update_bias(settled.as_ref(), quiet, sample);
+        self.update_bias(settled.as_ref(), AngularRate(rate), quiet, sample);
         let bias = self.bias();
         let stands = self.stood as usize > self.config.compensate.lag.samples();
         let prompt = self.compensator.prompt(bias);
@@ -273,7 +273,7 @@ impl Pipeline {
         (prompt, navigation, settled)
     }
 
-    fn update_bias(&mut self, settled: Option<&Settled>, quiet: bool, sample: &ImuSample) {
+    fn update_bias(&mut self, settled: Option<&Settled>, rate: AngularRate, quiet: bool, sample: &ImuSample) {
         let proof = match (self.wheels, self.standstill()) {
             (Some(_), Standstill::Still) => Proof::Wheels,
             // Where there are wheels they decide.
@@ -290,6 +290,9 @@ impl Pipeline {
             }
             Some(Second::Refused) => count(&mut self.counters.contradicted, 1),
             Some(Second::Waits) | None => {}
+        }
+        if !sample.clipped && zero_rate.watch(rate) {
+            count(&mut self.counters.contradicted, 1);
         }
         if zero_rate.stands() {
             self.stood = self.stood.saturating_add(1);

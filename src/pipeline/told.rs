@@ -1,6 +1,7 @@
 //! What is told of a sample beside its rates: faults, source, quality, the other axes.
 
 use super::{Pipeline, YawRate};
+use crate::bias::ZeroRate;
 use crate::health::{Faults, judge};
 use crate::sample::{Frame, ImuSample, PERIOD_US, WheelSample};
 use crate::units::AngularRate;
@@ -13,7 +14,11 @@ impl Pipeline {
         self.estimate_faults
             .with(fault(self.gap_within > 0, Faults::GAP))
             .with(fault(sample.clipped, Faults::CLIPPED))
-            .with(fault(self.wheels_silent(), Faults::WHEELS))
+            .with(fault(self.wheels_silent() || self.contradicted(), Faults::WHEELS))
+    }
+
+    fn contradicted(&self) -> bool {
+        self.zero_rate().is_some_and(ZeroRate::contradicted)
     }
 
     /// A wheel that has had a speed has none, or none has ever had one.

@@ -2,6 +2,7 @@
 
 pub mod ablation;
 pub mod bundled;
+pub mod campaign;
 pub mod candump;
 pub mod checkpoint;
 mod curve;

@@ -8,8 +8,8 @@
 //! | ICM-42688-P | a 20-bit FIFO packet a row, over a simulated SPI bus | 1/131 deg/s, 1/8192 g |
 
 pub mod compare;
-mod dsp1760;
-mod icm42688;
+pub(crate) mod dsp1760;
+pub(crate) mod icm42688;
 mod xsens;
 
 use crate::recording::{Recording, Row};

@@ -6,9 +6,9 @@ use gyronet::units::WheelSpeed;
 use gyronet::wheels::{StandstillRule, Wheels};
 
 /// Radius of a wheel of the recorded car, m.
-const RADIUS: f64 = 0.289;
+pub const RADIUS: f64 = 0.289;
 /// Front right, rear right, front left, rear left, as places of [`WheelSample::speeds`].
-const PLACES: [usize; WHEELS] = [1, 3, 0, 2];
+pub const PLACES: [usize; WHEELS] = [1, 3, 0, 2];
 const FRONT: [usize; 2] = [0, 2];
 const REAR: [usize; 2] = [1, 3];
 /// A gyro on a standing wheel shows up to 0.04 rad/s; what is too slow to tell is not moving.

@@ -15,10 +15,10 @@ use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::units::Micros;
 
 /// Messages a row.
-const MESSAGES: u64 = 10;
+pub const MESSAGES: u64 = 10;
 /// From one to the next.
-const MESSAGE_US: u64 = PERIOD_US / MESSAGES;
-const BOTH: Fitted = Fitted { imu: true, fog: true };
+pub const MESSAGE_US: u64 = PERIOD_US / MESSAGES;
+pub const BOTH: Fitted = Fitted { imu: true, fog: true };
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut gyro = Gyro { part: Dsp1760::new(Dsp1760Config::DEFAULT), bytes: 0 };
@@ -77,7 +77,7 @@ impl Gyro {
 }
 
 /// A tenth of a row's turn, at `now`.
-fn message(now: u64, sample: &ImuSample) -> Message {
+pub fn message(now: u64, sample: &ImuSample) -> Message {
     let seconds = MESSAGE_US as f64 * 1e-6;
     Message {
         rotation: sample.angular_rate.map(|rate| (rate.rad_per_sec() * seconds) as f32),

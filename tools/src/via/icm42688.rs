@@ -10,10 +10,9 @@ use gyronet::sensor::icm42688::packet::{Packet, Resolution};
 use gyronet::sensor::icm42688::registers as reg;
 use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::units::{Micros, STANDARD_GRAVITY};
-use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// 1/131 deg/s: of its 20 bits the part uses 19 for a rate.
 pub const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
@@ -23,9 +22,9 @@ pub const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
 const RATE_COUNTS: f64 = 2.0;
 const FORCE_COUNTS: f64 = 4.0;
 /// The largest reading; the most negative one would be "no reading".
-const LARGEST: f64 = 524_287.0;
+pub const LARGEST: f64 = 524_287.0;
 /// The part's 16-bit clock wraps.
-const WRAP_US: u64 = 1 << 16;
+pub const WRAP_US: u64 = 1 << 16;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let bus = Bus::default();
@@ -35,7 +34,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut samples = Vec::with_capacity(recording.rows.len());
     for row in &recording.rows {
         let error = |why: String| Part::Icm42688.no_sample(recording, row, why);
-        bus.0.borrow_mut().fifo.extend(packet(&row.sample).emit());
+        bus.fill(packet(&row.sample).emit());
         let sample = part.next_sample().map_err(|e| error(e.to_string()))?;
         let sample = sample.ok_or_else(|| error("its FIFO seems empty".to_owned()))?;
         // The part's clock begins anywhere, and a silence longer than its 65 ms is told by the
@@ -44,12 +43,12 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
         let time = Micros(sample.time.0 + behind / WRAP_US * WRAP_US);
         samples.push(ImuSample { time, ..sample });
     }
-    let bytes = bus.0.borrow().bytes;
+    let bytes = bus.part().bytes;
     Ok((samples, bytes))
 }
 
 /// The packet of a sample, its readings rounded to the part's steps and clipped at its ends.
-fn packet(sample: &ImuSample) -> Packet {
+pub fn packet(sample: &ImuSample) -> Packet {
     let reading = |value: f64, step: f64, counts: f64| {
         Some((libm::round(value / step) * counts).clamp(-LARGEST, LARGEST) as i32)
     };
@@ -97,7 +96,18 @@ impl Simulated {
 
 /// The simulated part, shared by the driver and whoever fills its FIFO.
 #[derive(Debug, Clone, Default)]
-struct Bus(Rc<RefCell<Simulated>>);
+pub struct Bus(Arc<Mutex<Simulated>>);
+
+impl Bus {
+    /// The part puts bytes into its FIFO.
+    pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
+        self.part().fifo.extend(bytes);
+    }
+
+    fn part(&self) -> MutexGuard<'_, Simulated> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 impl ErrorType for Bus {
     type Error = Infallible;
@@ -105,7 +115,7 @@ impl ErrorType for Bus {
 
 impl SpiDevice for Bus {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
-        let mut part = self.0.borrow_mut();
+        let mut part = self.part();
         let mut selected = 0;
         for operation in operations {
             match operation {
@@ -129,7 +139,8 @@ impl SpiDevice for Bus {
     }
 }
 
-struct NoDelay;
+/// Time stands still.
+pub struct NoDelay;
 
 impl DelayNs for NoDelay {
     fn delay_ns(&mut self, _ns: u32) {}

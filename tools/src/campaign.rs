@@ -1,0 +1,214 @@
+//! Faults on purpose: drives as bytes on the board's lines, damaged, and what the board makes of it.
+//!
+//! A [`drive::Drive`] becomes the bytes that a [`part::Part`] and the vehicle's wheels would send;
+//! faults disturb what is measured ([`motion`]) or damage bytes on a line ([`wire`]); the
+//! [`board::Board`], the library's own parts in the order of the image, turns them into bytes of
+//! frames; a [`receiver::Receiver`] reads these as an ECU would. Nothing looks inside.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | told | a receiver of our own messages learns of it: quality, fault bits, E2E, silence of 35 ms |
+//! | marked good | a set of messages that arrives whole, quality good, no fault bit |
+//! | moved | yaw turned in a second, all of it marked good, less the same second of the same drive undamaged, by the accumulated yaw on the bus |
+//! | stated sigma | the expected error that is sent with the last set of that second |
+//! | undetected | yaw has moved by more than the stated sigma, and nothing had told of the fault |
+//! | harmless | nothing told of it, and yaw has not moved by more than the stated sigma |
+//! | error | yaw turned in a good second less the drive's reference: what is left of it without faults is the method's |
+//! | recovery | from the end of the fault to the last time that a receiver was told |
+//!
+//! After a receiver has been told, and from 0.2 s after the last telling on, what counts is by how much
+//! the error of a good second has grown against the same second undamaged: the network's windows
+//! begin at another sample then, and two estimates that are equally good need not be equal.
+
+pub mod board;
+pub mod draw;
+pub mod drive;
+pub mod exceptions;
+pub mod fault;
+pub mod input;
+pub mod judge;
+pub mod motion;
+pub mod part;
+pub mod plot;
+pub mod receiver;
+pub mod report;
+pub mod scene;
+pub mod upsets;
+pub mod wire;
+
+use draw::Draw;
+use drive::Drive;
+use exceptions::{Exception, excepted};
+use fault::{Fault, Kind, Span};
+use gyronet::model::{Blob, GyroNet};
+use judge::Outcome;
+use part::Part;
+use scene::{STATE_EVERY, Scene};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Runs of a small campaign: twelve of each kind alone, and 128 pairs.
+pub const QUICK: usize = 320;
+/// Rows of a run at most: 8 s.
+const ROWS: usize = 800;
+/// Rows of a run after its faults are over, and with those that stay.
+const AFTER: usize = 350;
+const WITH: usize = 400;
+/// Rows before a fault may begin, a second of them to be good in.
+const HEALTHY: usize = 101;
+/// The same where static initialisation is under way.
+const HEALTHY_AT_START: usize = 20;
+/// Every so many runs one is at the start of its drive.
+const START_EVERY: u64 = 8;
+/// Of so many runs [`SINGLE`] are of one fault, the others of two.
+const OF: usize = 5;
+const SINGLE: usize = 3;
+
+/// What to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Runs.
+    pub runs: usize,
+    /// The same seed gives the same runs.
+    pub seed: u64,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// One run.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Its number.
+    pub number: usize,
+    /// Number of the drive.
+    pub drive: usize,
+    /// The part.
+    pub part: Part,
+    /// Where.
+    pub span: Span,
+    /// One or two faults.
+    pub faults: Vec<Fault>,
+    /// What became of it; a panic's text.
+    pub outcome: Result<Outcome, String>,
+}
+
+impl Run {
+    /// What became of it, unless it panicked.
+    #[must_use]
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcome.as_ref().ok()
+    }
+
+    /// The exception that allows it to go undetected.
+    #[must_use]
+    pub fn exception(&self) -> Option<&'static Exception> {
+        let outcome = self.outcome().filter(|outcome| outcome.is_undetected())?;
+        excepted(&self.faults, self.part, outcome.moved)
+    }
+
+    /// A panic, or a fault that went undetected and is not on the list.
+    #[must_use]
+    pub fn is_failure(&self) -> bool {
+        self.outcome().is_none_or(|outcome| outcome.is_undetected() && self.exception().is_none())
+    }
+}
+
+/// Every drive with every part, undamaged.
+#[must_use]
+pub fn scenes<'d>(
+    drives: &'d [Drive],
+    blob: &Blob<'_>,
+    threads: usize,
+    tick: impl Fn() + Sync,
+) -> Vec<Scene<'d>> {
+    let of: Vec<(&Drive, Part)> =
+        drives.iter().flat_map(|drive| Part::ALL.map(|part| (drive, part))).collect();
+    on_threads(
+        threads,
+        of.len(),
+        || GyroNet::new(*blob),
+        |network, n| {
+            let (drive, part) = of[n];
+            let scene = Scene::new(drive, part, network);
+            tick();
+            scene
+        },
+    )
+}
+
+/// Runs the plan; `tick` is called after each run. The runs come in their order.
+#[must_use]
+pub fn run(plan: Plan, scenes: &[Scene<'_>], blob: &Blob<'_>, tick: impl Fn() + Sync) -> Vec<Run> {
+    on_threads(
+        plan.threads,
+        plan.runs,
+        || GyroNet::new(*blob),
+        |network, number| {
+            let run = one(plan.seed, number, scenes, network);
+            tick();
+            run
+        },
+    )
+}
+
+fn one(seed: u64, number: usize, scenes: &[Scene<'_>], network: &mut GyroNet<'_>) -> Run {
+    let mut draw = Draw::new(seed, number as u64);
+    let at = draw.below(scenes.len());
+    let scene = &scenes[at];
+    let last_state = scene.rows().saturating_sub(ROWS) / STATE_EVERY;
+    let at_start = draw.bits().is_multiple_of(START_EVERY);
+    let (state, healthy) =
+        if at_start { (0, HEALTHY_AT_START) } else { (1 + draw.below(last_state), HEALTHY) };
+    let from = (state * STATE_EVERY).min(last_state * STATE_EVERY);
+    let mut span = Span { from, to: (from + ROWS).min(scene.rows()), healthy };
+    let kind = Kind::ALL[number / OF % Kind::ALL.len()];
+    let mut kinds = vec![kind];
+    if number % OF >= SINGLE {
+        kinds.push(draw.pick(&Kind::ALL));
+    }
+    let faults: Vec<Fault> =
+        kinds.iter().map(|kind| Fault::draw(*kind, scene.part, span, &mut draw)).collect();
+    if !at_start {
+        let to = |fault: &Fault| {
+            let end = fault.from + fault.rows;
+            if end < span.to { end + AFTER } else { fault.from + WITH }
+        };
+        span.to = faults.iter().map(to).max().unwrap_or(span.to).min(span.to);
+    }
+    let outcome = catch_unwind(AssertUnwindSafe(|| scene.run(span, &faults, network)));
+    let outcome = outcome.map_err(|panic| {
+        let text = panic.downcast_ref::<String>().cloned();
+        text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap_or_default()
+    });
+    Run { number, drive: at / Part::ALL.len(), part: scene.part, span, faults, outcome }
+}
+
+/// Does `count` things on some threads, each with a tool of its own; gives them in their order.
+fn on_threads<W, T: Send>(
+    threads: usize,
+    count: usize,
+    tool: impl Fn() -> W + Sync,
+    make: impl Fn(&mut W, usize) -> T + Sync,
+) -> Vec<T> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(count)));
+    std::thread::scope(|scope| {
+        for _ in 0..threads.max(1) {
+            scope.spawn(|| {
+                let (mut tool, mut own) = (tool(), Vec::new());
+                loop {
+                    let n = next.fetch_add(1, Ordering::Relaxed);
+                    if n >= count {
+                        break;
+                    }
+                    own.push((n, make(&mut tool, n)));
+                }
+                // A thread that panicked has ended the program already.
+                done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut own);
+            });
+        }
+    });
+    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    done.sort_by_key(|(n, _)| *n);
+    done.into_iter().map(|(_, thing)| thing).collect()
+}

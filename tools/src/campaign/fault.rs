@@ -1,0 +1,261 @@
+//! What is done to a drive, and how it is drawn.
+
+use super::draw::Draw;
+use super::part::Part;
+use serde::Serialize;
+
+/// Kinds of faults.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Messages are lost.
+    Drop,
+    /// Messages come twice.
+    Duplicate,
+    /// One bit of a message is wrong.
+    BitFlip,
+    /// A run of bytes is noise.
+    Burst,
+    /// The end of a message is lost.
+    Truncation,
+    /// A message overtakes those before it.
+    Reordering,
+    /// Nothing comes for a while; then all of it at once, or none of it.
+    Stall,
+    /// The part's clock, and with it its sampling, is too fast or too slow.
+    ClockDrift,
+    /// The part's clock jumps.
+    ClockJump,
+    /// Readings stand still.
+    Stuck,
+    /// The motion is beyond the part's range.
+    Saturation,
+    /// A reading is off by a constant from one sample to the next.
+    BiasStep,
+    /// The part sends no number.
+    NotANumber,
+    /// Wheels spin, or are locked.
+    WheelSlip,
+    /// Wheels have changed places.
+    SwappedWheels,
+    /// The bus is gone: no wheel speeds in, or no frames out.
+    CanLoss,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 16] = [
+        Self::Drop,
+        Self::Duplicate,
+        Self::BitFlip,
+        Self::Burst,
+        Self::Truncation,
+        Self::Reordering,
+        Self::Stall,
+        Self::ClockDrift,
+        Self::ClockJump,
+        Self::Stuck,
+        Self::Saturation,
+        Self::BiasStep,
+        Self::NotANumber,
+        Self::WheelSlip,
+        Self::SwappedWheels,
+        Self::CanLoss,
+    ];
+
+    /// For tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Drop => "drop",
+            Self::Duplicate => "duplicate",
+            Self::BitFlip => "bit flip",
+            Self::Burst => "burst",
+            Self::Truncation => "truncation",
+            Self::Reordering => "reordering",
+            Self::Stall => "stall",
+            Self::ClockDrift => "clock drift",
+            Self::ClockJump => "clock jump",
+            Self::Stuck => "stuck value",
+            Self::Saturation => "saturation",
+            Self::BiasStep => "bias step",
+            Self::NotANumber => "not a number",
+            Self::WheelSlip => "wheel slip",
+            Self::SwappedWheels => "swapped wheels",
+            Self::CanLoss => "CAN loss",
+        }
+    }
+
+    /// Whether it is bytes on a line that are damaged, not what is measured.
+    #[must_use]
+    pub const fn is_on_a_line(self) -> bool {
+        matches!(
+            self,
+            Self::Drop
+                | Self::Duplicate
+                | Self::BitFlip
+                | Self::Burst
+                | Self::Truncation
+                | Self::Reordering
+                | Self::Stall
+                | Self::CanLoss
+        )
+    }
+}
+
+/// A line that bytes come over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Line {
+    /// Of the sensor; where there are two, of the accelerometer.
+    Sensor,
+    /// Of the fibre-optic gyro.
+    Gyro,
+    /// Wheel speeds in, SLCAN.
+    Wheels,
+    /// Frames out, SLCAN.
+    Out,
+}
+
+/// What is affected of a part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axes {
+    /// All six.
+    All,
+    /// All of the gyro.
+    Gyro,
+    /// One: 0 to 2 gyro x, y, z; 3 to 5 accelerometer x, y, z.
+    One(usize),
+}
+
+impl Axes {
+    /// Whether gyro (0 to 2) or accelerometer (3 to 5) axis `axis` is among them.
+    #[must_use]
+    pub fn contains(self, axis: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Gyro => axis < 3,
+            Self::One(one) => one == axis,
+        }
+    }
+}
+
+/// One fault.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fault {
+    /// What.
+    pub kind: Kind,
+    /// Where, for what happens on a line.
+    pub line: Line,
+    /// Row of the drive with which it begins.
+    pub from: usize,
+    /// Rows that it lasts.
+    pub rows: usize,
+    /// Share of the messages that it hits.
+    pub share: f64,
+    /// Clock: microseconds of a jump, ppm of a drift. Bias: rad/s or m/s^2. Burst: bytes.
+    /// Reordering: places. Slip: factor of the wheels' speed.
+    pub size: f64,
+    /// Of the sensor.
+    pub axes: Axes,
+    /// One of a few forms of the same: see where it is used.
+    pub form: usize,
+    /// For what is drawn while it lasts.
+    pub seed: u64,
+}
+
+/// Where a run lies in its drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Span {
+    /// First row.
+    pub from: usize,
+    /// One behind the last.
+    pub to: usize,
+    /// Rows before which no fault begins.
+    pub healthy: usize,
+}
+
+impl Fault {
+    /// Draws one of a kind.
+    #[must_use]
+    pub fn draw(kind: Kind, part: Part, span: Span, draw: &mut Draw) -> Self {
+        let lines: &[Line] = match (kind, part) {
+            (Kind::CanLoss, _) => &[Line::Wheels, Line::Out],
+            // What the part sends is what the campaign is about: every second fault is there.
+            (_, Part::Dsp1760) => &[Line::Gyro, Line::Gyro, Line::Sensor, Line::Wheels, Line::Out],
+            _ => &[Line::Sensor, Line::Sensor, Line::Wheels, Line::Out],
+        };
+        let mut fault = Self {
+            kind,
+            line: draw.pick(lines),
+            from: span.from + span.healthy + draw.below(100),
+            rows: draw.log_between(1.0, 200.0) as usize,
+            share: if draw.chance(0.3) { 1.0 } else { draw.log_between(0.02, 1.0) },
+            size: 0.0,
+            axes: draw.pick(&[Axes::One(2), Axes::One(2), Axes::Gyro, Axes::All]),
+            form: draw.below(4),
+            seed: draw.bits(),
+        };
+        let to_the_end = span.to - fault.from;
+        match kind {
+            Kind::Burst => fault.size = draw.log_between(2.0, 64.0).floor(),
+            Kind::Reordering => fault.size = draw.log_between(1.0, 4.0).floor(),
+            Kind::ClockDrift => {
+                fault.rows = to_the_end;
+                fault.size = draw.sign() * draw.log_between(10.0, 20_000.0);
+            }
+            Kind::ClockJump => {
+                fault.rows = to_the_end;
+                fault.size = draw.sign() * draw.log_between(1e3, 1e7);
+            }
+            Kind::Stuck | Kind::Saturation => {
+                fault.rows = draw.log_between(1.0, 300.0) as usize;
+                fault.axes = if draw.chance(0.5) { fault.axes } else { Axes::One(draw.below(6)) };
+            }
+            Kind::BiasStep => {
+                fault.rows = to_the_end;
+                fault.axes = Axes::One(if draw.chance(0.7) { 2 } else { draw.below(6) });
+                let largest = if fault.axes.contains(3 + fault.form % 3) { 5.0 } else { 0.35 };
+                fault.size = draw.sign() * draw.log_between(1e-5, largest);
+            }
+            Kind::NotANumber => fault.axes = Axes::One(draw.below(6)),
+            Kind::WheelSlip => {
+                fault.rows = draw.log_between(5.0, 300.0) as usize;
+                fault.size = if draw.chance(0.5) { 0.0 } else { draw.log_between(1.1, 4.0) };
+            }
+            Kind::SwappedWheels => fault.rows = to_the_end,
+            Kind::CanLoss => {
+                fault.rows = draw.log_between(2.0, 300.0) as usize;
+                fault.share = 1.0;
+            }
+            Kind::Drop | Kind::Duplicate | Kind::BitFlip | Kind::Truncation | Kind::Stall => {}
+        }
+        fault
+    }
+
+    /// Whether it is there in a row.
+    #[must_use]
+    pub fn holds(&self, row: usize) -> bool {
+        (self.from..self.from + self.rows).contains(&row)
+    }
+
+    /// What is drawn while it lasts.
+    #[must_use]
+    pub fn draw_on(&self) -> Draw {
+        Draw::new(self.seed, 0)
+    }
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { kind, line, from, rows, share, size, axes, form, .. } = self;
+        write!(f, "{}", kind.name())?;
+        if kind.is_on_a_line() {
+            write!(f, " on line {line:?}, {:.0} % of the messages", 100.0 * share)?;
+        } else {
+            write!(f, " of {axes:?}")?;
+        }
+        write!(f, ", size {size:.3e}, form {form}, rows {from} to {}", from + rows)
+    }
+}

@@ -1,0 +1,239 @@
+//! The board's end of the sensor's line: bytes in, samples out, by the library's parsers.
+
+use super::fault::Line;
+use super::part::{ADIS, Part};
+use super::wire::Message;
+use crate::via::dsp1760::BOTH;
+use crate::via::icm42688::{Bus, NoDelay, WRAP_US};
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use gyronet::align::streams::Streams;
+use gyronet::sample::ImuSample;
+use gyronet::sensor::adis16465::{Adis16465, BURST};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
+use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
+use gyronet::sensor::xsens::Mti;
+use gyronet::units::Micros;
+use std::convert::Infallible;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Packets that the board fetches from a FIFO at once.
+const MAX_FETCHED: usize = 32;
+
+/// Parser or driver, with its state.
+#[derive(Debug, Clone)]
+pub enum Input {
+    /// Of [`Part::Xsens`].
+    Xsens(Box<Mti>),
+    /// Of [`Part::Dsp1760`].
+    Dsp1760(Box<(Dsp1760, Mti, Streams)>),
+    /// Of [`Part::Icm42688`].
+    Icm42688(Fifo),
+    /// Of [`Part::Adis16465`].
+    Adis16465(Bursts),
+}
+
+/// What came of some bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Delivered {
+    /// A sample.
+    Sample(ImuSample),
+    /// The parser says that something is wrong.
+    Error,
+}
+
+impl Input {
+    /// Nothing received yet.
+    #[must_use]
+    pub fn new(part: Part) -> Self {
+        match part {
+            Part::Xsens => Self::Xsens(Box::default()),
+            Part::Dsp1760 => Self::Dsp1760(Box::new((
+                Dsp1760::new(Dsp1760Config::DEFAULT),
+                Mti::new(),
+                Streams::new(BOTH),
+            ))),
+            Part::Icm42688 => Self::Icm42688(Fifo::new(None)),
+            Part::Adis16465 => Self::Adis16465(Bursts::new(None)),
+        }
+    }
+
+    /// Takes a message's bytes at `now`.
+    pub fn receive(&mut self, message: &Message, now: Micros) -> Vec<Delivered> {
+        let mut delivered = Vec::new();
+        match self {
+            Self::Xsens(mti) => {
+                for byte in &message.bytes {
+                    mti.push(*byte);
+                    delivered.extend(std::iter::from_fn(|| mti.next_sample()).map(Delivered::from));
+                }
+            }
+            Self::Dsp1760(parts) => {
+                let (gyro, mti, streams) = &mut **parts;
+                let mut wrong = 0;
+                for byte in &message.bytes {
+                    if message.line == Line::Gyro {
+                        gyro.push(*byte);
+                        for sample in std::iter::from_fn(|| gyro.next_sample()) {
+                            let taken = sample.is_ok_and(|sample| streams.push_fog(now, sample).is_ok());
+                            wrong += usize::from(!taken);
+                        }
+                    } else {
+                        mti.push(*byte);
+                        for sample in std::iter::from_fn(|| mti.next_sample()) {
+                            let taken = sample.is_ok_and(|sample| streams.push_imu(now, sample).is_ok());
+                            wrong += usize::from(!taken);
+                        }
+                    }
+                }
+                delivered.extend(std::iter::repeat_n(Delivered::Error, wrong));
+            }
+            Self::Icm42688(fifo) => fifo.receive(&message.bytes, &mut delivered),
+            Self::Adis16465(bursts) => delivered.push(bursts.receive(&message.bytes, now)),
+        }
+        delivered
+    }
+
+    /// What has become due by now.
+    pub fn poll(&mut self, now: Micros) -> Vec<Delivered> {
+        let Self::Dsp1760(parts) = self else { return Vec::new() };
+        let (_, _, streams) = &mut **parts;
+        let steps = std::iter::from_fn(|| streams.next_step(now));
+        let samples = steps.map(|step| {
+            // A rate is that of the fibre-optic gyro or none; and what came too late for its step,
+            // or on the other side of a clock's jump, is missing in it.
+            let events = step.events;
+            let whole = events.increments.late + events.fog.jumps + events.imu.jumps == 0;
+            let [x, y, z] = [0, 1, 2].map(|axis| step.fog.rate(axis));
+            match (step.imu, x, y, z) {
+                (Some((sample, _)), Some(x), Some(y), Some(z)) if whole => {
+                    Delivered::Sample(ImuSample { time: step.time, angular_rate: [x, y, z], ..sample })
+                }
+                _ => Delivered::Error,
+            }
+        });
+        samples.collect()
+    }
+
+    /// Intact frames' opposites, as far as the parsers count them.
+    #[must_use]
+    pub fn bad_frames(&self) -> u32 {
+        match self {
+            Self::Xsens(mti) => mti.bad_checksums(),
+            Self::Dsp1760(parts) => {
+                parts.0.bad_checksums() + parts.0.counters().lost + parts.1.bad_checksums()
+            }
+            Self::Icm42688(_) | Self::Adis16465(_) => 0,
+        }
+    }
+}
+
+impl<E> From<Result<ImuSample, E>> for Delivered {
+    fn from(sample: Result<ImuSample, E>) -> Self {
+        sample.map_or(Self::Error, Self::Sample)
+    }
+}
+
+/// An ICM-42688-P on its simulated bus.
+#[derive(Debug)]
+pub struct Fifo {
+    driver: Icm42688<Bus>,
+    bus: Bus,
+    /// The last good packet and its time.
+    last: Option<(Vec<u8>, u64)>,
+    /// What the driver's clock began at.
+    epoch: u64,
+}
+
+impl Fifo {
+    /// A driver has state that cannot be copied: a new one begins with the last packet.
+    fn new(last: Option<(Vec<u8>, u64)>) -> Self {
+        let bus = Bus::default();
+        let driver = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay);
+        let mut fifo = Self {
+            driver: driver.expect("a simulated part that is well"),
+            bus,
+            last: None,
+            epoch: last.as_ref().map_or(0, |(_, time)| time - time % WRAP_US),
+        };
+        if let Some((packet, _)) = &last {
+            fifo.receive(packet, &mut Vec::new());
+        }
+        fifo.last = last;
+        fifo
+    }
+
+    fn receive(&mut self, bytes: &[u8], delivered: &mut Vec<Delivered>) {
+        self.bus.fill(bytes.iter().copied());
+        for _ in 0..MAX_FETCHED {
+            match self.driver.next_sample() {
+                Ok(None) => break,
+                Ok(Some(sample)) => {
+                    let time = Micros(sample.time.0 + self.epoch);
+                    self.last = Some((bytes.to_vec(), time.0));
+                    delivered.push(Delivered::Sample(ImuSample { time, ..sample }));
+                }
+                Err(_) => delivered.push(Delivered::Error),
+            }
+        }
+    }
+}
+
+impl Clone for Fifo {
+    fn clone(&self) -> Self {
+        Self::new(self.last.clone())
+    }
+}
+
+/// An ADIS16465 on its simulated bus.
+#[derive(Debug)]
+pub struct Bursts {
+    driver: Adis16465<Answer>,
+    answer: Answer,
+    last: Option<[u8; BURST]>,
+}
+
+impl Bursts {
+    fn new(last: Option<[u8; BURST]>) -> Self {
+        let answer = Answer::default();
+        let mut bursts = Self { driver: Adis16465::new(answer.clone(), ADIS), answer, last: None };
+        if let Some(bytes) = last {
+            bursts.receive(&bytes, Micros(0));
+        }
+        bursts
+    }
+
+    /// What the part does not send of a burst reads as ones.
+    fn receive(&mut self, bytes: &[u8], now: Micros) -> Delivered {
+        let mut burst = [0xFF; BURST];
+        burst.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
+        *self.answer.0.lock().unwrap_or_else(PoisonError::into_inner) = burst;
+        self.last = Some(burst);
+        self.driver.read(now).into()
+    }
+}
+
+impl Clone for Bursts {
+    fn clone(&self) -> Self {
+        Self::new(self.last)
+    }
+}
+
+/// Answers every read with the same bytes.
+#[derive(Debug, Clone, Default)]
+struct Answer(Arc<Mutex<[u8; BURST]>>);
+
+impl ErrorType for Answer {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Answer {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let burst = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        for operation in operations {
+            if let Operation::Read(to) = operation {
+                to.iter_mut().zip(burst).for_each(|(to, byte)| *to = byte);
+            }
+        }
+        Ok(())
+    }
+}

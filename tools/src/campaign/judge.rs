@@ -1,0 +1,202 @@
+//! A run held against the undamaged one.
+
+use super::receiver::{Seen, Told};
+use gyronet::sample::RATE_HZ;
+use serde::Serialize;
+
+/// Rows of the second over which yaw is compared.
+const SECOND: usize = RATE_HZ as usize;
+/// A sample that was sent as not good owes its estimate to the next ones; so many rows after the
+/// last telling that is paid.
+const PAID: usize = 20;
+const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
+
+/// What a receiver of the undamaged run has of each row.
+#[derive(Debug, Clone, Default)]
+pub struct Baseline {
+    rows: Vec<Row>,
+    /// True yaw at the sample that each row's message tells of, rad.
+    truth: Option<Vec<f64>>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Row {
+    told: Told,
+    yaw: Option<i32>,
+    /// Rows in a row, up to this one, that were good.
+    good: usize,
+    events: u64,
+}
+
+/// What became of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Outcome {
+    /// From the fault's first effect to the first message (or lack of one) that told of it, s.
+    pub told_after: Option<f64>,
+    /// The board has counted something; a diagnosis would see it.
+    pub counted: bool,
+    /// Largest yaw moved in a second all marked good, before anything was told, rad.
+    pub moved: f64,
+    /// The same over the expected error that was sent with it.
+    pub moved_sigmas: f64,
+    /// From 0.2 s after the last telling on: by how much the error of a good second is larger than
+    /// that of the same second undamaged, rad; where there is no reference, how far it was moved.
+    pub grown: f64,
+    /// The same over the expected error that was sent with it.
+    pub grown_sigmas: f64,
+    /// Largest error against the true yaw in a second all marked good, rad.
+    pub error: f64,
+    /// From the end of the fault to the last that was told of it, s; 0 where that was before.
+    pub recovery: f64,
+    /// It was still told of at the end.
+    pub not_recovered: bool,
+}
+
+impl Outcome {
+    /// Whether the fault moved yaw by more than the expected error sent with it, and nothing
+    /// had told of it by then.
+    #[must_use]
+    pub fn is_undetected(&self) -> bool {
+        self.moved_sigmas > 1.0
+    }
+
+    /// Nothing told of it, and it did nothing that counts.
+    #[must_use]
+    pub fn is_harmless(&self) -> bool {
+        self.told_after.is_none() && !self.is_undetected()
+    }
+}
+
+/// Of one run: where it begins, and when the fault is there.
+#[derive(Debug, Clone, Copy)]
+pub struct Times {
+    /// First row of the run.
+    pub from: usize,
+    /// One behind the last row.
+    pub to: usize,
+    /// When the fault first did something, microseconds.
+    pub begin: u64,
+    /// When it was over; the run's end where it lasts.
+    pub end: u64,
+    /// When the run ends.
+    pub last: u64,
+}
+
+impl Baseline {
+    /// From all that was seen of a run of so many rows; `events` after each of them.
+    #[must_use]
+    pub fn new(count: usize, seen: &[Seen], events: &[u64], truth: Option<&[f64]>, lag: usize) -> Self {
+        let mut rows = vec![Row::default(); count];
+        for (row, events) in rows.iter_mut().zip(events) {
+            row.events = *events;
+        }
+        for seen in seen {
+            let Some(set) = seen.set else { continue };
+            rows[set.row].told = seen.told;
+            rows[set.row].yaw = Some(set.yaw);
+        }
+        let mut good = 0;
+        for row in &mut rows {
+            good = if row.yaw.is_some() && row.told.is_nothing() { good + 1 } else { 0 };
+            row.good = good;
+        }
+        let truth = truth.map(|yaw| (0..count).map(|row| yaw[row.saturating_sub(lag)]).collect());
+        Self { rows, truth }
+    }
+
+    /// What the board had counted when a row was over.
+    #[must_use]
+    pub fn events(&self, row: usize) -> u64 {
+        self.rows.get(row).map_or(0, |row| row.events)
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Share of the rows with a whole good second up to them.
+    #[must_use]
+    pub fn good_share(&self) -> f64 {
+        let good = self.rows.iter().filter(|row| row.good > SECOND).count();
+        good as f64 / self.rows.len().max(1) as f64
+    }
+
+    /// Judges what was seen of a damaged run.
+    #[must_use]
+    pub fn judge(&self, seen: &[Seen], times: Times) -> Outcome {
+        let mut outcome = Outcome::default();
+        // Yaw moved up to each row of the run, where that row was good, and error of the yaw.
+        let mut moved = vec![None; self.rows.len()];
+        let mut yaws = vec![None; self.rows.len()];
+        let before = times.from.saturating_sub(SECOND + 1)..times.from;
+        for row in before {
+            moved[row] = (self.rows[row].good > 0).then_some(0);
+            yaws[row] = self.rows[row].yaw;
+        }
+        let mut good = times.from.checked_sub(1).map_or(0, |row| self.rows[row].good);
+        let mut last_row = times.from.wrapping_sub(1);
+        let (mut last_told, mut told_row) = (None, 0);
+        for seen in seen {
+            let undamaged = seen.set.map_or(Told::default(), |set| self.rows[set.row].told);
+            if !seen.told.beyond(undamaged).is_nothing() && seen.at >= times.begin {
+                let after = (seen.at - times.begin) as f64 * 1e-6;
+                outcome.told_after.get_or_insert(after);
+                last_told = Some(seen.at);
+                told_row = seen.set.map_or(last_row, |set| set.row);
+            }
+            let Some(set) = seen.set else {
+                good = 0;
+                continue;
+            };
+            let connected = set.row == last_row.wrapping_add(1);
+            last_row = set.row;
+            let base = self.rows[set.row].yaw;
+            good = match (seen.told.is_nothing(), connected) {
+                (true, true) => good + 1,
+                (true, false) => 1,
+                (false, _) => 0,
+            };
+            moved[set.row] = base.map(|base| set.yaw.wrapping_sub(base));
+            yaws[set.row] = Some(set.yaw);
+            if good <= SECOND || set.row < SECOND {
+                continue;
+            }
+            let start = set.row - SECOND;
+            let error = |yaws: [Option<i32>; 2]| {
+                let truth = self.truth.as_ref()?;
+                let turned = f64::from(yaws[1]?.wrapping_sub(yaws[0]?)) * RADIANS;
+                Some((turned - (truth[set.row] - truth[start])).abs())
+            };
+            let own = error([yaws[start], Some(set.yaw)]);
+            outcome.error = outcome.error.max(own.unwrap_or_default());
+            let (Some(now), Some(then), Some(sigma)) = (moved[set.row], moved[start], set.sigma) else {
+                continue;
+            };
+            let by = f64::from(now.wrapping_sub(then)).abs() * RADIANS;
+            if outcome.told_after.is_none() {
+                outcome.moved = outcome.moved.max(by);
+                outcome.moved_sigmas = outcome.moved_sigmas.max(by / sigma);
+            } else if start >= told_row.saturating_add(PAID) {
+                let undamaged = error([self.rows[start].yaw, self.rows[set.row].yaw]);
+                let grown =
+                    own.zip(undamaged).map_or(by, |(own, undamaged)| (own - undamaged).clamp(0.0, by));
+                outcome.grown = outcome.grown.max(grown);
+                outcome.grown_sigmas = outcome.grown_sigmas.max(grown / sigma);
+            }
+        }
+        if let Some(last_told) = last_told {
+            outcome.recovery = last_told.saturating_sub(times.end) as f64 * 1e-6;
+            // Half a second of nothing wrong is recovery.
+            outcome.not_recovered = times.end < times.last && last_told + 500_000 > times.last;
+        }
+        outcome
+    }
+}

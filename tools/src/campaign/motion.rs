@@ -1,0 +1,124 @@
+//! Faults of what is measured: in the part, in its clock, at the wheels.
+
+use super::drive::Reading;
+use super::fault::{Fault, Kind};
+use super::part::Part;
+use gyronet::units::{AngularRate, SpecificForce};
+
+/// Lets a fault loose on the readings of the rows from `first_row` on; gives when it first did
+/// something. `gyro_bias`: what is no motion in the readings.
+pub fn disturb(
+    readings: &mut [Reading],
+    first_row: usize,
+    fault: &Fault,
+    part: Part,
+    gyro_bias: [AngularRate; 3],
+) -> Option<u64> {
+    let begin = readings.get(fault.from - first_row).copied();
+    let mut draw = fault.draw_on();
+    let mut first = None;
+    for (row, reading) in (first_row..).zip(readings.iter_mut()).filter(|(row, _)| fault.holds(*row)) {
+        let Some(begin) = begin else { break };
+        if fault.kind == Kind::NotANumber && row > fault.from && !draw.chance(fault.share) {
+            continue;
+        }
+        let at = reading.at;
+        match fault.kind {
+            Kind::ClockDrift => drift(reading, &begin, fault.size * 1e-6, part, gyro_bias),
+            Kind::ClockJump => reading.stamp_us += fault.size as i64,
+            Kind::Stuck => hold(reading, &begin, fault),
+            Kind::Saturation => {
+                for (axis, saturated) in reading.saturated.iter_mut().enumerate() {
+                    *saturated |= fault.axes.contains(axis);
+                }
+            }
+            Kind::BiasStep => shift(reading, fault),
+            Kind::NotANumber => {
+                reading.no_number =
+                    (0..6).find(|axis| fault.axes.contains(*axis)).map(|axis| (axis, fault.form));
+            }
+            Kind::WheelSlip => slip(reading, fault),
+            Kind::SwappedWheels => {
+                let [fl, fr, rl, rr] = reading.wheels;
+                reading.wheels = match fault.form {
+                    0 => [fr, fl, rr, rl],
+                    1 => [rl, rr, fl, fr],
+                    2 => [fr, fl, rl, rr],
+                    _ => [rr, rl, fr, fl],
+                };
+            }
+            // These are on a line.
+            Kind::Drop
+            | Kind::Duplicate
+            | Kind::BitFlip
+            | Kind::Burst
+            | Kind::Truncation
+            | Kind::Reordering
+            | Kind::Stall
+            | Kind::CanLoss => break,
+        }
+        first.get_or_insert(at);
+    }
+    first
+}
+
+/// A part whose clock is fast by a share samples that much more often, and does not know it.
+///
+/// The rows then tell of a vehicle that does all it does in less time, and turns faster by that
+/// share: so row n of the disturbed drive has turned as far as row n of the undisturbed one, and
+/// they can be compared. Increments are angles whatever the clock: there the stamps alone drift.
+fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bias: [AngularRate; 3]) {
+    if part == Part::Dsp1760 {
+        reading.stamp_us += ((reading.at - begin.at) as f64 * share) as i64;
+        return;
+    }
+    // Two such faults: where the rows are by now is what counts.
+    let since = reading.at.saturating_sub(begin.at) as f64;
+    reading.at = begin.at + (since / (1.0 + share)) as u64;
+    for (rate, bias) in reading.sample.angular_rate.iter_mut().zip(gyro_bias) {
+        let motion = f64::from(rate.0.saturating_sub(bias.0));
+        rate.0 = rate.0.saturating_add((motion * share) as i32);
+    }
+}
+
+/// The readings stay as they were when the fault began.
+fn hold(reading: &mut Reading, begin: &Reading, fault: &Fault) {
+    for axis in 0..3 {
+        if fault.axes.contains(axis) {
+            reading.sample.angular_rate[axis] = begin.sample.angular_rate[axis];
+        }
+        if fault.axes.contains(3 + axis) {
+            reading.sample.specific_force[axis] = begin.sample.specific_force[axis];
+        }
+    }
+}
+
+/// Gyro axes by rad/s, accelerometer axes by m/s^2.
+fn shift(reading: &mut Reading, fault: &Fault) {
+    for axis in 0..3 {
+        if fault.axes.contains(axis) {
+            let rate = &mut reading.sample.angular_rate[axis].0;
+            *rate = rate.saturating_add((fault.size * f64::from(AngularRate::PER_RAD_PER_SEC)) as i32);
+        }
+        if fault.axes.contains(3 + axis) {
+            let force = &mut reading.sample.specific_force[axis].0;
+            *force = force.saturating_add((fault.size * f64::from(SpecificForce::PER_METRE_PER_SEC2)) as i32);
+        }
+    }
+}
+
+/// All wheels, the rear axle, the front axle, or one.
+fn slip(reading: &mut Reading, fault: &Fault) {
+    for (wheel, speed) in reading.wheels.iter_mut().enumerate() {
+        let slips = match fault.form {
+            0 => true,
+            1 => wheel >= 2,
+            2 => wheel < 2,
+            _ => wheel == 0,
+        };
+        if let (true, Some(speed)) = (slips, speed.as_mut()) {
+            // A standing vehicle's wheels may spin as well: 5 km/h of it.
+            *speed = if fault.size > 0.0 { *speed * fault.size + 5.0 } else { 0.0 };
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! An ECU that reads our own yaw messages: what it is told, and what it takes for good.
+//!
+//! It checks E2E, takes a set of rate, angle and detail only where all three carry the same
+//! sample counter, and takes silence for a fault.
+
+use super::fault::Line;
+use super::wire::Message;
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::config::Config;
+use gyronet::can::e2e::{Checker, Verdict};
+use gyronet::can::slcan::assembler::LineAssembler;
+use gyronet::can::yaw::{AngleMessage, DetailMessage, Quality, RateMessage, SIGMA_UNKNOWN};
+use gyronet::can::{DataFrame, slcan};
+
+/// Without a whole set for so long the sender is taken for dead: three periods and a half.
+pub const TIMEOUT_US: u64 = 35_000;
+/// So many lost messages in a row are loss; more are disorder.
+const MAX_DELTA: u8 = 10;
+
+/// What a receiver is told, a bit each: 0 to 7 the fault byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Told(pub u32);
+
+impl Told {
+    /// Quality other than good.
+    pub const NOT_GOOD: Self = Self(1 << 8);
+    /// Quality "not to be used".
+    pub const UNUSABLE: Self = Self(1 << 9);
+    /// Checksum, or no frame at all.
+    pub const DAMAGED: Self = Self(1 << 10);
+    /// Messages are missing, come twice, or in disorder.
+    pub const SEQUENCE: Self = Self(1 << 11);
+    /// No set for [`TIMEOUT_US`].
+    pub const SILENT: Self = Self(1 << 12);
+
+    /// What this says and another one does not.
+    #[must_use]
+    pub const fn beyond(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Whether it says nothing.
+    #[must_use]
+    pub const fn is_nothing(self) -> bool {
+        self.0 == 0
+    }
+
+    fn add(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+}
+
+/// One set of messages.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Set {
+    /// Row of the sample with which it was sent.
+    pub row: usize,
+    /// Accumulated yaw, 360 deg / 2^32.
+    pub yaw: i32,
+    /// Expected error over a second, rad; `None` where not known.
+    pub sigma: Option<f64>,
+}
+
+/// Something that the receiver notices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// When, microseconds of the board's clock.
+    pub at: u64,
+    /// What it is told.
+    pub told: Told,
+    /// The set, where there is one.
+    pub set: Option<Set>,
+}
+
+/// The ECU.
+#[derive(Debug, Clone)]
+pub struct Receiver {
+    messages: Vec<(Id, Checker)>,
+    assembler: LineAssembler,
+    rate: Option<(u8, RateMessage)>,
+    angle: Option<(u8, AngleMessage)>,
+    last: Option<u64>,
+}
+
+impl Receiver {
+    /// Nothing received yet.
+    #[must_use]
+    pub fn new() -> Self {
+        let yaw = Config::DEFAULT.settings().yaw.into_iter().flat_map(|yaw| {
+            let ids = yaw.ids.map(|id| StandardId::new(id).map(Id::Standard));
+            let checkers = yaw.e2e.profiles().map(|profile| Checker::new(profile, MAX_DELTA));
+            ids.into_iter().flatten().zip(checkers)
+        });
+        Self { messages: yaw.collect(), assembler: LineAssembler::new(), rate: None, angle: None, last: None }
+    }
+
+    /// Takes a line's bytes; what it notices is appended.
+    pub fn receive(&mut self, message: &Message, seen: &mut Vec<Seen>) {
+        debug_assert_eq!(message.line, Line::Out);
+        self.time(message.at, seen);
+        for byte in &message.bytes {
+            let Some(line) = self.assembler.push(*byte) else { continue };
+            // Answers to what the wheels' line says are no frames; a frame that begins as one is
+            // missed by its counter.
+            let line = line.map(|line| line.strip_prefix(b"\x07").unwrap_or(line));
+            let frame = match line {
+                Ok([b't' | b'T', ..]) => line.ok().and_then(|line| slcan::parse::<DataFrame>(line).ok()),
+                Ok(_) => continue,
+                Err(_) => None,
+            };
+            match frame {
+                Some(frame) => seen.extend(self.frame(&frame, message)),
+                None => seen.push(Seen { at: message.at, told: Told::DAMAGED, set: None }),
+            }
+        }
+    }
+
+    /// Lets time pass.
+    pub fn time(&mut self, now: u64, seen: &mut Vec<Seen>) {
+        if let Some(last) = self.last
+            && now > last + TIMEOUT_US
+        {
+            seen.push(Seen { at: last + TIMEOUT_US, told: Told::SILENT, set: None });
+            self.last = Some(now);
+        }
+    }
+
+    fn frame(&mut self, frame: &DataFrame, message: &Message) -> Option<Seen> {
+        let (id, data) = (frame.id(), frame.data());
+        let index = self.messages.iter().position(|(own, _)| *own == id)?;
+        let mut seen = Seen { at: message.at, told: Told::default(), set: None };
+        match self.messages[index].1.check(data) {
+            Err(_) => seen.told.add(Told::DAMAGED),
+            Ok(Verdict::First | Verdict::Ok) => {}
+            Ok(Verdict::Lost(_) | Verdict::Repeated | Verdict::WrongSequence { .. }) => {
+                seen.told.add(Told::SEQUENCE);
+            }
+        }
+        if !seen.told.is_nothing() {
+            return Some(seen);
+        }
+        let counter = data[2];
+        match index {
+            0 => self.rate = RateMessage::parse(data).ok().map(|rate| (counter, rate)),
+            1 => self.angle = AngleMessage::parse(data).ok().map(|angle| (counter, angle)),
+            _ => return self.set(counter, data, message.row, seen),
+        }
+        None
+    }
+
+    fn set(&mut self, counter: u8, data: &[u8], row: usize, mut seen: Seen) -> Option<Seen> {
+        let detail = DetailMessage::parse(data).ok()?;
+        let (rate, angle) = (self.rate.take()?, self.angle.take()?);
+        if [rate.0, angle.0] != [counter; 2] {
+            return None;
+        }
+        let ((_, rate), (_, angle)) = (rate, angle);
+        self.last = Some(seen.at);
+        seen.told.add(Told(angle.faults.0.into()));
+        if rate.quality != Quality::Good {
+            seen.told.add(Told::NOT_GOOD);
+        }
+        if rate.quality == Quality::Unusable {
+            seen.told.add(Told::UNUSABLE);
+        }
+        // 1e-5 deg/s over a second.
+        let sigma = (detail.sigma != SIGMA_UNKNOWN).then(|| (f64::from(detail.sigma) * 1e-5).to_radians());
+        seen.set = Some(Set { row, yaw: angle.yaw, sigma });
+        Some(seen)
+    }
+}
+
+impl Default for Receiver {
+    fn default() -> Self {
+        Self::new()
+    }
+}

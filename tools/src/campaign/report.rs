@@ -1,0 +1,216 @@
+//! What a campaign has shown: a line for each kind of fault.
+
+use super::Run;
+use super::exceptions::EXCEPTIONS;
+use super::fault::{Fault, Kind};
+use serde::Serialize;
+use std::fmt;
+
+/// Median and most.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Spread {
+    /// Half of them are below.
+    pub median: f64,
+    /// The largest.
+    pub most: f64,
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let median = values.get(values.len() / 2).copied().unwrap_or_default();
+        Self { median, most: values.last().copied().unwrap_or_default() }
+    }
+}
+
+/// All runs of one kind of fault.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Line {
+    /// The kind.
+    pub name: String,
+    /// Runs.
+    pub runs: usize,
+    /// A receiver was told.
+    pub told: usize,
+    /// Nothing told of it, and it did nothing that counts.
+    pub harmless: usize,
+    /// Of those, the board has counted something.
+    pub counted: usize,
+    /// Undetected, and on the named list.
+    pub excepted: usize,
+    /// Undetected.
+    pub undetected: usize,
+    /// Panics.
+    pub panics: usize,
+    /// From the first effect to the telling, s.
+    pub told_after: Spread,
+    /// Most that yaw was moved in a good second before anything was told, the named ones left
+    /// out, rad and stated sigmas.
+    pub moved: f64,
+    /// In stated sigmas.
+    pub moved_sigmas: f64,
+    /// Most that the error of a good second has grown after the last telling, stated sigmas.
+    pub grown_sigmas: f64,
+    /// Runs in which that was more than one sigma.
+    pub grown: usize,
+    /// Largest error against the reference in a good second, rad.
+    pub error: f64,
+    /// From the end of the fault, s.
+    pub recovery: Spread,
+    /// Still told of at the end of the run, though the fault was over.
+    pub not_recovered: usize,
+}
+
+/// An exception and what came under it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Excepted {
+    /// Its name.
+    pub name: &'static str,
+    /// Why nothing sees it.
+    pub why: &'static str,
+    /// Runs.
+    pub runs: usize,
+    /// The most that they moved yaw in a good second, rad.
+    pub moved: f64,
+}
+
+/// A run that must not be.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failure {
+    /// Its number.
+    pub run: usize,
+    /// The drive.
+    pub drive: String,
+    /// The part.
+    pub part: &'static str,
+    /// What was done to it.
+    pub faults: Vec<Fault>,
+    /// What is wrong.
+    pub what: String,
+}
+
+/// Everything.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// The seed.
+    pub seed: u64,
+    /// Single faults by kind, then pairs, then all.
+    pub lines: Vec<Line>,
+    /// The named list.
+    pub exceptions: Vec<Excepted>,
+    /// What must not be.
+    pub failures: Vec<Failure>,
+}
+
+impl Report {
+    /// Sums up; `drives` are their names.
+    #[must_use]
+    pub fn new(seed: u64, drives: &[String], runs: &[Run]) -> Self {
+        let single = |run: &&Run| run.faults.len() == 1;
+        let of = |kind| runs.iter().filter(single).filter(move |run| run.faults[0].kind == kind);
+        let mut lines: Vec<Line> = Kind::ALL.iter().map(|kind| line(kind.name(), of(*kind))).collect();
+        lines.push(line("pairs of these", runs.iter().filter(|run| run.faults.len() > 1)));
+        lines.push(line("all", runs.iter()));
+        let exceptions = EXCEPTIONS.iter().map(|exception| {
+            let own = || runs.iter().filter(|run| run.exception().is_some_and(|e| e.name == exception.name));
+            let moved = own().filter_map(Run::outcome).map(|outcome| outcome.moved).fold(0.0, f64::max);
+            Excepted { name: exception.name, why: exception.why, runs: own().count(), moved }
+        });
+        let failures = runs.iter().filter(|run| run.is_failure()).map(|run| Failure {
+            run: run.number,
+            drive: drives[run.drive].clone(),
+            part: run.part.name(),
+            faults: run.faults.clone(),
+            what: match &run.outcome {
+                Err(panic) => format!("panic: {panic}"),
+                Ok(outcome) => format!("{:.2e} rad, {:.1} sigma", outcome.moved, outcome.moved_sigmas),
+            },
+        });
+        Self { seed, lines, exceptions: exceptions.collect(), failures: failures.collect() }
+    }
+}
+
+fn line<'r>(name: &str, runs: impl Iterator<Item = &'r Run>) -> Line {
+    let mut line = Line { name: name.to_owned(), ..Line::default() };
+    let (mut told_after, mut recovery) = (Vec::new(), Vec::new());
+    for run in runs {
+        line.runs += 1;
+        let Some(outcome) = run.outcome() else {
+            line.panics += 1;
+            continue;
+        };
+        told_after.extend(outcome.told_after);
+        line.told += usize::from(outcome.told_after.is_some() && !outcome.is_undetected());
+        line.harmless += usize::from(outcome.is_harmless());
+        line.counted += usize::from(outcome.is_harmless() && outcome.counted);
+        let excepted = run.exception().is_some();
+        line.excepted += usize::from(excepted);
+        line.undetected += usize::from(run.is_failure());
+        if !excepted {
+            line.moved = line.moved.max(outcome.moved);
+            line.moved_sigmas = line.moved_sigmas.max(outcome.moved_sigmas);
+        }
+        line.grown += usize::from(outcome.grown_sigmas > 1.0);
+        line.grown_sigmas = line.grown_sigmas.max(outcome.grown_sigmas);
+        line.error = line.error.max(outcome.error);
+        if outcome.told_after.is_some() {
+            recovery.push(outcome.recovery);
+        }
+        line.not_recovered += usize::from(outcome.not_recovered);
+    }
+    line.told_after = Spread::of(told_after);
+    line.recovery = Spread::of(recovery);
+    line
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{:<15} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6}  {:>13}  {:>7}  {:>8} {:>6}  {:>13} {:>5}",
+            "fault",
+            "runs",
+            "told",
+            "harmless",
+            "named",
+            "undetected",
+            "panics",
+            "told after ms",
+            "moved/s",
+            "grown/s",
+            "runs",
+            "recovery s",
+            "never"
+        )?;
+        for line in &self.lines {
+            let ms = |value: f64| 1e3 * value;
+            writeln!(
+                f,
+                "{:<15} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6}  {:>6.0} {:>6.0}  {:>7.2}  {:>8.2} {:>6}  {:>6.2} {:>6.2} {:>5}",
+                line.name,
+                line.runs,
+                line.told,
+                line.harmless,
+                line.excepted,
+                line.undetected,
+                line.panics,
+                ms(line.told_after.median),
+                ms(line.told_after.most),
+                line.moved_sigmas,
+                line.grown_sigmas,
+                line.grown,
+                line.recovery.median,
+                line.recovery.most,
+                line.not_recovered,
+            )?;
+        }
+        for Excepted { name, why, runs, moved } in &self.exceptions {
+            writeln!(f, "named: {name}: {runs} runs, at most {moved:.1e} rad in a second: {why}")?;
+        }
+        for Failure { run, drive, part, faults, what } in &self.failures {
+            let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
+            writeln!(f, "UNDETECTED run {run}, {drive}, {part}: {what}: {}", faults.join(" and "))?;
+        }
+        Ok(())
+    }
+}

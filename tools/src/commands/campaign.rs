@@ -1,0 +1,125 @@
+//! `gyronet campaign`: faults on purpose.
+
+use super::networks::Weights;
+use super::{Common, WriteError, print_json, progress};
+use gyronet::model::{Blob, GyroNet, weights};
+use gyronet_tools::bundled;
+use gyronet_tools::campaign::drive::Drive;
+use gyronet_tools::campaign::part::Part;
+use gyronet_tools::campaign::report::Report;
+use gyronet_tools::campaign::scene::Scene;
+use gyronet_tools::campaign::upsets::handed_over::{Place, flip};
+use gyronet_tools::campaign::upsets::weights::WeightUpsets;
+use gyronet_tools::campaign::{self, Plan, plot};
+use gyronet_tools::recording::Recording;
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Damage drives on purpose and see what a receiver is told.
+///
+/// The bundled simulated drive, and recordings where they are given, go through the bytes of four
+/// parts and through SLCAN; faults are drawn by a seed, single and in pairs. Exit status 1 when
+/// one goes undetected that is not on the named list, or anything panics.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet campaign --quick                              # half a minute
+  gyronet campaign trial08_100hz.csv --plot faults.svg  # 20,000 runs, a recording beside the simulated drive
+  gyronet campaign --upsets                             # flipped bits instead")]
+pub struct Args {
+    /// Recordings to damage beside the simulated drive.
+    #[arg(value_name = "DRIVE.csv")]
+    drives: Vec<PathBuf>,
+    /// How many runs, of 8 s at most.
+    #[arg(long, default_value_t = 20_000)]
+    runs: usize,
+    /// The same seed gives the same runs.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// A small part of it: 320 runs.
+    #[arg(long)]
+    quick: bool,
+    /// Flip bits of weights, windows and estimates instead: every bit of the weight file's header,
+    /// and so many of the weights.
+    #[arg(long, value_name = "BITS", num_args = 0..=1, default_missing_value = "100000")]
+    upsets: Option<usize>,
+    /// Draw the runs of single faults as SVG here.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let weights = Weights::open(None)?;
+    let blob = weights.blob()?;
+    let mut drives = vec![Drive::new(&bundled::simulated_drive()?)];
+    for path in &args.drives {
+        drives.push(Drive::new(&Recording::read(path)?));
+    }
+    if let Some(bits) = args.upsets {
+        return upset(bits, args, &drives[0], common);
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let bar = progress::bar(common, drives.len() * Part::ALL.len(), "undamaged");
+    let scenes = campaign::scenes(&drives, &blob, threads, || bar.inc(1));
+    bar.finish_and_clear();
+    let plan = Plan { runs: if args.quick { campaign::QUICK } else { args.runs }, seed: args.seed, threads };
+    let bar = progress::bar(common, plan.runs, "faults");
+    let runs = campaign::run(plan, &scenes, &blob, || bar.inc(1));
+    bar.finish_and_clear();
+    let names: Vec<String> = drives.iter().map(|drive| drive.name.clone()).collect();
+    let report = Report::new(plan.seed, &names, &runs);
+    let mut out = std::io::stdout().lock();
+    if common.json {
+        print_json(&mut out, &report)?;
+    } else {
+        write!(out, "{report}")?;
+    }
+    if let Some(path) = &args.plot {
+        fs::write(path, plot::svg(&runs)?).map_err(WriteError::to(path))?;
+    }
+    match report.failures.len() {
+        0 => Ok(()),
+        count => Err(format!("{count} of {} runs must not be", plan.runs).into()),
+    }
+}
+
+/// Windows that each damaged network is asked about.
+const WINDOWS: usize = 2;
+/// Bits of windows and of estimates, as a part of those of weights.
+const HANDED_OVER: usize = 50;
+
+fn upset(bits: usize, args: &Args, drive: &Drive, common: Common) -> super::Result {
+    let file = &weights::DEFAULT.0;
+    let blob = Blob::new_checked(file)?;
+    let mut network = GyroNet::new(blob);
+    let scene = Scene::new(drive, Part::Xsens, &mut network);
+    let mut windows: Vec<_> = scene.known.keys().copied().collect();
+    windows.sort_unstable();
+    let windows: Vec<_> = windows.iter().step_by(windows.len() / WINDOWS).copied().take(WINDOWS).collect();
+    let bar = progress::bar(common, bits + 2 * bits / HANDED_OVER, "upsets");
+    let drawn = (bits, args.seed);
+    let weights = WeightUpsets::new(file, &blob, &windows, drawn, || bar.inc(1));
+    let drawn = (bits / HANDED_OVER, args.seed);
+    let window = flip(Place::Window, &scene, &mut network, drawn, || bar.inc(1));
+    let estimate = flip(Place::Estimate, &scene, &mut network, drawn, || bar.inc(1));
+    bar.finish_and_clear();
+    let mut out = std::io::stdout().lock();
+    if common.json {
+        let all = serde_json::json!({ "weights": weights, "window": window, "estimate": estimate });
+        print_json(&mut out, &all)?;
+    } else {
+        write!(out, "{weights}")?;
+        writeln!(out, "a window in RAM: {window}")?;
+        writeln!(out, "an estimate in RAM: {estimate}")?;
+    }
+    let accepted =
+        weights.header_bits - weights.header_refused + weights.weight_bits - weights.weight_refused;
+    if accepted + weights.not_found > 0 {
+        return Err(
+            format!("{accepted} damaged files were loaded, {} not found in use", weights.not_found).into()
+        );
+    }
+    Ok(())
+}
