@@ -19,6 +19,7 @@
 //! Taking differences of overlapping windows instead (what the newest window has and the one
 //! before it had not) makes 60 interleaved sums of single estimates, each with its own error.
 
+pub mod lane;
 mod rate;
 
 pub use rate::{IncrementRate, PseudoFog};
@@ -107,6 +108,7 @@ impl FogCorrector {
     }
 
     /// Takes one frame.
+    #[inline(never)]
     pub fn process(&mut self, frame: &FogFrame) -> FogOutput {
         let correction = frame.turn.map_or(Angle::ZERO, |turn| self.correction(turn));
         let mut output = FogOutput {

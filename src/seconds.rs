@@ -79,7 +79,7 @@ impl<const N: usize> Mean<N> {
 
     /// Means to the nearest code; `None` when they are of less than half a second's frames.
     fn take(&self) -> Option<[i32; N]> {
-        let count = i64::from(self.count);
+        let count = i64::from(self.count.max(1));
         // A mean of int32s fits an int32.
         (2 * self.count >= FRAMES).then(|| self.sums.map(|sum| (sum + count / 2).div_euclid(count) as i32))
     }
@@ -148,7 +148,9 @@ impl Minute {
 
     /// Adds the newest second.
     pub fn push(&mut self, second: Second) {
-        self.ring[self.next] = second;
+        if let Some(place) = self.ring.get_mut(self.next) {
+            *place = second;
+        }
         self.next = (self.next + 1) % STEPS;
         self.filled = (self.filled + 1).min(STEPS);
     }
@@ -185,17 +187,18 @@ impl<'m> SecondsWindow<'m> {
     pub fn iter(&self) -> impl Iterator<Item = &'m Second> + use<'m> {
         let Self { minute: &Minute { ref ring, next, filled }, padding } = *self;
         let missing = STEPS - filled;
-        (0..STEPS).map(move |step| {
+        (0..STEPS).filter_map(move |step| {
             let age = match (step.checked_sub(missing), padding) {
                 (Some(row), _) => row,
                 (None, Padding::Repeat) => {
                     // Counted from the newest end, so that the repetition ends where the data begin.
-                    (filled - missing % filled + step) % filled
+                    let seconds = filled.max(1);
+                    (filled - missing % seconds + step) % seconds
                 }
                 (None, Padding::Edge | Padding::None) => 0,
             };
             // A ring that is not full begins at place 0.
-            &ring[if filled == STEPS { (next + age) % STEPS } else { age }]
+            ring.get(if filled == STEPS { (next + age) % STEPS } else { age })
         })
     }
 }

@@ -33,6 +33,10 @@ impl Board {
         sure(self.0.send(n, bytes, limit));
     }
 
+    pub fn await_sent(&self, n: usize, limit: Duration, enough: impl FnMut(&[u8]) -> bool) {
+        sure(self.0.await_sent(n, limit, enough));
+    }
+
     #[must_use]
     pub fn lines(&self, n: usize, end: u8, count: usize, limit: Duration) -> Vec<Vec<u8>> {
         sure(self.0.lines(n, end, count, limit))

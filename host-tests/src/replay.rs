@@ -1,13 +1,20 @@
-//! The board's output task on the host: bytes of an Xsens MTi in, SLCAN lines out.
+//! The board's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames in,
+//! SLCAN lines out.
 
 use crate::recordings::Row;
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::can::yaw_feed::YawFeed;
 use gyronet::can::{DataFrame, slcan};
+use gyronet::fog::FogConfig;
+use gyronet::fog::lane::{FogCounters, FogLane};
 use gyronet::guard::{Guard, TIMEOUT_US};
-use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::pipeline::PipelineConfig;
-use gyronet::sample::PERIOD_US;
+use gyronet::sample::{PERIOD_US, WheelSample};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 use gyronet::vehicle::VehicleSample;
@@ -60,8 +67,20 @@ pub struct Board {
     mti: Mti,
     guard: Guard,
     feeds: Feeds,
+    wheels: WheelReceiver,
+    wheels_heard: bool,
+    wheels_known: Option<WheelSample>,
+    dsp1760: Dsp1760,
+    lane: FogLane,
+    fog_network: FogNet<'static, 'static>,
+    fog_feed: YawFeed,
+    sample_time: Micros,
+    /// What an emulated board has sent: see [`Board::following`].
+    heard: Vec<Vec<u8>>,
     /// Silent for so many message sets.
     silent: u64,
+    /// Message sets without a rate that were followed.
+    pub followed: u64,
     /// What it has sent.
     pub lines: Vec<Vec<u8>>,
 }
@@ -80,13 +99,51 @@ impl Board {
     #[must_use]
     pub fn new() -> Self {
         let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+        let fog_blob = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
         Self {
             network: GyroNet::new(blob),
             mti: Mti::new(),
             guard: Guard::new(PipelineConfig::DEFAULT),
             feeds: Feeds::new(CONFIG),
+            wheels: WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"),
+            wheels_heard: false,
+            wheels_known: None,
+            dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
+            lane: FogLane::new(FogConfig::DEFAULT, true),
+            fog_network: FogNet::new(fog_blob, Box::leak(Box::new(FogNetState::ZERO))),
+            fog_feed: YawFeed::fog(),
+            sample_time: Micros(0),
+            heard: Vec::new(),
             silent: 0,
+            followed: 0,
             lines: Vec::new(),
+        }
+    }
+
+    /// Beside an emulated board that has sent these lines. A busy host may keep its bytes back for
+    /// so long that it finds the sensor silent, by its own clock, and says so; where it has, this one
+    /// says so, too. All else must be the same.
+    #[must_use]
+    pub fn following(lines: Vec<Vec<u8>>) -> Self {
+        Self { heard: lines, ..Self::new() }
+    }
+
+    /// Says what the emulated board has said before anything else came.
+    fn follow(&mut self) {
+        loop {
+            let (mut guard, mut feeds) = (self.guard.clone(), self.feeds);
+            let Some(vehicle) = guard.poll(Micros(TIMEOUT_US + self.silent * PERIOD_US)) else {
+                return;
+            };
+            let set = lines_of(&mut feeds, &vehicle);
+            let at = self.lines.len();
+            if self.heard.get(at..at + set.len()) != Some(&set[..]) {
+                return;
+            }
+            (self.guard, self.feeds) = (guard, feeds);
+            self.lines.extend(set);
+            self.silent += 1;
+            self.followed += 1;
         }
     }
 
@@ -95,14 +152,59 @@ impl Board {
         for byte in bytes {
             self.mti.push(*byte);
             while let Some(sample) = self.mti.next_sample() {
-                let Ok(Ok(output)) = sample.map(|sample| self.guard.process(sample, Micros(0))) else {
-                    continue;
-                };
+                let Ok(sample) = sample else { continue };
+                self.follow();
+                self.sample_time = sample.time;
+                if self.wheels_heard {
+                    let known = self.wheels.poll(sample.time);
+                    self.wheels_known = Some(known);
+                    self.guard.wheels(known);
+                }
+                let Ok(output) = self.guard.process(sample, Micros(0)) else { continue };
                 self.silent = 0;
                 if let Some(due) = output.window {
                     self.guard.pipeline().deliver(due.end, self.network.estimate(&due.features));
                 }
                 self.send(&output.vehicle);
+                self.fog_out();
+            }
+        }
+    }
+
+    /// A wheel frame comes.
+    pub fn wheel(&mut self, frame: &DataFrame) {
+        self.wheels_heard |= matches!(self.wheels.process(frame, self.sample_time), Some(Ok(_)));
+    }
+
+    /// The fibre-optic gyro sends.
+    pub fn push_fog(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.dsp1760.push(*byte);
+            while let Some(sample) = self.dsp1760.next_sample() {
+                if let Ok(sample) = sample {
+                    self.lane.push(self.sample_time, sample);
+                    self.fog_out();
+                }
+            }
+        }
+    }
+
+    /// What became of the fibre-optic gyro.
+    #[must_use]
+    pub fn fog(&self) -> &FogCounters {
+        self.lane.counters()
+    }
+
+    fn fog_out(&mut self) {
+        let inertial = self.guard.pipeline().inertial();
+        self.follow();
+        while let Some(yaw) = self.lane.next_step(self.sample_time, inertial, self.wheels_known.as_ref()) {
+            for frame in self.fog_feed.fog_frames::<DataFrame>(&yaw) {
+                self.lines.push(line(&frame));
+            }
+            if let Some((number, window)) = self.lane.window() {
+                let estimate = self.fog_network.estimate(&window);
+                self.lane.deliver(number, estimate);
             }
         }
     }
@@ -121,9 +223,16 @@ impl Board {
     }
 
     fn send(&mut self, vehicle: &VehicleSample) {
-        for frame in self.feeds.process::<DataFrame>(vehicle) {
-            let line = slcan::emit(&frame).expect("a data frame");
-            self.lines.push(line.strip_suffix(b"\r").expect("a CR").to_vec());
-        }
+        let lines = lines_of(&mut self.feeds, vehicle);
+        self.lines.extend(lines);
     }
+}
+
+fn lines_of(feeds: &mut Feeds, vehicle: &VehicleSample) -> Vec<Vec<u8>> {
+    feeds.process::<DataFrame>(vehicle).iter().map(line).collect()
+}
+
+fn line(frame: &DataFrame) -> Vec<u8> {
+    let line = slcan::emit(frame).expect("a data frame");
+    line.strip_suffix(b"\r").expect("a CR").to_vec()
 }

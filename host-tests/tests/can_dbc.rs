@@ -1,13 +1,14 @@
 //! `tools/gyronet.dbc` says what the codecs do: parsed by another's parser, decoded bit by bit.
 
 use can_dbc::{AttributeValue, ByteOrder, Dbc, Message, MessageId, NumericValue, Signal, ValueType};
-use embedded_can::{Frame, Id};
+use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch;
 use gyronet::can::config::{Config, Settings, Vdc2Settings};
 use gyronet::can::feeds::Feeds;
 use gyronet::can::j1939::Vdc2;
-use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, Quality, RateMessage, Source};
+use gyronet::can::load::Periodic;
+use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 use gyronet::vehicle::{PromptSample, VehicleSample, YawSample};
 use proptest::prelude::*;
@@ -67,8 +68,11 @@ fn feeds() -> Feeds {
 fn the_file_has_every_message_with_its_cycle_time() {
     let dbc = dbc();
     let config = Config::new(ALL).expect("checked");
-    assert_eq!(dbc.messages.len(), config.messages().len());
-    for sent in config.messages() {
+    let fog =
+        FOG_IDS.map(|id| Periodic { id: Id::Standard(StandardId::new(id).expect("11 bits")), period_ms: 10 });
+    let sent: Vec<Periodic> = config.messages().iter().copied().chain(fog).collect();
+    assert_eq!(dbc.messages.len(), sent.len());
+    for sent in sent {
         let message = message(&dbc, sent.id);
         assert_eq!(message.size, 8);
         let cycle = dbc.message_attribute(message.id, "GenMsgCycleTime");

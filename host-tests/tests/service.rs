@@ -33,7 +33,7 @@ const IDENTITY: Identity = Identity {
 
 fn start(flash: &Rc<RefCell<F405>>) -> Board {
     let records = Region::new(flash, layout::STORE);
-    let mut board = Board::new(&[ImuPart::XsensMti]);
+    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
     board.begin(Some(records), Some(MappedRegion::new(flash)), IDENTITY);
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &weights::DEFAULT.0);
@@ -43,7 +43,7 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
 
 /// Without a flash controller, as in the emulator.
 fn bare() -> Board {
-    let mut board = Board::new(&[ImuPart::XsensMti]);
+    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
     board.begin(None, None, IDENTITY);
     board.weights(None, &weights::DEFAULT.0);
     board
@@ -116,7 +116,7 @@ fn configuration_is_kept_whole() {
     let refused = |error| Reply::Refused(Refusal::Store(StoreError::Field(error)));
     let other_part = Configuration { imu: ImuPart::Adis16465, ..wanted };
     assert_eq!(ask(&mut board, &set(other_part)), refused(FieldError::PartNotInImage));
-    let with_fog = Configuration { fog: Some(FogPart::Dsp1760), ..wanted };
+    let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
     assert_eq!(ask(&mut board, &set(with_fog)), refused(FieldError::PartNotInImage));
     let request = Request::SetConfiguration { version: 9, configuration: wanted };
     assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 1 }));

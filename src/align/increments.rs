@@ -135,6 +135,7 @@ impl Increments {
     }
 
     /// What was turned in the step that ends at `time`; asked for in ascending order.
+    #[inline(never)]
     pub fn take(&mut self, time: Micros) -> Turn {
         let begin = time.0.saturating_sub(PERIOD_US);
         let mut angle = [Some(Angle::ZERO); 3];

@@ -121,6 +121,7 @@ impl Streams {
 
     /// The next step, if it is complete or due. Call it until `None` after every sample, and
     /// at least every few milliseconds.
+    #[inline(never)]
     pub fn next_step(&mut self, now: Micros) -> Option<Step> {
         let next = self.next?;
         let imu = !self.fitted.imu || self.imu.has_reached(Micros(next));

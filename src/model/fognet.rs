@@ -52,21 +52,23 @@ pub trait MinuteNetwork {
 
 /// What is under way. FC2 takes the last step, and the way back of LSTM2's second layer begins with
 /// it: that is [`Stage::Last`]. `Idle` is zero, so that a state at rest needs no place in flash.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
+#[repr(u8)]
+#[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; they share its place")]
 enum Stage {
     Idle,
-    First(Run),
-    Second(Run),
-    Last,
+    First(Run, Scratch<HIDDEN1, { HIDDEN1 / 2 + 1 }>),
+    Second(Run, Scratch2),
+    Last(Scratch2),
 }
+
+type Scratch2 = Scratch<HIDDEN2, { HIDDEN2 / 2 }>;
 
 /// Working memory of one window. Both LSTMs share it: they run one after the other.
 #[derive(Debug, Clone)]
 pub struct FogNetState {
     input: [u32; STEPS * COLUMNS / 2],
     between: [u32; STEPS * HIDDEN1],
-    first: Scratch<HIDDEN1, { HIDDEN1 / 2 + 1 }>,
-    second: Scratch<HIDDEN2, { HIDDEN2 / 2 }>,
     f1: [i32; STEPS],
     f2: i32,
     linear: Angle,
@@ -79,8 +81,6 @@ impl FogNetState {
     pub const ZERO: Self = Self {
         input: [0; _],
         between: [0; _],
-        first: Scratch::ZERO,
-        second: Scratch::ZERO,
         f1: [0; _],
         f2: 0,
         linear: Angle::ZERO,
@@ -125,38 +125,42 @@ impl<'w, 's> FogNet<'w, 's> {
             let mut values = [0; COLUMNS];
             for ((to, code), n) in values.iter_mut().zip(codes).zip(&blob.normalisation) {
                 let value = normalise(code, *n);
-                let inside = value.clamp(-clamp, clamp);
+                let inside = value.min(clamp).max(-clamp);
                 state.clamped_inputs += u16::from(inside != value);
                 *to = inside as i16;
             }
             for (k, [first, second]) in values.as_chunks::<2>().0.iter().enumerate() {
-                state.input[bilstm::word_index(step, 2 * k, COLUMNS)] = pack(*first, *second);
+                if let Some(word) = state.input.get_mut(bilstm::word_index(step, 2 * k, COLUMNS)) {
+                    *word = pack(*first, *second);
+                }
             }
         }
         let linear = (linear + (1 << (GAIN_FRACTION_BITS - 1))) >> GAIN_FRACTION_BITS;
         state.linear = Angle(linear.clamp(i64::MIN.into(), i64::MAX.into()) as i64);
         state.f1 = [blob.fc1.bias; STEPS];
         state.f2 = blob.fc2.bias;
-        state.stage = Stage::First(Run::new());
+        state.stage = Stage::First(Run::new(), Scratch::ZERO);
     }
 
     /// Does a bounded piece of the window (two steps of one direction of one layer); returns the
     /// estimate with the last one, `None` before that and when none is under way.
     pub fn advance(&mut self) -> Option<FogEstimate> {
         let Self { blob, state } = self;
-        let FogNetState { input, between, first, second, f1, f2, stage, .. } = state;
+        let FogNetState { input, between, f1, f2, stage, .. } = state;
         match stage {
             Stage::Idle => None,
-            Stage::First(run) => {
+            Stage::First(run, first) => {
                 let more = run.advance(&blob.lstm1, input, between, first, |way, step, hidden| {
-                    f1[step] = f1[step].wrapping_add(half(blob.fc1.weights, way, hidden));
+                    if let Some(f1) = f1.get_mut(step) {
+                        *f1 = f1.wrapping_add(half(blob.fc1.weights, way, hidden));
+                    }
                 });
                 if !more {
                     state.load_second(blob);
                 }
                 None
             }
-            Stage::Second(run) => {
+            Stage::Second(run, second) => {
                 let mut last = false;
                 let (input, between) = (&input[..STEPS], &mut between[..STEPS * HIDDEN2]);
                 run.advance(&blob.lstm2, input, between, second, |way, step, hidden| {
@@ -166,11 +170,11 @@ impl<'w, 's> FogNet<'w, 's> {
                     }
                 });
                 if last {
-                    *stage = Stage::Last;
+                    *stage = Stage::Last(Scratch::ZERO);
                 }
                 None
             }
-            Stage::Last => {
+            Stage::Last(second) => {
                 let [_, Layer { backward, .. }] = &blob.lstm2;
                 let between = &between[..STEPS * HIDDEN2];
                 Pass::first(Way::Backward, backward, between, second, |_, hidden| {
@@ -185,7 +189,7 @@ impl<'w, 's> FogNet<'w, 's> {
 
 /// What one direction's hidden state adds to a row over both.
 fn half(weights: &[i16], way: Way, hidden: &[u32]) -> i32 {
-    let (forward, backward) = weights.split_at(weights.len() / 2);
+    let (forward, backward) = weights.split_at_checked(weights.len() / 2).unwrap_or_default();
     Dense::partial(if way == Way::Forward { forward } else { backward }, hidden)
 }
 
@@ -196,10 +200,10 @@ impl FogNetState {
         for step in 0..STEPS {
             // Ahead of what is written: five words a step are read, one is written.
             let (gyro, _) = unpack(self.input[bilstm::word_index(step, GYRO, COLUMNS)]);
-            let f1 = blob.fc1.scale(self.f1[step]).clamp(-clamp, clamp);
+            let f1 = blob.fc1.scale(self.f1[step]).min(clamp).max(-clamp);
             self.input[bilstm::word_index(step, 0, 2)] = pack(f1 as i16, gyro as i16);
         }
-        self.stage = Stage::Second(Run::new());
+        self.stage = Stage::Second(Run::new(), Scratch::ZERO);
     }
 
     fn estimate(&self, blob: &FogBlob<'_>) -> FogEstimate {

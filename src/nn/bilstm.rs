@@ -91,10 +91,11 @@ impl Pass {
         let words = direction.inputs();
         let (pair, first) = match way {
             Way::Forward => (0, 0),
-            Way::Backward => (input.len() / words - 1, 1),
+            Way::Backward => (input.len().checked_div(words).unwrap_or(0).saturating_sub(1), 1),
         };
+        let Some(columns) = input.get(pair * words..(pair + 1) * words) else { return };
         let Scratch { cell_state, hidden: [hidden, _], projection } = scratch;
-        lstm::project(direction, &input[pair * words..(pair + 1) * words], projection);
+        lstm::project(direction, columns, projection);
         *cell_state = [0; U];
         lstm::step(direction, &projection[first], None, cell_state, hidden);
         emit(2 * pair + first, hidden);

@@ -22,7 +22,7 @@ impl Dense<'_> {
     #[must_use]
     pub fn partial(weights: &[i16], hidden: &[u32]) -> i32 {
         // Halfwords, as a multiply-accumulate of the processor takes them: no unpacking.
-        let hidden: &[i16] = bytemuck::cast_slice(hidden);
+        let hidden: &[i16] = bytemuck::must_cast_slice(hidden);
         weights.iter().zip(hidden).fold(0, |sum: i32, (w, h)| sum.wrapping_add(i32::from(*w) * i32::from(*h)))
     }
 

@@ -125,15 +125,18 @@ impl<const U: usize, const W: usize> Scratch<U, W> {
 ///
 /// `x`: the two steps' inputs, word by word in turn, as many words as the direction has inputs.
 ///
-/// # Panics
-/// When `x` or `U` does not fit the direction.
+/// Does nothing when `x` or `U` does not fit the direction: a defect of the caller, which debug builds
+/// stop at.
 pub fn project<const U: usize>(
     direction: &Direction<'_>,
     x: &[u32],
     projection: &mut [[Accumulators; U]; 2],
 ) {
-    assert!(x.len() == direction.inputs && U == direction.units);
-    simd::project(direction, x, projection);
+    let fits = x.len() == direction.inputs && U == direction.units;
+    debug_assert!(fits);
+    if fits {
+        simd::project(direction, x, projection);
+    }
 }
 
 /// One recurrent step of all units: gates, cell state, hidden state.
@@ -141,8 +144,7 @@ pub fn project<const U: usize>(
 /// `projection` belongs to this step. `previous` is the hidden state before it; `None` for the
 /// zero state that a sequence starts from.
 ///
-/// # Panics
-/// When `U` or `W` does not fit the direction.
+/// Does nothing when `U` or `W` does not fit the direction, as [`project`].
 pub fn step<const U: usize, const W: usize>(
     direction: &Direction<'_>,
     projection: &[Accumulators; U],
@@ -150,8 +152,11 @@ pub fn step<const U: usize, const W: usize>(
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
-    assert!(U == direction.units && 2 * W == Direction::padded(U));
-    simd::step(direction, projection, previous, cell_state, hidden);
+    let fits = U == direction.units && 2 * W == Direction::padded(U);
+    debug_assert!(fits);
+    if fits {
+        simd::step(direction, projection, previous, cell_state, hidden);
+    }
 }
 
 /// Adds the products of packed rows with packed columns to accumulators.

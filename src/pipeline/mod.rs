@@ -26,7 +26,7 @@ use crate::mounting::Rotation;
 use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
 use crate::uncertainty::Uncertainty;
 use crate::units::{AngularRate, Yaw};
-use crate::window::{self, WINDOW, Window};
+use crate::window::{self, Features, WINDOW, Window};
 
 /// The whole way of the data for one vehicle.
 #[derive(Debug, Clone)]
@@ -51,6 +51,8 @@ pub struct Pipeline {
     /// Samples until a gap is a whole window away.
     gap_within: u32,
     wheels: Option<WheelSample>,
+    /// The newest sample as the networks see it.
+    inertial: Option<Features>,
     /// Wheels that have had a speed.
     wheels_seen: [bool; WHEELS],
     counters: Counters,
@@ -77,6 +79,7 @@ impl Pipeline {
             estimate_faults: Faults::NONE,
             gap_within: 0,
             wheels: None,
+            inertial: None,
             wheels_seen: [false; WHEELS],
             counters: Counters::default(),
         }
@@ -134,6 +137,13 @@ impl Pipeline {
         {
             *slot = Some(estimate);
         }
+    }
+
+    /// The newest sample as the networks see it, for [`crate::fog`]; `None` before the bias is known
+    /// and while the part is saturated.
+    #[must_use]
+    pub fn inertial(&self) -> Option<Features> {
+        self.inertial
     }
 
     /// Event counters since start.
@@ -241,6 +251,7 @@ impl Pipeline {
         let features = window::features(sample, &zero.reading());
         let [.., rate] = features;
         self.compensator.push(frame.tick, AngularRate(rate), sample.clipped);
+        self.inertial = (!sample.clipped).then_some(features);
         if !sample.clipped {
             self.window.push(features);
             self.since_window += 1;

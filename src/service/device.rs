@@ -15,7 +15,7 @@ use crate::model::Blob;
 use crate::sample::ImuSample;
 use crate::store::slots::{Selection, SlotError, Upload, WeightSource, select};
 use crate::store::{
-    Accepted, Calibration, Configuration, FieldError, ImuPart, Record, Slot, Store, StoreError,
+    Accepted, Calibration, Configuration, FieldError, FogPart, ImuPart, Record, Slot, Store, StoreError,
 };
 use embedded_storage::nor_flash::NorFlash;
 
@@ -40,6 +40,7 @@ pub struct Device<R: NorFlash, W> {
     slots: Option<W>,
     /// Parts that the image drives.
     parts: &'static [ImuPart],
+    fogs: &'static [FogPart],
     identity: Identity,
     flash: FlashState,
     configuration: Configuration,
@@ -64,11 +65,12 @@ pub struct Device<R: NorFlash, W> {
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// With built-in values, before [`Device::begin`]. A constant: it can be made where it stays.
     #[must_use]
-    pub const fn new(parts: &'static [ImuPart]) -> Self {
+    pub const fn new(parts: &'static [ImuPart], fogs: &'static [FogPart]) -> Self {
         Self {
             store: None,
             slots: None,
             parts,
+            fogs,
             identity: Identity::UNKNOWN,
             flash: FlashState::Absent,
             configuration: Configuration::DEFAULT,
@@ -140,7 +142,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        if self.parts.contains(&configuration.imu) && configuration.fog.is_none() {
+        let fog = configuration.fog.is_none_or(|fog| self.fogs.contains(&fog));
+        if fog && self.parts.contains(&configuration.imu) {
             Ok(())
         } else {
             Err(StoreError::Field(FieldError::PartNotInImage))

@@ -2,6 +2,7 @@
 
 use super::calibrate::{State, Task};
 use super::event::{Crash, LogPage, ResetCause};
+use crate::fog::lane::FogCounters;
 use crate::health::{Counters, Status, WatchCounters};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Calibration, Configuration, Slot, StoreError};
@@ -259,6 +260,8 @@ pub struct AllCounters {
     pub watch: WatchCounters,
     /// Of the lines.
     pub lines: LineCounters,
+    /// Of the fibre-optic gyro.
+    pub fog: FogCounters,
 }
 
 /// What went wrong on the lines.
@@ -273,6 +276,8 @@ pub struct LineCounters {
     /// Bytes that had to wait because a line's queue was full: what comes meanwhile is lost, where
     /// the line cannot be made to wait.
     pub held: u32,
+    /// Samples or frames of the fibre-optic gyro that were refused.
+    pub fog_errors: u32,
     /// Windows and notes for which a task of lower priority had no time.
     pub overruns: u32,
     /// Service frames that were none.
@@ -281,6 +286,13 @@ pub struct LineCounters {
 
 impl LineCounters {
     /// Nothing yet.
-    pub const NONE: Self =
-        Self { sensor_errors: 0, unsent: 0, line_errors: 0, held: 0, overruns: 0, service_errors: 0 };
+    pub const NONE: Self = Self {
+        sensor_errors: 0,
+        unsent: 0,
+        line_errors: 0,
+        held: 0,
+        fog_errors: 0,
+        overruns: 0,
+        service_errors: 0,
+    };
 }

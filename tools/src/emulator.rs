@@ -133,6 +133,18 @@ impl Board {
         sent.map_err(|error| self.process.failed(format!("USART{n} does not take the bytes: {error}")))
     }
 
+    /// Waits until what USART `n` has sent since the start is enough.
+    ///
+    /// # Errors
+    /// When it is not within `limit`.
+    pub fn await_sent(&self, n: usize, limit: Duration, enough: impl FnMut(&[u8]) -> bool) -> Result<()> {
+        if self.usarts[n - 1].received.holds(limit, enough) {
+            Ok(())
+        } else {
+            Err(self.process.failed(format!("USART{n} did not send in {limit:?} what is awaited")))
+        }
+    }
+
     /// Everything that USART `n` has sent since the start, once it holds `count` lines (ends of
     /// line `end`). Each line without its end; an unfinished one is left out.
     ///

@@ -18,6 +18,8 @@ const LIMIT: Duration = Duration::from_secs(900);
 const POLL: Duration = Duration::from_millis(5);
 /// The images that count, one after the other.
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
+/// The image that is flashed.
+const FLASHED: &str = "coprocessor";
 /// The emulated board.
 pub const MACHINE: &str = "netduinoplus2";
 /// The image's target.
@@ -157,6 +159,10 @@ pub fn target_installed() -> Result<(), String> {
 pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
     cargo.current_dir(workspace).args(["build", "--release", "--quiet", "-p", "gyronet", "--bin", image]);
+    if image == FLASHED {
+        // As `cargo fw` does.
+        cargo.args(["--config", "profile.release.opt-level='s'"]);
+    }
     cargo.args(["--features", "firmware", "--target", TARGET, "--target-dir"]).arg(folder);
     run(&mut cargo)?;
     Ok(folder.join(TARGET).join("release").join(image))

@@ -13,7 +13,7 @@ use gyronet::service::frame::{Deframer, MAX_MESSAGE, emit};
 use gyronet::service::message::{AllCounters, Calibrate, Identity};
 use gyronet::service::{Device, Reply, Request};
 use gyronet::store::layout::SLOT_SIZE;
-use gyronet::store::{Configuration, ImuPart, Record};
+use gyronet::store::{Configuration, FogPart, ImuPart, Record};
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
 
@@ -22,7 +22,7 @@ type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
 /// side reads; what is stored by them, a board starts with.
 pub fn line(mut data: &[u8]) {
     let choice = byte(&mut data);
-    let mut board = Board::new(&[ImuPart::XsensMti]);
+    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
     let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(|| RamFlash::new(&[])));
     board.begin((choice & 4 != 0).then_some(records), slots, Identity::UNKNOWN);
     // As the asking side, which a board might talk nonsense to.

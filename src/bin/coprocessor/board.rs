@@ -14,12 +14,15 @@ use gyronet::health::supervisor::Supervisor;
 use gyronet::service::message::Identity;
 use pac::Interrupt;
 
-/// Bytes of a part that may wait: four windows' worth of computing time at 100 samples a second.
-pub const IMU_QUEUE: usize = 2048;
+/// Bytes of a part that may wait: twice what comes in the 20 ms that an estimate is waited for.
+pub const IMU_QUEUE: usize = 384;
+/// Bytes of a fibre-optic gyro that may wait: 7 ms at 1000 messages a second; it is looked at every
+/// millisecond.
+pub const FOG_QUEUE: usize = 256;
 /// Bytes of a host that may wait: a window's worth of wheel frames.
-pub const SLCAN_QUEUE: usize = 512;
+pub const SLCAN_QUEUE: usize = 256;
 /// Bytes of the service line that may wait: a frame, and then the line is held.
-pub const SERVICE_QUEUE: usize = 512;
+pub const SERVICE_QUEUE: usize = 256;
 /// Bytes on their way to a line.
 pub const SENDING: usize = 128;
 
@@ -29,16 +32,18 @@ pub const CAN_PRIORITY: u8 = 3;
 /// Which tasks have run.
 pub static SUPERVISOR: Supervisor = Supervisor::new();
 
-static FAULTS: [serial::Faults; 3] = [const { serial::Faults::new() }; 3];
+static FAULTS: [serial::Faults; 4] = [const { serial::Faults::new() }; 4];
 
 static IMU: Queue<u8, IMU_QUEUE> = Queue::new();
+static FOG: Queue<u8, FOG_QUEUE> = Queue::new();
 static SLCAN: Queue<u8, SLCAN_QUEUE> = Queue::new();
 static SERVICE: Queue<u8, SERVICE_QUEUE> = Queue::new();
-static TO_LINES: [Queue<u8, SENDING>; 3] = [const { Queue::new() }; 3];
+static TO_LINES: [Queue<u8, SENDING>; 4] = [const { Queue::new() }; 4];
 
 /// What the tasks use.
 pub struct Board {
     pub imu: serial::Port<IMU_QUEUE>,
+    pub fog: serial::Port<FOG_QUEUE>,
     pub slcan: serial::Port<SLCAN_QUEUE>,
     pub service: serial::Port<SERVICE_QUEUE>,
     /// Where the controller answers and the clock is exact enough for it.
@@ -52,6 +57,7 @@ pub struct Board {
 /// What the interrupts use.
 pub struct Handlers {
     pub imu: serial::Handler<IMU_QUEUE>,
+    pub fog: serial::Handler<FOG_QUEUE>,
     pub slcan: serial::Handler<SLCAN_QUEUE>,
     pub service: serial::Handler<SERVICE_QUEUE>,
 }
@@ -70,20 +76,24 @@ impl Board {
             reset,
             crash: crash::take(),
         };
-        let [to_imu, to_slcan, to_service] = &TO_LINES;
-        let [imu_faults, slcan_faults, service_faults] = &FAULTS;
+        let [to_imu, to_fog, to_slcan, to_service] = &TO_LINES;
+        let [imu_faults, fog_faults, slcan_faults, service_faults] = &FAULTS;
         let usart1 = Usart { registers: pac::USART1::ptr(), interrupt: Interrupt::USART1 };
         let usart2 = Usart { registers: pac::USART2::ptr(), interrupt: Interrupt::USART2 };
+        let usart3 = Usart { registers: pac::USART3::ptr(), interrupt: Interrupt::USART3 };
         let usart6 = Usart { registers: pac::USART6::ptr(), interrupt: Interrupt::USART6 };
         let (imu_handler, imu) = serial::line(usart1, &IMU, to_imu, imu_faults);
+        let (fog_handler, fog) = serial::line(usart3, &FOG, to_fog, fog_faults);
         let (slcan_handler, slcan) = serial::line(usart2, &SLCAN, to_slcan, slcan_faults);
         let (service_handler, service) = serial::line(usart6, &SERVICE, to_service, service_faults);
         usart1.start(clocks.apb2_hz, 115_200);
         usart2.start(clocks.apb1_hz, 921_600);
+        usart3.start(clocks.apb1_hz, 921_600);
         usart6.start(clocks.apb2_hz, 115_200);
         let time = BoardTime::start(systick, clocks, identity.device_id.is_none());
-        let handlers = Handlers { imu: imu_handler, slcan: slcan_handler, service: service_handler };
-        (Self { imu, slcan, service, can, time, watchdog, identity }, handlers)
+        let handlers =
+            Handlers { imu: imu_handler, fog: fog_handler, slcan: slcan_handler, service: service_handler };
+        (Self { imu, fog, slcan, service, can, time, watchdog, identity }, handlers)
     }
 }
 

@@ -19,6 +19,7 @@ pub fn tick() {
 /// The board's own time. For tasks that SysTick interrupts.
 pub struct BoardTime {
     ticks_per_ms: u32,
+    emulated: bool,
     last: u32,
     wraps: u64,
 }
@@ -37,7 +38,12 @@ impl BoardTime {
         systick.clear_current();
         systick.enable_interrupt();
         systick.enable_counter();
-        Self { ticks_per_ms, last: 0, wraps: 0 }
+        Self { ticks_per_ms, emulated, last: 0, wraps: 0 }
+    }
+
+    /// No part has said what it is: nothing outside keeps this time.
+    pub fn emulated(&self) -> bool {
+        self.emulated
     }
 
     /// Since the start.

@@ -1,10 +1,12 @@
 //! What is done when nothing else is to do: the service line, and the weights' own checksum.
 
 use crate::chip::flash::{Records, Slots};
+use crate::fog_network::FogNetwork;
 use crate::queue::Queue;
 use crate::{board, clock, serial};
 use embedded_io::{Write, WriteReady};
 use gyronet::health::Status;
+use gyronet::model::FogNet;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::ImuSample;
 use gyronet::service::Device;
@@ -25,13 +27,14 @@ pub struct Observation {
 }
 
 /// Samples that idle has not looked at.
-pub static OBSERVATIONS: Queue<Observation, 32> = Queue::new();
+pub static OBSERVATIONS: Queue<Observation, 8> = Queue::new();
 
 /// The idle task.
 pub struct Idle {
     device: &'static mut Device<Records, Slots>,
     check: Option<BackgroundCheck<'static>>,
     service: serial::Port<{ board::SERVICE_QUEUE }>,
+    fog_network: FogNetwork,
     /// An answer on its way out, and how much of it is.
     answer: Frame,
     sent: usize,
@@ -43,8 +46,13 @@ pub type Stored = (&'static mut Device<Records, Slots>, Option<BackgroundCheck<'
 
 impl Idle {
     #[inline(never)]
-    pub fn new((device, check): Stored, service: serial::Port<{ board::SERVICE_QUEUE }>) -> Self {
-        Self { device, check, service, answer: Frame::new(), sent: 0, milliseconds: 0 }
+    pub fn new(
+        (device, check): Stored,
+        service: serial::Port<{ board::SERVICE_QUEUE }>,
+        fog_network: Option<&'static mut FogNet<'static, 'static>>,
+    ) -> Self {
+        let fog_network = FogNetwork::new(fog_network);
+        Self { device, check, service, fog_network, answer: Frame::new(), sent: 0, milliseconds: 0 }
     }
 
     /// A bounded piece of work; whether the weights were found to be damaged.
@@ -55,6 +63,11 @@ impl Idle {
         }
         self.answer(counters);
         self.check()
+    }
+
+    /// FoGNet, for what it shares with the output task.
+    pub fn fog_network(&mut self) -> &mut FogNetwork {
+        &mut self.fog_network
     }
 
     fn check(&mut self) -> bool {

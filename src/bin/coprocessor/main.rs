@@ -3,6 +3,7 @@
 //! | pin | function |
 //! |---|---|
 //! | PA10 (PA9) | USART1 RX (TX), 115200 8N1, Xsens MTi |
+//! | PB11 (PB10) | USART3 RX (TX), 921600 8N1, KVH DSP-1760 |
 //! | PA2, PA3 | USART2 TX, RX, 921600 8N1, SLCAN |
 //! | PC6, PC7 | USART6 TX, RX, 115200 8N1, service line |
 //! | PB8, PB9 | CAN1 RX, TX, 500 kbit/s |
@@ -10,11 +11,11 @@
 //! # What runs when
 //! | priority | task | when | what |
 //! |---|---|---|---|
-//! | 4 | `imu_line`, `slcan_line`, `tick` | a byte, 1 ms | a byte into or out of its queue; board time |
+//! | 4 | `imu_line`, `fog_line`, `slcan_line`, `tick` | a byte, 1 ms | a byte into or out of its queue; board time |
 //! | 3 | `service_line`, `bus::receive` | a byte, a frame | into and out of their queues |
 //! | 2 | `output` | pended by both | samples, pipeline, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
-//! | 0 | `idle` | the rest | service line, weights against their checksum |
+//! | 0 | `idle` | the rest | FoGNet in pieces, service line, weights against their checksum |
 //!
 //! Tasks hand things over in queues of fixed length; what does not fit is counted. An estimate is
 //! used two samples after its window, so when it was ready changes no frame; see `output.rs` for
@@ -42,6 +43,8 @@ mod clock;
 #[cfg(target_os = "none")]
 mod crash;
 #[cfg(target_os = "none")]
+mod fog_network;
+#[cfg(target_os = "none")]
 mod idle;
 #[cfg(target_os = "none")]
 mod output;
@@ -58,13 +61,14 @@ mod start;
 #[allow(unsafe_code, reason = "a section that is not loaded")]
 #[used]
 #[unsafe(link_section = ".priorities")]
-static PRIORITIES: [[u8; 2]; 7] = {
+static PRIORITIES: [[u8; 2]; 8] = {
     use crate::board::CAN_PRIORITY;
     use crate::chip::{CAN_INTERRUPT, pac::Interrupt};
     const SYSTICK: u8 = 15;
     const FIRST: u8 = 16;
     [
         [FIRST + Interrupt::USART1 as u8, 4],
+        [FIRST + Interrupt::USART3 as u8, 4],
         [SYSTICK, 4],
         [FIRST + Interrupt::USART2 as u8, 4],
         [FIRST + Interrupt::USART6 as u8, 3],
@@ -84,6 +88,8 @@ mod app {
     use crate::output::{Output, WindowTask};
     use crate::{board, clock, serial, start};
     use core::mem::MaybeUninit;
+    use gyronet::fog::FogConfig;
+    use gyronet::fog::lane::FogLane;
     use gyronet::health::supervisor::Task;
     use gyronet::model::GyroNet;
     use gyronet::service::message::AllCounters;
@@ -93,11 +99,13 @@ mod app {
     struct Shared {
         counters: AllCounters,
         weights_damaged: bool,
+        fog: &'static mut FogLane,
     }
 
     #[local]
     struct Local {
         imu: serial::Handler<{ board::IMU_QUEUE }>,
+        fog_handler: serial::Handler<{ board::FOG_QUEUE }>,
         slcan: serial::Handler<{ board::SLCAN_QUEUE }>,
         service: serial::Handler<{ board::SERVICE_QUEUE }>,
         sender: &'static mut Output,
@@ -108,28 +116,37 @@ mod app {
     #[init(local = [
         network_place: MaybeUninit<GyroNet<'static>> = MaybeUninit::uninit(),
         sender_place: MaybeUninit<Output> = MaybeUninit::uninit(),
+        fog_place: MaybeUninit<FogLane> = MaybeUninit::uninit(),
         rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
-        let start::Parts { output, weights, device } = parts;
+        let start::Parts { output, weights, fog_network, device } = parts;
         let network = weights.map(|blob| start::place(cx.local.network_place, || GyroNet::new(blob)));
         let network = WindowTask { network };
         let service = board.service;
-        let ports = (board.imu, board.slcan, board.can);
+        let ports = (board.imu, board.fog, board.slcan, board.can);
+        let has_network = fog_network.is_some();
+        let fog = start::place(cx.local.fog_place, || FogLane::new(FogConfig::DEFAULT, has_network));
         let sender =
             start::place(cx.local.sender_place, || output.connect(ports, board.time, board.watchdog));
-        let rest = start::place(cx.local.rest_place, || Idle::new(device, service));
-        let board::Handlers { imu, slcan, service } = handlers;
-        let shared = Shared { counters: AllCounters::default(), weights_damaged: false };
-        (shared, Local { imu, slcan, service, sender, network, rest })
+        let rest = start::place(cx.local.rest_place, || Idle::new(device, service, fog_network));
+        let board::Handlers { imu, fog: fog_handler, slcan, service } = handlers;
+        let shared = Shared { counters: AllCounters::default(), weights_damaged: false, fog };
+        (shared, Local { imu, fog_handler, slcan, service, sender, network, rest })
     }
 
     #[task(binds = USART1, priority = 4, local = [imu])]
     fn imu_line(cx: imu_line::Context) {
         cx.local.imu.serve();
         rtic::pend(Interrupt::UART4);
+    }
+
+    // A thousand messages a second: they are looked at with every tick, not with every byte.
+    #[task(binds = USART3, priority = 4, local = [fog_handler])]
+    fn fog_line(cx: fog_line::Context) {
+        cx.local.fog_handler.serve();
     }
 
     #[task(binds = SysTick, priority = 4)]
@@ -149,10 +166,10 @@ mod app {
         cx.local.service.serve();
     }
 
-    #[task(binds = UART4, priority = 2, local = [sender], shared = [counters, weights_damaged])]
+    #[task(binds = UART4, priority = 2, local = [sender], shared = [counters, weights_damaged, fog])]
     fn output(cx: output::Context) {
-        (cx.shared.counters, cx.shared.weights_damaged)
-            .lock(|counters, damaged| cx.local.sender.turn(counters, *damaged));
+        (cx.shared.counters, cx.shared.weights_damaged, cx.shared.fog)
+            .lock(|counters, damaged, fog| cx.local.sender.turn(counters, *damaged, fog));
         rtic::pend(Interrupt::UART5);
     }
 
@@ -164,13 +181,18 @@ mod app {
         board::SUPERVISOR.report(Task::Window);
     }
 
-    #[idle(local = [rest], shared = [counters, weights_damaged])]
+    #[idle(local = [rest], shared = [counters, weights_damaged, fog])]
     fn idle(mut cx: idle::Context) -> ! {
         loop {
             let counters = cx.shared.counters.lock(|counters| *counters);
             let damaged = cx.local.rest.turn(&counters);
             if damaged {
                 cx.shared.weights_damaged.lock(|known| *known = true);
+            }
+            let fog_network = cx.local.rest.fog_network();
+            let begun = fog_network.is_waiting() && cx.shared.fog.lock(|fog| fog_network.begin(fog));
+            if let (false, Some((number, estimate))) = (begun, fog_network.advance()) {
+                cx.shared.fog.lock(|fog| fog.deliver(number, estimate));
             }
             board::SUPERVISOR.report(Task::Idle);
         }

@@ -18,18 +18,21 @@ use gyronet::can::feeds::Feeds;
 use gyronet::can::queue::TransmitQueue;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::guard::Guard;
+use gyronet::can::yaw_feed::YawFeed;
+use gyronet::fog::lane::FogLane;
+use gyronet::guard::{Guard, TIMEOUT_US};
 use gyronet::health::{Faults, Status, count};
 use gyronet::model::{Estimate, GyroNet, WindowNetwork};
 use gyronet::pipeline::DueWindow;
-use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sample::{ImuSample, PERIOD_US, WheelSample};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::units::Micros;
 use gyronet::vehicle::VehicleSample;
 
 /// Frames that may wait for a line: what older ones say is of no use to anybody.
-const QUEUE: usize = 32;
+const QUEUE: usize = 24;
 /// Bytes of the sensor in one turn: all that can wait.
 const TURN: usize = board::IMU_QUEUE;
 
@@ -78,6 +81,9 @@ pub struct Unconnected {
 /// The output task.
 pub struct Output {
     imu: ImuPort,
+    fog: FogPort,
+    dsp1760: Dsp1760,
+    fog_feed: YawFeed,
     mti: Mti,
     guard: &'static mut Guard,
     has_network: bool,
@@ -85,6 +91,7 @@ pub struct Output {
     out: Option<Out>,
     tick: u32,
     wheels: Option<WheelReceiver>,
+    wheels_known: Option<WheelSample>,
     /// A wheel frame has come; a vehicle that sends none is not at fault.
     wheels_heard: bool,
     feeds: Feeds,
@@ -104,15 +111,19 @@ pub struct Output {
 }
 
 type ImuPort = serial::Port<{ board::IMU_QUEUE }>;
+type FogPort = serial::Port<{ board::FOG_QUEUE }>;
 type SlcanPort = serial::Port<{ board::SLCAN_QUEUE }>;
-type Ports = (ImuPort, SlcanPort, Option<Bus>);
+type Ports = (ImuPort, FogPort, SlcanPort, Option<Bus>);
 
 impl Unconnected {
     #[inline]
-    pub fn connect(self, (imu, slcan, can): Ports, time: BoardTime, watchdog: Watchdog) -> Output {
+    pub fn connect(self, (imu, fog, slcan, can): Ports, time: BoardTime, watchdog: Watchdog) -> Output {
         let Self { guard, config, wheels, has_network, delay } = self;
         Output {
             imu,
+            fog,
+            dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
+            fog_feed: YawFeed::fog(),
             mti: Mti::new(),
             guard,
             has_network,
@@ -120,6 +131,7 @@ impl Unconnected {
             out: None,
             tick: 0,
             wheels: wheels.and_then(|wheels| WheelReceiver::new(wheels).ok()),
+            wheels_known: None,
             wheels_heard: false,
             feeds: Feeds::new(config),
             slcan,
@@ -139,10 +151,11 @@ impl Unconnected {
 impl Output {
     /// Does what there is to do. `weights_damaged`: what idle has found out.
     #[inline(never)]
-    pub fn turn(&mut self, counters: &mut AllCounters, weights_damaged: bool) {
+    pub fn turn(&mut self, counters: &mut AllCounters, weights_damaged: bool, lane: &mut FogLane) {
         self.has_network &= !weights_damaged;
         let now = self.time.now();
         self.frames_in();
+        self.fog_in(lane, now);
         for _ in 0..TURN {
             self.take_estimate();
             if self.must_wait(now) {
@@ -155,6 +168,7 @@ impl Output {
                 match sample {
                     Ok(sample) => {
                         self.process(sample, now);
+                        self.fog_out(lane, now);
                         self.frames_out();
                     }
                     Err(_) => count(&mut self.lines.sensor_errors, 1),
@@ -166,7 +180,12 @@ impl Output {
         }
         self.frames_out();
         let watch = *self.guard.counters();
-        *counters = AllCounters { pipeline: *self.guard.pipeline().counters(), watch, lines: self.lines };
+        *counters = AllCounters {
+            pipeline: *self.guard.pipeline().counters(),
+            watch,
+            lines: self.lines,
+            fog: *lane.counters(),
+        };
         if SUPERVISOR.complete() {
             self.watchdog.feed();
         }
@@ -191,7 +210,9 @@ impl Output {
     fn process(&mut self, sample: ImuSample, now: Micros) {
         self.sample_time = sample.time;
         if let (true, Some(wheels)) = (self.wheels_heard, self.wheels.as_mut()) {
-            self.guard.wheels(wheels.poll(sample.time));
+            let known = wheels.poll(sample.time);
+            self.wheels_known = Some(known);
+            self.guard.wheels(known);
         }
         // What has no place in time is counted and gives no frame.
         let Ok(output) = &self.guard.process(sample, now) else { return };
@@ -200,6 +221,48 @@ impl Output {
         self.send(output.vehicle, sample.time);
         self.hand_out(output.window.as_ref(), now);
         self.note(Some(sample), self.tick, output.prompt.status);
+    }
+
+    /// What the fibre-optic gyro has sent.
+    fn fog_in(&mut self, lane: &mut FogLane, now: Micros) {
+        for _ in 0..board::FOG_QUEUE {
+            let Some(byte) = self.fog.receive() else { break };
+            self.dsp1760.push(byte);
+            while let Some(sample) = self.dsp1760.next_sample() {
+                match sample {
+                    Ok(sample) => {
+                        let (time, _) = self.stream_time(now);
+                        lane.push(time, sample);
+                        self.fog_out(lane, now);
+                    }
+                    Err(_) => count(&mut self.lines.fog_errors, 1),
+                }
+            }
+        }
+        self.fog_out(lane, now);
+    }
+
+    #[inline(never)]
+    fn fog_out(&mut self, lane: &mut FogLane, now: Micros) {
+        let (time, fresh) = self.stream_time(now);
+        let inertial = self.guard.pipeline().inertial().filter(|_| fresh);
+        let wheels = self.wheels_known;
+        while let Some(yaw) = lane.next_step(time, inertial, wheels.as_ref()) {
+            for frame in &self.fog_feed.fog_frames::<DataFrame>(&yaw) {
+                self.transmit(*frame, self.sample_time);
+            }
+        }
+    }
+
+    /// The time that the gyro's increments are summed by, and whether the other sensor's newest sample
+    /// is of that time. The emulator's parts send at the host's pace: there the time stamps are the
+    /// time, as they are for the pipeline.
+    fn stream_time(&self, now: Micros) -> (Micros, bool) {
+        if self.time.emulated() {
+            (self.sample_time, true)
+        } else {
+            (now, now.0.saturating_sub(self.heard.0) < TIMEOUT_US)
+        }
     }
 
     /// The sensor says nothing: that is told by its own time, as far as it is known.
@@ -220,10 +283,14 @@ impl Output {
     fn send(&mut self, mut vehicle: VehicleSample, time: Micros) {
         vehicle.yaw.faults = vehicle.yaw.faults.with(self.faults());
         for frame in &self.feeds.process::<DataFrame>(&vehicle) {
-            self.port.push(*frame, time);
-            if self.can.is_some() {
-                self.queue.push(*frame);
-            }
+            self.transmit(*frame, time);
+        }
+    }
+
+    fn transmit(&mut self, frame: DataFrame, time: Micros) {
+        self.port.push(frame, time);
+        if self.can.is_some() {
+            self.queue.push(frame);
         }
     }
 
@@ -264,8 +331,9 @@ impl Output {
         if let Some(can) = self.can.as_mut() {
             self.queue.service(can);
         }
-        self.lines.line_errors = self.imu.lost().saturating_add(self.slcan.lost());
-        self.lines.held = self.imu.held().saturating_add(self.slcan.held());
+        self.lines.line_errors =
+            self.imu.lost().saturating_add(self.fog.lost()).saturating_add(self.slcan.lost());
+        self.lines.held = self.imu.held().saturating_add(self.fog.held()).saturating_add(self.slcan.held());
     }
 }
 

@@ -9,12 +9,15 @@ use gyronet::can::config::Config;
 use gyronet::can::wheel::WheelSettings;
 use gyronet::guard::Guard;
 use gyronet::model::background::BackgroundCheck;
-use gyronet::model::{Blob, weights};
+use gyronet::model::fognet::FogNetState;
+use gyronet::model::{Blob, FogBlob, FogNet, weights};
 use gyronet::service::Device;
-use gyronet::store::ImuPart;
+use gyronet::store::{FogPart, ImuPart};
 
 /// What the image drives.
 const PARTS: &[ImuPart] = &[ImuPart::XsensMti];
+/// A fibre-optic gyro is listened to whether one is configured or not.
+const FOGS: &[FogPart] = &[FogPart::Dsp1760];
 /// Whose wheel frames are understood.
 pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
 
@@ -23,6 +26,7 @@ pub struct Parts {
     pub output: Unconnected,
     /// To be put under the network.
     pub weights: Option<Blob<'static>>,
+    pub fog_network: Option<&'static mut FogNet<'static, 'static>>,
     pub device: Stored,
 }
 
@@ -33,7 +37,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
         Some(flash) => Some(&*cortex_m::singleton!(: Flash = flash)?),
         None => None,
     };
-    let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(PARTS) })?;
+    let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(PARTS, FOGS) })?;
     device.begin(flash.map(Records), flash.map(Slots), board.identity);
     // Without good weights the pipeline still runs: the status says degraded, and the rate is
     // the gyro's less its static bias.
@@ -50,8 +54,17 @@ pub fn parts(board: &Board) -> Option<Parts> {
     Some(Parts {
         output: Unconnected { guard, config, wheels: Some(WHEELS), has_network, delay },
         weights: blob,
+        fog_network: fog_network(),
         device: (device, check),
     })
+}
+
+/// FoGNet on its built-in weights; `None` when they are damaged.
+#[inline(never)]
+fn fog_network() -> Option<&'static mut FogNet<'static, 'static>> {
+    let state = cortex_m::singleton!(: FogNetState = FogNetState::ZERO)?;
+    let blob = FogBlob::new_checked(&weights::FOGNET.0).ok()?;
+    cortex_m::singleton!(: FogNet<'static, 'static> = FogNet::new(blob, state))
 }
 
 /// Makes a value where it stays; what that takes of the stack is given back.

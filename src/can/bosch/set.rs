@@ -158,6 +158,11 @@ pub struct Motion {
     pub counter: u8,
 }
 
+/// There are three, as [`LAYOUTS`] knows.
+fn axis<T: Copy + Default>(axes: &[T; 3], axis: usize) -> T {
+    axes.get(axis).copied().unwrap_or_default()
+}
+
 /// Rounding residuals of the three rates.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SetEncoder {
@@ -169,7 +174,7 @@ impl SetEncoder {
     /// its signal is sent as the nearest limit, marked as failed.
     pub fn encode(&mut self, motion: &Motion) -> [Message; 3] {
         let mut messages = LAYOUTS.map(|layout| {
-            let (acceleration, fits) = encode_acceleration(motion.specific_force[layout.force_axis]);
+            let (acceleration, fits) = encode_acceleration(axis(&motion.specific_force, layout.force_axis));
             Message {
                 rate: 0,
                 rate_status: motion.rate_status,
@@ -181,7 +186,7 @@ impl SetEncoder {
             }
         });
         for ((message, signal), layout) in messages.iter_mut().zip(&mut self.rates).zip(&LAYOUTS) {
-            let rate = motion.angular_rate[layout.rate_axis];
+            let rate = axis(&motion.angular_rate, layout.rate_axis);
             let rate = if layout.rate_negated { AngularRate(rate.0.saturating_neg()) } else { rate };
             message.rate = signal.encode(rate).unwrap_or_else(|limit| {
                 message.rate_status = SignalStatus(message.rate_status.0 | SignalStatus::FAILURE.0);

@@ -111,7 +111,11 @@ pub(in crate::nn) fn project<const U: usize>(
 ) {
     let pairs = direction.inputs() / 2;
     let [first, second] = projection;
-    let x = &x[..direction.inputs()];
+    // The caller has made sure of both lengths.
+    let (Some(x), Some(units)) = (x.get(..direction.inputs()), first.get(..direction.units())) else {
+        return;
+    };
+    let first_end = units.as_ptr_range().end;
     let skipped = entry(pairs, PROJECT_UNROLL);
     let call = ProjectCall {
         // The loop addresses from its top, also when it is entered in the middle.
@@ -119,7 +123,7 @@ pub(in crate::nn) fn project<const U: usize>(
         x_end: x.as_ptr_range().end,
         first: first.as_mut_ptr(),
         second: second.as_mut_ptr(),
-        first_end: first[..direction.units()].as_ptr_range().end,
+        first_end,
         entry: skipped * PROJECT_BYTES,
         to_weights: 16 - 8 * skipped as isize,
     };

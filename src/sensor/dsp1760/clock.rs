@@ -16,7 +16,8 @@ impl MessageClock {
 
     /// The time `messages` (127 at most) later.
     pub(super) fn advance(&mut self, rate: OutputRate, messages: u32) -> u64 {
-        let hertz = u32::from(rate.hertz());
+        // No rate is zero; where the compiler does not see that, nothing is divided by it.
+        let hertz = u32::from(rate.hertz()).max(1);
         let elapsed = messages * 1_000_000 + self.remainder;
         self.time += u64::from(elapsed / hertz);
         self.remainder = elapsed % hertz;

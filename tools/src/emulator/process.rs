@@ -29,6 +29,13 @@ impl Collected {
         (bytes.clone(), !timeout.timed_out())
     }
 
+    /// Whether it becomes enough before time is up; no copy is made.
+    pub(super) fn holds(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> bool {
+        let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.more.wait_timeout_while(bytes, limit, |bytes| !enough(bytes));
+        !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
+    }
+
     /// Hands on what comes until there is no more, or the sink takes no more.
     pub(super) fn copy_to(&self, mut sink: impl Write) {
         let mut copied = 0;

@@ -84,7 +84,7 @@ impl Code {
             let bytes = body.get((at - address) as usize..)?.first_chunk::<2>()?;
             Some(u16::from_le_bytes(*bytes))
         };
-        let (mut at, mut low) = (address, [0u32; 16]);
+        let (mut at, mut low, mut aligned) = (address, [0u32; 16], [0u32; 16]);
         while let Some(first) = halfword(at) {
             if is_data(at) {
                 at += 2;
@@ -94,6 +94,11 @@ impl Code {
             match thumb::effect(first, second, at) {
                 Effect::None => {}
                 Effect::Push(bytes) => function.own += bytes,
+                Effect::Align { register, bytes } => aligned[usize::from(register)] = bytes,
+                // A frame on a larger boundary; what is not rounded gives the stack back.
+                Effect::MoveSp { register } => {
+                    function.own += std::mem::take(&mut aligned[usize::from(register)]);
+                }
                 Effect::Dynamic => return Err(StackError::Dynamic { function: function.name, address: at }),
                 Effect::Indirect => function.indirect += 1,
                 // Inside, a branch is a loop or a condition; to the outside, a call at the end.

@@ -12,6 +12,10 @@ pub enum Effect {
     Push(u32),
     /// It grows by a register's value.
     Dynamic,
+    /// A register is rounded down, by less than so many bytes; it may become the stack pointer.
+    Align { register: u8, bytes: u32 },
+    /// A register becomes the stack pointer.
+    MoveSp { register: u8 },
     /// A call of a function at an address.
     Call(u32),
     /// A jump to an address.
@@ -47,6 +51,8 @@ fn narrow(code: u16, address: u32) -> Effect {
         _ if code & 0xFE00 == 0xB400 => Effect::Push(4 * (code & 0x1FF).count_ones()),
         // SUB sp, #imm7 * 4
         _ if code & 0xFF80 == 0xB080 => Effect::Push(4 * u32::from(code & 0x7F)),
+        // MOV sp, Rm
+        _ if code & 0xFF87 == 0x4685 => Effect::MoveSp { register: (code >> 3 & 0xF) as u8 },
         // BLX Rm
         _ if code & 0xFF87 == 0x4780 => Effect::Indirect,
         // BX Rm; BX lr returns
@@ -78,8 +84,10 @@ fn wide(first: u16, second: u16, address: u32) -> Effect {
         _ if first & 0xFBFF == 0xF2AD && second & 0x8F00 == 0x0D00 => Effect::Push(imm12(first, second)),
         // SUB.W sp, sp, Rm
         _ if first & 0xFFEF == 0xEBAD && rd == SP => Effect::Dynamic,
-        // BFC Rd, #0, #width rounds a stack pointer down
-        (0xF36F, _) if second & 0x70C0 == 0 => Effect::Push(1 << ((second & 0x1F) + 1).min(10)),
+        // BFC Rd, #0, #width
+        (0xF36F, _) if second & 0x70C0 == 0 => {
+            Effect::Align { register: rd as u8, bytes: 1 << ((second & 0x1F) + 1).min(10) }
+        }
         // LDR pc, [Rn, ...]; from the stack it is a return
         _ if first & 0xFF70 == 0xF850 && rt == PC && rn != SP => Effect::Indirect,
         // BL, B.W
@@ -160,6 +168,8 @@ mod tests {
         assert_eq!(narrow(0xB004), Effect::None); // add sp, #16
         assert_eq!(narrow(0x4798), Effect::Indirect); // blx r3
         assert_eq!(narrow(0x4770), Effect::None); // bx lr
+        assert_eq!(narrow(0x46A5), Effect::MoveSp { register: 4 }); // mov sp, r4
+        assert_eq!(wide(0xF36F, 0x0402), Effect::Align { register: 4, bytes: 8 }); // bfc r4, #0, #3
         assert_eq!(narrow(0xE7FE), Effect::Branch(0x0801_0000)); // b .
         assert_eq!(narrow(0xD1FC), Effect::Branch(0x0800_FFFC)); // bne .-4
         assert_eq!(narrow(0xDE00), Effect::None); // udf #0

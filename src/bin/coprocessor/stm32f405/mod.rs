@@ -33,7 +33,7 @@ impl Chip {
     pub fn start(p: pac::Peripherals) -> Self {
         let clocks = Clocks::start(&p.RCC, &p.FLASH, &p.PWR);
         p.RCC.ahb1enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
-        p.RCC.apb1enr().modify(|_, w| w.usart2en().enabled().can1en().enabled());
+        p.RCC.apb1enr().modify(|_, w| w.usart2en().enabled().usart3en().enabled().can1en().enabled());
         p.RCC.apb2enr().modify(|_, w| w.usart1en().enabled().usart6en().enabled());
         pins(&p.GPIOA, &p.GPIOB, &p.GPIOC);
         let can = if clocks.exact() { Bus::start(p.CAN1, Some(&WHEELS)) } else { None };
@@ -46,14 +46,17 @@ impl Chip {
 fn pins(a: &pac::GPIOA, b: &pac::GPIOB, c: &pac::GPIOC) {
     a.afrl().modify(|_, w| w.afrl2().af7().afrl3().af7());
     a.afrh().modify(|_, w| w.afrh9().af7().afrh10().af7());
-    b.afrh().modify(|_, w| w.afrh8().af9().afrh9().af9());
+    b.afrh().modify(|_, w| w.afrh8().af9().afrh9().af9().afrh10().af7().afrh11().af7());
     c.afrl().modify(|_, w| w.afrl6().af8().afrl7().af8());
     a.moder().modify(|_, w| {
         w.moder2().alternate().moder3().alternate().moder9().alternate().moder10().alternate()
     });
     // A line that hangs open reads as idle.
     a.pupdr().modify(|_, w| w.pupdr3().pull_up().pupdr10().pull_up());
-    b.moder().modify(|_, w| w.moder8().alternate().moder9().alternate());
+    b.moder().modify(|_, w| {
+        w.moder8().alternate().moder9().alternate().moder10().alternate().moder11().alternate()
+    });
+    b.pupdr().modify(|_, w| w.pupdr11().pull_up());
     c.moder().modify(|_, w| w.moder6().alternate().moder7().alternate());
     c.pupdr().modify(|_, w| w.pupdr7().pull_up());
 }

@@ -40,7 +40,7 @@ impl Chip {
         caches();
         let clocks = Clocks::start(&p.RCC, &p.FLASH, &p.PWR);
         p.RCC.ahb4enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
-        p.RCC.apb1lenr().modify(|_, w| w.usart2en().enabled());
+        p.RCC.apb1lenr().modify(|_, w| w.usart2en().enabled().usart3en().enabled());
         p.RCC.apb1henr().modify(|_, w| w.fdcanen().enabled());
         p.RCC.apb2enr().modify(|_, w| w.usart1en().enabled().usart6en().enabled());
         pins(&p.GPIOA, &p.GPIOB, &p.GPIOC);
@@ -62,14 +62,17 @@ fn caches() {
 fn pins(a: &pac::GPIOA, b: &pac::GPIOB, c: &pac::GPIOC) {
     a.afrl().modify(|_, w| w.afr2().af7().afr3().af7());
     a.afrh().modify(|_, w| w.afr9().af7().afr10().af7());
-    b.afrh().modify(|_, w| w.afr8().af9().afr9().af9());
+    b.afrh().modify(|_, w| w.afr8().af9().afr9().af9().afr10().af7().afr11().af7());
     c.afrl().modify(|_, w| w.afr6().af7().afr7().af7());
     a.moder().modify(|_, w| {
         w.moder2().alternate().moder3().alternate().moder9().alternate().moder10().alternate()
     });
     // A line that hangs open reads as idle.
     a.pupdr().modify(|_, w| w.pupdr3().pull_up().pupdr10().pull_up());
-    b.moder().modify(|_, w| w.moder8().alternate().moder9().alternate());
+    b.moder().modify(|_, w| {
+        w.moder8().alternate().moder9().alternate().moder10().alternate().moder11().alternate()
+    });
+    b.pupdr().modify(|_, w| w.pupdr11().pull_up());
     c.moder().modify(|_, w| w.moder6().alternate().moder7().alternate());
     c.pupdr().modify(|_, w| w.pupdr7().pull_up());
 }
