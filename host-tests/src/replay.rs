@@ -40,7 +40,7 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
 pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
     // The least bits of a real part always move.
     let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let (force, rate) = (5e-4 * sign, 5e-8 * sign);
+    let (force, rate) = (2e-6 * sign, 8e-9 * sign);
     let row = Row {
         time: number as f64 * 0.01,
         acceleration: [force, force, 9.81 + force],
