@@ -36,8 +36,8 @@ const QUEUE: usize = 24;
 /// Bytes of the sensor in one turn: all that can wait.
 const TURN: usize = board::IMU_QUEUE;
 
-/// Frames that the bus has brought.
-pub static FRAMES: Queue<DataFrame, 16> = Queue::new();
+/// Frames that the bus has brought: of wheels alone, for which there is a turn every millisecond.
+pub static FRAMES: Queue<DataFrame, 8> = Queue::new();
 /// The window that is due, until it has been run.
 static WINDOWS: Queue<DueWindow, 1> = Queue::new();
 /// Its estimate.
