@@ -53,10 +53,10 @@
 //! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # use gyronet::sensor::xsens::MtData2;
-//! # let messages = (0..400_u32).flat_map(|k| MtData2 {
+//! # let messages = (0..400_u32).flat_map(|k| { let noise = 0.001 * (k % 2) as f32; MtData2 {
 //! #     packet_counter: Some(k as u16), sample_time_fine: Some(100 * k), temperature: None, status: Some(3),
-//! #     acceleration: Some([0.0, 0.0, 9.81 + 0.001 * (k % 2) as f32]), rate_of_turn: Some([0.0, 0.0, 0.01]),
-//! # }.emit().to_vec());
+//! #     acceleration: Some([noise, noise, 9.81 + noise]), rate_of_turn: Some([noise, noise, 0.01 + noise]),
+//! # } .emit().to_vec() });
 //! let (uart, can) = (/* your port and your controller */
 //! #     Port(messages.collect()), Controller::default());
 //! # let frames = can.0.clone();
