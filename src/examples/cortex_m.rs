@@ -74,12 +74,13 @@ mod firmware {
             let emptied = !self.message.is_empty();
             self.message.clear();
             if !emptied {
-                // Gyro and accelerometer of a parked car: a bias, and a least bit that moves.
+                // A parked car: a bias, and a least bit that moves; an axis without noise is a stuck one.
+                let noise = 0.001 * (self.sent % 2) as f32;
                 let message = MtData2 {
                     packet_counter: Some(self.sent as u16),
                     sample_time_fine: Some(100 * self.sent),
-                    acceleration: Some([0.0, 0.0, 9.81 + 0.001 * (self.sent % 2) as f32]),
-                    rate_of_turn: Some([0.0, 0.0, 0.01]),
+                    acceleration: Some([noise, noise, 9.81 + noise]),
+                    rate_of_turn: Some([noise, noise, 0.01 + noise]),
                     temperature: None,
                     status: Some(3),
                 };
