@@ -21,7 +21,7 @@ use crate::align::AlignError;
 use crate::health::{Faults, Quality, Source, Status, WatchCounters, count};
 use crate::pipeline::{Output, Pipeline, PipelineConfig};
 use crate::sample::{ImuSample, PERIOD_US, WheelSample};
-use crate::units::{AngularRate, Micros, SpecificForce};
+use crate::units::{AngularRate, Micros, SpecificForce, Yaw};
 use crate::vehicle::{PromptSample, VehicleSample, YawSample};
 
 /// Without a sample for so long the sensor is silent: two samples missing, and told before the
@@ -30,7 +30,7 @@ pub const TIMEOUT_US: u64 = 29_000;
 /// After a start an MTi needs about a second before it speaks.
 pub const START_US: u64 = 2_000_000;
 /// Samples after saturation that are not trusted: 50 ms, in which the part's filter recovers.
-pub const HOLD: u32 = 5;
+pub const HOLD: u8 = 5;
 
 /// A pipeline and the watch over its sensor.
 #[derive(Debug, Clone)]
@@ -39,12 +39,13 @@ pub struct Guard {
     still: still::Still,
     jump: jump::Jump,
     stuck: bool,
-    hold: u32,
+    hold: u8,
     /// When the sensor was heard of, by the board's clock.
     heard: Option<Micros>,
     /// When the next message set without a sample is due.
     due: Option<u64>,
-    newest: Option<VehicleSample>,
+    /// Yaw and step of what went out last.
+    newest: (Yaw, u32),
     counters: WatchCounters,
 }
 
@@ -60,7 +61,7 @@ impl Guard {
             hold: 0,
             heard: None,
             due: None,
-            newest: None,
+            newest: Default::default(),
             counters: WatchCounters::default(),
         }
     }
@@ -114,7 +115,7 @@ impl Guard {
         if stuck {
             output.prompt.status = Status::Stuck;
         }
-        self.newest = Some(output.vehicle);
+        self.newest = (output.vehicle.yaw.yaw, output.vehicle.tick);
         result
     }
 
@@ -138,15 +139,14 @@ impl Guard {
         // Without catching up: a set that nobody had time for is of no use later.
         self.due = Some(now.0.max(due) + PERIOD_US);
         let missing = if first { TIMEOUT_US.div_ceil(PERIOD_US) as u32 } else { 1 };
-        let silent = silent(self.newest.as_ref(), missing);
-        self.newest = Some(silent);
-        Some(silent)
+        let (yaw, tick) = &mut self.newest;
+        *tick = tick.wrapping_add(missing);
+        Some(silent(*yaw, *tick))
     }
 }
 
-/// No rate, no force, and the yaw that was known; so many steps on.
-fn silent(newest: Option<&VehicleSample>, steps: u32) -> VehicleSample {
-    let (yaw, tick) = newest.map_or_else(Default::default, |newest| (newest.yaw.yaw, newest.tick));
+/// No rate, no force, and the yaw that was known.
+fn silent(yaw: Yaw, tick: u32) -> VehicleSample {
     VehicleSample {
         prompt: PromptSample { rate: AngularRate::ZERO, quality: Quality::Unusable },
         yaw: YawSample {
@@ -160,6 +160,6 @@ fn silent(newest: Option<&VehicleSample>, steps: u32) -> VehicleSample {
         pitch_rate: AngularRate::ZERO,
         specific_force: [SpecificForce(0); 3],
         temperature: None,
-        tick: tick.wrapping_add(steps),
+        tick,
     }
 }

@@ -113,7 +113,7 @@ fn saturation_is_held_for_50_ms() {
         let expected = if tick < 402 + u64::from(HOLD) { Status::Clipped } else { Status::Degraded };
         assert_eq!(output.prompt.status, expected, "sample {tick}");
     }
-    assert_eq!(guard.counters().held, HOLD);
+    assert_eq!(guard.counters().held, u32::from(HOLD));
 }
 
 #[test]

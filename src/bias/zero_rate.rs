@@ -56,6 +56,9 @@ impl ZeroRateConfig {
     };
 }
 
+/// Bits of a rate that the watch over a standing vehicle leaves out.
+const TURNED_SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
+
 /// Why the vehicle is taken to stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -107,9 +110,9 @@ pub struct ZeroRate {
     block: Spread,
     waiting: Option<Measurement>,
     refused: bool,
-    /// Codes x samples turned in this second of standing, by the newest samples.
-    turned: i64,
-    turned_for: u32,
+    /// 2^-20 rad/s x samples turned in this second of standing, by the newest samples.
+    turned: i32,
+    turned_for: u8,
     since_walk: u32,
     temperature: Option<CentiCelsius>,
 }
@@ -181,12 +184,14 @@ impl ZeroRate {
             (self.turned, self.turned_for) = (0, 0);
             return false;
         }
-        if self.turned_for == RATE_HZ {
+        if u32::from(self.turned_for) == RATE_HZ {
             (self.turned, self.turned_for) = (0, 0);
         }
-        self.turned += i64::from(rate.0) - i64::from(self.bias().0);
+        // A hundred of them fit.
+        self.turned += rate.0.saturating_sub(self.bias().0) >> TURNED_SHIFT;
         self.turned_for += 1;
-        let turned = self.turned as f32 / (AngularRate::PER_RAD_PER_SEC * RATE_HZ as f32);
+        let per_rad = (AngularRate::PER_RAD_PER_SEC / (1 << TURNED_SHIFT) as f32) * RATE_HZ as f32;
+        let turned = self.turned as f32 / per_rad;
         if libm::fabsf(turned) <= self.wheels_gate() {
             return false;
         }

@@ -14,35 +14,37 @@ pub const JUMP_FORCE: SpecificForce = SpecificForce(30 << 20);
 /// So many readings in a row are not believed; the next one is, wherever it is.
 pub const JUMP_PATIENCE: u8 = 3;
 /// A reading that is older says nothing of this one, microseconds.
-const OLD_US: u64 = 50_000;
+const OLD_US: u32 = 50_000;
 
-/// The last reading that was believed.
+/// The last reading that was believed; small, for the board's RAM.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Jump {
-    believed: Option<ImuSample>,
+    angular_rate: [AngularRate; 3],
+    specific_force: [SpecificForce; 3],
+    /// Its time, modulo 2^32.
+    at: u32,
+    known: bool,
     doubted: u8,
 }
 
 impl Jump {
     /// Takes a sample; whether it is not to be believed.
     pub fn process(&mut self, sample: &ImuSample) -> bool {
-        let jumps = self.believed.as_ref().is_some_and(|believed| jumps(believed, sample));
-        if jumps && self.doubted < JUMP_PATIENCE {
+        if self.known && self.jumps(sample) && self.doubted < JUMP_PATIENCE {
             self.doubted += 1;
             return true;
         }
-        self.doubted = 0;
-        self.believed = Some(*sample);
+        let ImuSample { angular_rate, specific_force, time, .. } = *sample;
+        *self = Self { angular_rate, specific_force, at: time.0 as u32, known: true, doubted: 0 };
         false
     }
-}
 
-fn jumps(from: &ImuSample, to: &ImuSample) -> bool {
-    let age = to.time.0.abs_diff(from.time.0);
-    let rates = from.angular_rate.iter().zip(to.angular_rate);
-    let forces = from.specific_force.iter().zip(to.specific_force);
-    let turns = |(from, to): (&AngularRate, AngularRate)| from.0.abs_diff(to.0) > JUMP_RATE.0.unsigned_abs();
-    let strikes =
-        |(from, to): (&SpecificForce, SpecificForce)| from.0.abs_diff(to.0) > JUMP_FORCE.0.unsigned_abs();
-    age <= OLD_US && (rates.into_iter().any(turns) || forces.into_iter().any(strikes))
+    fn jumps(&self, to: &ImuSample) -> bool {
+        let age = (to.time.0 as u32).wrapping_sub(self.at) as i32;
+        let rates = self.angular_rate.iter().zip(to.angular_rate);
+        let forces = self.specific_force.iter().zip(to.specific_force);
+        let mut far = rates.map(|(from, to)| from.0.abs_diff(to.0) > JUMP_RATE.0.unsigned_abs());
+        let mut hard = forces.map(|(from, to)| from.0.abs_diff(to.0) > JUMP_FORCE.0.unsigned_abs());
+        age.unsigned_abs() <= OLD_US && (far.any(|far| far) || hard.any(|hard| hard))
+    }
 }

@@ -8,27 +8,27 @@ use crate::sample::ImuSample;
 /// Noise of half a bit lets an axis repeat nearly every second reading at rest; that three axes
 /// do so seven times in a row takes two days even then, and months where an axis repeats one
 /// reading in thirty. And of these samples no navigation rate has gone out yet.
-pub const STUCK_AFTER: u32 = 7;
+pub const STUCK_AFTER: u8 = 7;
 /// The same of one axis alone that often repeats itself.
-pub const AXIS_STUCK_AFTER: u32 = 30;
+pub const AXIS_STUCK_AFTER: u8 = 30;
 
 /// Accelerometer x, y, z, gyro x, y, z.
 const AXES: usize = 6;
 /// How often an axis repeats itself is averaged over so many samples, as a power of two.
 const AVERAGE: u32 = 8;
-const ALWAYS: u32 = 1 << 16;
+const ALWAYS: u16 = 1 << 15;
 /// An axis that repeats itself less often than this, [`STUCK_AFTER`] times in a row included, has
 /// noise enough.
-const SELDOM: u32 = ALWAYS / 16;
+const SELDOM: u16 = ALWAYS / 16;
 
 /// How long the readings of the axes have stood still.
 #[derive(Debug, Clone)]
 pub(super) struct Still {
     last: Option<[i32; AXES]>,
     /// Samples equal to the one before.
-    equal: [u32; AXES],
+    equal: [u8; AXES],
     /// How often that is, of [`ALWAYS`].
-    repeats: [u32; AXES],
+    repeats: [u16; AXES],
     stuck: [bool; AXES],
 }
 
@@ -54,7 +54,7 @@ impl Still {
             *stuck = repeated && (*stuck || seldom || *equal >= AXIS_STUCK_AFTER);
         }
         let (accelerometer, gyro) = self.equal.split_at(AXES / 2);
-        let stands = |part: &[u32]| part.iter().all(|equal| *equal >= STUCK_AFTER);
+        let stands = |part: &[u8]| part.iter().all(|equal| *equal >= STUCK_AFTER);
         stands(accelerometer) || stands(gyro) || self.stuck.contains(&true)
     }
 }
