@@ -11,6 +11,7 @@ pub mod qemu;
 pub mod recordings;
 pub mod replay;
 pub mod require;
+pub mod stored;
 pub mod stream;
 pub mod synthetic;
 pub mod wire;
