@@ -1,6 +1,7 @@
 //! What the host tests share: how a test gets QEMU or the recordings or says that it is skipped,
 //! the emulated board and its image, bytes, samples, streams and weights made for the purpose.
 
+pub mod connected;
 pub mod entrance;
 pub mod flash;
 pub mod golden;
