@@ -14,6 +14,7 @@ pub mod supervisor;
 /// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is believed | `missing`, `late`, `implausible` |
 /// | ready | `Ready` | a believable window covers the recent samples | gyro less bias and correction | as above | `windows` |
 /// | fault | `Clipped` | the part says that it is saturated | marked failed | 50 ms after the last such sample | `clipped`, `held` |
+/// | fault | `Clipped` | a reading that no vehicle can have ([`crate::guard`]) | marked failed, fault bit `IMPLAUSIBLE` | a reading near the last good one, or the fourth in a row | `wrong` |
 /// | fault | `Stuck` | seven samples equal in gyro, accelerometer or one axis | marked failed, fault bit `STUCK` | a sample that differs | `stuck` |
 /// | fault | `Silent` | 29 ms without a sample, by the board's clock | not available, every 10 ms | the next sample | `silences` |
 ///

@@ -81,7 +81,7 @@ pub struct Board {
 
 impl Board {
     /// Starts QEMU with an image and its first `usarts` serial lines (1 to 6) connected;
-    /// `arguments` are added to QEMU's.
+    /// `arguments` come behind QEMU's own, and hold where they contradict them.
     ///
     /// # Errors
     /// [`EmulatorError`], with QEMU's own words.
@@ -96,7 +96,7 @@ impl Board {
             // An instruction takes a nanosecond: the board's time does not depend on how busy the host is.
             .args(["-icount", "shift=0"])
             .args(["-semihosting-config", "enable=on,target=native"])
-            .args(["-monitor", "none", "-qtest-log", "/dev/null"])
+            .args(["-monitor", "stdio", "-qtest-log", "/dev/null"])
             .args(["-qtest", &format!("tcp:127.0.0.1:{}", port(&registers)?)])
             .args(arguments);
         // A multiplexer of one: it keeps up to 32 bytes, so that QEMU need not be woken for each of
@@ -252,6 +252,21 @@ impl Board {
             }
             self.process.sleep(until, format!("did not end within {limit:?}"))?;
         }
+    }
+
+    /// Ends QEMU in order, so that its plugins have their last word; what it, and the image through
+    /// semihosting, have written to standard error.
+    ///
+    /// # Errors
+    /// When it does not end.
+    pub fn quit(mut self) -> Result<String> {
+        self.process.quit()
+    }
+
+    /// An error of somebody who drives the board.
+    #[must_use]
+    pub fn failed(&self, what: impl std::fmt::Display) -> EmulatorError {
+        self.process.failed(what)
     }
 
     /// What QEMU, and the image through semihosting, have written to standard error.

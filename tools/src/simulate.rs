@@ -19,6 +19,7 @@ pub mod car;
 pub mod csv;
 pub mod fog;
 pub mod layout;
+pub mod leg;
 pub mod mems;
 pub mod odometer;
 mod random;

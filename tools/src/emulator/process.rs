@@ -66,7 +66,7 @@ pub(super) struct Process {
 
 impl Process {
     pub(super) fn start(mut command: Command) -> Result<Self> {
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().map_err(EmulatorError::Start)?;
         let stderr = child.stderr.take();
         let mut process = Self { child, errors: Arc::default(), threads: Vec::new() };
@@ -117,6 +117,22 @@ impl Process {
         }
         std::thread::sleep(POLL);
         Ok(())
+    }
+
+    /// Ends QEMU in order, by its monitor; all that it has written to standard error.
+    pub(super) fn quit(&mut self) -> Result<String> {
+        let asked = self.child.stdin.take().map(|mut monitor| monitor.write_all(b"quit\n"));
+        if !matches!(asked, Some(Ok(()))) {
+            return Err(self.failed("its monitor does not listen"));
+        }
+        let until = Instant::now() + START;
+        while !matches!(self.child.try_wait(), Ok(Some(_))) {
+            self.sleep(until, "does not quit")?;
+        }
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+        Ok(self.errors())
     }
 
     pub(super) fn errors(&self) -> String {

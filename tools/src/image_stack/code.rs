@@ -35,7 +35,8 @@ impl Code {
             if name.starts_with("$t") || name.starts_with("$d") {
                 mapping.insert(address, name.starts_with("$d"));
             } else if symbol.kind() == SymbolKind::Text && symbol.size() > 0 {
-                ranges.entry(address & !1).or_insert((symbol.size() as u32, demangle(name)));
+                let name = format!("{:#}", rustc_demangle::demangle(name));
+                ranges.entry(address & !1).or_insert((symbol.size() as u32, name));
             }
         }
         let mut code = Self::default();
@@ -171,21 +172,4 @@ impl Code {
         }
         way
     }
-}
-
-/// The path of a Rust name in the legacy mangling (`_ZN`, then each part behind its length),
-/// without the hash at its end; any other name as it is.
-fn demangle(name: &str) -> String {
-    let Some(mut rest) = name.strip_prefix("_ZN") else { return name.to_owned() };
-    let mut parts = Vec::new();
-    while let Some(digits) = rest.find(|c: char| !c.is_ascii_digit()).filter(|digits| *digits > 0) {
-        let (len, tail) = rest.split_at(digits);
-        let Some((part, tail)) = len.parse().ok().and_then(|len: usize| tail.split_at_checked(len)) else {
-            return name.to_owned();
-        };
-        parts.push(part);
-        rest = tail;
-    }
-    parts.pop_if(|part| part.len() == 17 && part.starts_with('h'));
-    parts.join("::")
 }

@@ -5,8 +5,9 @@
 //! Dynamics and Control, chapter 2.
 
 use super::DT;
+use super::leg::Leg;
 use super::random::{Purpose, Random};
-use super::route::{Leg, Route, Way};
+use super::route::{Route, Way};
 use std::f64::consts::TAU;
 
 /// m/s^2.

@@ -4,8 +4,8 @@
 //! Corners are as fast as comfort allows: the tightest point of a corner and the lateral
 //! acceleration give the speed.
 
+use super::leg::Leg;
 use super::random::{Purpose, Random};
-use super::route::Leg;
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
