@@ -51,6 +51,8 @@ mod output;
 #[cfg(target_os = "none")]
 mod queue;
 #[cfg(target_os = "none")]
+mod received;
+#[cfg(target_os = "none")]
 mod serial;
 #[cfg(target_os = "none")]
 mod start;
