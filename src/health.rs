@@ -89,8 +89,8 @@ impl Faults {
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
-    /// The weights are damaged.
-    pub const WEIGHTS: Self = Self(1 << 5);
+    /// What is stored is damaged: weights, configuration or calibration; the service line says what.
+    pub const STORED: Self = Self(1 << 5);
     /// The wheels are silent, or say that the vehicle stands while the gyro says that it turns.
     pub const WHEELS: Self = Self(1 << 6);
     /// Frames were dropped because the bus did not take them.

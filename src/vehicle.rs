@@ -54,3 +54,15 @@ pub struct VehicleSample {
     /// Step of the grid.
     pub tick: u32,
 }
+
+impl VehicleSample {
+    /// Made with the built-in configuration because the one of this vehicle is lost: no rate is
+    /// better than degraded, whatever the pipeline thinks of it.
+    pub fn doubt(&mut self) {
+        for quality in [&mut self.prompt.quality, &mut self.yaw.quality] {
+            if *quality == Quality::Good {
+                *quality = Quality::Degraded;
+            }
+        }
+    }
+}

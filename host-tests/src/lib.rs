@@ -1,6 +1,7 @@
 //! What the host tests share: how a test gets QEMU or the recordings or says that it is skipped,
 //! the emulated board and its image, bytes, samples, streams and weights made for the purpose.
 
+pub mod connected;
 pub mod entrance;
 pub mod flash;
 pub mod golden;
@@ -11,6 +12,7 @@ pub mod qemu;
 pub mod recordings;
 pub mod replay;
 pub mod require;
+pub mod stored;
 pub mod stream;
 pub mod synthetic;
 pub mod wire;

@@ -10,12 +10,13 @@ use gyronet::can::{DataFrame, slcan};
 use gyronet::fog::FogConfig;
 use gyronet::fog::lane::{FogCounters, FogLane};
 use gyronet::guard::{Guard, TIMEOUT_US};
+use gyronet::health::Faults;
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
-use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::{PERIOD_US, WheelSample};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::store::{Calibration, Configuration};
 use gyronet::units::Micros;
 use gyronet::vehicle::VehicleSample;
 
@@ -75,6 +76,8 @@ pub struct Board {
     fog_network: FogNet<'static, 'static>,
     fog_feed: YawFeed,
     sample_time: Micros,
+    stored_damaged: bool,
+    configuration_lost: bool,
     /// What an emulated board has sent: see [`Board::following`].
     heard: Vec<Vec<u8>>,
     /// Silent for so many message sets.
@@ -99,12 +102,22 @@ impl Board {
     #[must_use]
     pub fn new() -> Self {
         let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+        Self::configured(&Configuration::DEFAULT, blob)
+    }
+
+    /// With another configuration, on other weights.
+    ///
+    /// # Panics
+    /// When the configuration, or FoGNet's own weights, are refused.
+    #[must_use]
+    pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
+        let config = Config::new(configuration.can).expect("a configuration that can be stored");
         let fog_blob = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
         Self {
             network: GyroNet::new(blob),
             mti: Mti::new(),
-            guard: Guard::new(PipelineConfig::DEFAULT),
-            feeds: Feeds::new(CONFIG),
+            guard: Guard::new(configuration.pipeline(&Calibration::NONE)),
+            feeds: Feeds::new(config),
             wheels: WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"),
             wheels_heard: false,
             wheels_known: None,
@@ -113,6 +126,8 @@ impl Board {
             fog_network: FogNet::new(fog_blob, Box::leak(Box::new(FogNetState::ZERO))),
             fog_feed: YawFeed::fog(),
             sample_time: Micros(0),
+            stored_damaged: false,
+            configuration_lost: false,
             heard: Vec::new(),
             silent: 0,
             followed: 0,
@@ -125,7 +140,19 @@ impl Board {
     /// says so, too. All else must be the same.
     #[must_use]
     pub fn following(lines: Vec<Vec<u8>>) -> Self {
-        Self { heard: lines, ..Self::new() }
+        Self::new().beside(lines)
+    }
+
+    /// The same, beside one that was configured.
+    #[must_use]
+    pub fn beside(self, lines: Vec<Vec<u8>>) -> Self {
+        Self { heard: lines, ..self }
+    }
+
+    /// Found something damaged at its start, perhaps the configuration itself.
+    #[must_use]
+    pub fn damaged(self, configuration_lost: bool) -> Self {
+        Self { stored_damaged: true, configuration_lost, ..self }
     }
 
     /// Says what the emulated board has said before anything else came.
@@ -135,7 +162,7 @@ impl Board {
             let Some(vehicle) = guard.poll(Micros(TIMEOUT_US + self.silent * PERIOD_US)) else {
                 return;
             };
-            let set = lines_of(&mut feeds, &vehicle);
+            let set = lines_of(&mut feeds, &self.told(vehicle));
             let at = self.lines.len();
             if self.heard.get(at..at + set.len()) != Some(&set[..]) {
                 return;
@@ -165,7 +192,7 @@ impl Board {
                 if let Some(due) = output.window {
                     self.guard.pipeline().deliver(due.end, self.network.estimate(&due.features));
                 }
-                self.send(&output.vehicle);
+                self.send(output.vehicle);
                 self.fog_out();
             }
         }
@@ -217,13 +244,25 @@ impl Board {
         for set in self.silent..self.silent + sets {
             let now = Micros(TIMEOUT_US + set * PERIOD_US);
             let vehicle = self.guard.poll(now).expect("the sensor is silent");
-            self.send(&vehicle);
+            self.send(vehicle);
         }
         self.silent += sets;
     }
 
-    fn send(&mut self, vehicle: &VehicleSample) {
-        let lines = lines_of(&mut self.feeds, vehicle);
+    /// As the image tells it.
+    fn told(&self, mut vehicle: VehicleSample) -> VehicleSample {
+        if self.stored_damaged {
+            vehicle.yaw.faults = vehicle.yaw.faults.with(Faults::STORED);
+        }
+        if self.configuration_lost {
+            vehicle.doubt();
+        }
+        vehicle
+    }
+
+    fn send(&mut self, vehicle: VehicleSample) {
+        let vehicle = self.told(vehicle);
+        let lines = lines_of(&mut self.feeds, &vehicle);
         self.lines.extend(lines);
     }
 }

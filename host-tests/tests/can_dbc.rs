@@ -146,7 +146,7 @@ fn each_fault_has_its_bit() {
         ("Fault_Stuck", Faults::STUCK),
         ("Fault_Implausible", Faults::IMPLAUSIBLE),
         ("Fault_Late", Faults::LATE),
-        ("Fault_Weights", Faults::WEIGHTS),
+        ("Fault_Stored", Faults::STORED),
         ("Fault_Wheels", Faults::WHEELS),
         ("Fault_Bus", Faults::BUS),
     ] {

@@ -1,5 +1,5 @@
 //! The image's service line in QEMU, asked by the tool's own code: what it says of itself, what
-//! it refuses without a flash controller, a flood of noise, a restart.
+//! it refuses without a flash controller (what is stored: `firmware_stored`), a flood of noise, a restart.
 
 use gyronet::service::event::EventKind;
 use gyronet::service::message::{FlashState, Info, Origin, Refusal};
@@ -37,10 +37,10 @@ fn info(device: &mut Device<Line>) -> Info {
 }
 
 #[test]
-fn board_without_flash_says_so() {
-    let Some((_board, mut device)) = boot("board_without_flash_says_so") else { return };
+fn board_with_nothing_stored_says_so() {
+    let Some((_board, mut device)) = boot("board_with_nothing_stored_says_so") else { return };
     let about = info(&mut device);
-    assert_eq!(about.flash, FlashState::Absent);
+    assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
     assert_eq!(about.configuration, Origin::BuiltIn);
     assert_eq!(about.weights, WeightSource::BuiltIn);
     assert_eq!((about.identity.device_id, about.identity.crash), (None, None));

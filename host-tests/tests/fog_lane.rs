@@ -78,7 +78,7 @@ fn a_gap_is_no_rate_and_ends_the_window() {
 fn what_is_missing_is_said() {
     let mut lane = FogLane::new(FogConfig::DEFAULT, false);
     let sent = run(&mut lane, 1..301, |_| true);
-    assert!(sent.iter().all(|yaw| yaw.source == Source::Raw && yaw.faults == Faults::WEIGHTS));
+    assert!(sent.iter().all(|yaw| yaw.source == Source::Raw && yaw.faults == Faults::STORED));
     assert!(lane.window().is_none());
     let mut lane = FogLane::new(FogConfig::DEFAULT, true);
     lane.push(Micros(PERIOD_US), sample(1));

@@ -34,7 +34,7 @@ const IDENTITY: Identity = Identity {
 fn start(flash: &Rc<RefCell<F405>>) -> Board {
     let records = Region::new(flash, layout::STORE);
     let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
-    board.begin(Some(records), Some(MappedRegion::new(flash)), IDENTITY);
+    board.begin(Some(records), Some(MappedRegion::new(flash)), true, IDENTITY);
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &weights::DEFAULT.0);
     assert!(blob.is_some());
@@ -44,7 +44,7 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
 /// Without a flash controller, as in the emulator.
 fn bare() -> Board {
     let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
-    board.begin(None, None, IDENTITY);
+    board.begin(None, None, false, IDENTITY);
     board.weights(None, &weights::DEFAULT.0);
     board
 }
@@ -132,6 +132,33 @@ fn damaged_record_is_noted() {
     let mut board = start(&flash);
     assert_eq!(info(&mut board).flash, FlashState::Damaged);
     assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
+    assert!(board.stored_damaged() && board.configuration_lost());
+    let Reply::Log(page) = ask(&mut board, &Request::Log { after: 0 }) else { panic!("no log") };
+    assert!(page.events.iter().any(|event| event.kind == EventKind::RecordsDamaged));
+    // Until it is stored again.
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Reply::Done);
+    let board = start(&flash);
+    assert!(!board.stored_damaged() && !board.configuration_lost());
+}
+
+/// As in the emulator, whose flash is mapped but has no controller.
+#[test]
+fn what_is_stored_is_read_without_a_controller() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
+    assert_eq!(ask(&mut start(&flash), &set(wanted)), Reply::Done);
+    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
+    let records = Region::new(&flash, layout::STORE);
+    board.begin(Some(records), Some(MappedRegion::new(&flash)), false, IDENTITY);
+    assert_eq!(*board.configuration(), wanted);
+    let about = info(&mut board);
+    assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
+    let before = flash.borrow().operations();
+    let no_flash = Reply::Refused(Refusal::Store(StoreError::NoFlash));
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), no_flash);
+    let no_slot = Reply::Refused(Refusal::Slot(SlotError::NoFlash));
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
+    assert_eq!(flash.borrow().operations(), before);
 }
 
 #[test]

@@ -160,7 +160,7 @@ fn no_flipped_bit_is_believed() {
     );
     let mut store = open(&flash);
     store.set(&old).expect("it is stored");
-    let from = 8 + layout::STORE.start as usize;
+    let from = layout::STORE.start as usize;
     store.set(&new).expect("it is stored");
     let end = flash.borrow().bytes()[..layout::STORE.end as usize].iter().rposition(|byte| *byte != 0xFF);
     let mut flips = 0;

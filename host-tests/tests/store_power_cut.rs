@@ -2,19 +2,14 @@
 //! upload, on a flash with the F405's rules: the old or the new is always there, whole.
 
 use gyronet::model::weights;
-use gyronet::store::layout::{self, RECORD_SECTOR, SLOT_SIZE};
-use gyronet::store::slots::{Selection, Upload, WeightSource, select};
-use gyronet::store::{Accepted, Calibration, Configuration, Record, Slot, Store};
+use gyronet::store::layout::{self, SLOT_SIZE};
+use gyronet::store::slots::{Selection, WeightSource, select};
+use gyronet::store::{Accepted, Calibration, Configuration, Record, Slot};
 use gyronet::units::{AngularRate, CentiCelsius};
-use gyronet_host_tests::flash::{Cut, F405, Region};
+use gyronet_host_tests::flash::{Cut, F405};
+use gyronet_host_tests::stored::{open, other_weights, slots, upload};
 use std::cell::RefCell;
 use std::rc::Rc;
-
-type Records = Store<Region<RECORD_SECTOR>>;
-
-fn open(flash: &Rc<RefCell<F405>>) -> Result<Records, gyronet::store::StoreError> {
-    Store::open(Region::new(flash, layout::STORE), 0)
-}
 
 fn configuration(k: usize) -> Configuration {
     Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT }
@@ -123,36 +118,6 @@ fn calibration_write() {
     every_cut("calibration", calibration);
 }
 
-/// The built-in weights under another name: other provenance, other checksum.
-fn other_weights() -> Vec<u8> {
-    let mut file = weights::DEFAULT.0.to_vec();
-    let end = file.len() - 4;
-    let letter = file[76..].iter().position(u8::is_ascii_lowercase).expect("provenance is text");
-    file[76 + letter].make_ascii_uppercase();
-    let crc = gyronet::model::blob::CRC.checksum(&file[..end]);
-    file[end..].copy_from_slice(&crc.to_le_bytes());
-    file
-}
-
-fn slots(flash: &F405) -> [&[u8]; 2] {
-    let bytes = &flash.bytes()[layout::SLOTS.start as usize..layout::SLOTS.end as usize];
-    bytes.split_at(SLOT_SIZE).into()
-}
-
-/// Uploads a file to a slot, checks it and accepts it, as the board does.
-fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), String> {
-    let text = |error: &dyn std::error::Error| error.to_string();
-    let mut region = Region::<SLOT_SIZE>::new(flash, layout::SLOTS);
-    let mut upload = Upload::begin(&mut region, slot, file.len() as u32).map_err(|e| text(&e))?;
-    for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
-        upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
-    }
-    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?;
-    let mut store = open(flash).map_err(|e| text(&e))?;
-    let accepted = store.get::<Accepted>().map_err(|e| text(&e))?.unwrap_or(Accepted::NONE);
-    store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))
-}
-
 /// What the board would run on after a restart.
 fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
     let accepted = open(flash).and_then(|mut store| store.get::<Accepted>());
@@ -164,7 +129,7 @@ fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
 
 #[test]
 fn weight_upload() {
-    let (old, new) = (weights::DEFAULT.0.to_vec(), other_weights());
+    let (old, new) = (weights::DEFAULT.0.to_vec(), other_weights(1));
     let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     let flash = Rc::new(RefCell::new(F405::default()));
     assert_eq!(running(&flash), (WeightSource::BuiltIn, crc(&old)));

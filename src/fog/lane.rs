@@ -8,7 +8,7 @@
 //! | state | rate | source | quality | faults |
 //! |---|---|---|---|---|
 //! | an estimate is in use | less the correction | FoGNet | good | |
-//! | none yet, late, not believed, no weights, no wheels | as it is | raw | degraded | LATE, IMPLAUSIBLE, WEIGHTS, WHEELS |
+//! | none yet, late, not believed, no weights, no wheels | as it is | raw | degraded | LATE, IMPLAUSIBLE, STORED, WHEELS |
 //! | increments are missing in the step | not available | raw | unusable | GAP |
 
 use super::{FogConfig, FogCorrector, FogOutput, IncrementRate};
@@ -104,7 +104,7 @@ impl FogLane {
         let faults = self.estimate_faults;
         let faults = if turn.is_none() { faults.with(Faults::GAP) } else { faults };
         let faults = if wheels.is_none() { faults.with(Faults::WHEELS) } else { faults };
-        let faults = if self.has_network { faults } else { faults.with(Faults::WEIGHTS) };
+        let faults = if self.has_network { faults } else { faults.with(Faults::STORED) };
         let Some(turn) = output.turn else {
             let (yaw, quality) = (self.yaw, Quality::Unusable);
             return Some(YawSample { yaw, quality, faults, latency_us, ..YawSample::default() });

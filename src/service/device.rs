@@ -34,7 +34,7 @@ struct Uploading {
 
 /// What the board keeps beside the pipeline.
 ///
-/// Owns the flash: records in `R`, weight slots in `W`, `None` where there is no controller.
+/// Owns the flash: records in `R`, weight slots in `W`, `None` where none can be read.
 pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
@@ -43,6 +43,9 @@ pub struct Device<R: NorFlash, W> {
     fogs: &'static [FogPart],
     identity: Identity,
     flash: FlashState,
+    writable: bool,
+    /// Something that is stored is not used.
+    refused: bool,
     configuration: Configuration,
     configuration_origin: Origin,
     calibration: Calibration,
@@ -73,6 +76,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             fogs,
             identity: Identity::UNKNOWN,
             flash: FlashState::Absent,
+            writable: false,
+            refused: false,
             configuration: Configuration::DEFAULT,
             configuration_origin: Origin::BuiltIn,
             calibration: Calibration::NONE,
@@ -94,9 +99,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Reads what is stored; what is not whole or not in its range is not used and noted.
-    pub fn begin(&mut self, records: Option<R>, slots: Option<W>, identity: Identity) {
+    /// `writable`: a controller answers; without one what is stored can be read all the same.
+    pub fn begin(&mut self, records: Option<R>, slots: Option<W>, writable: bool, identity: Identity) {
         self.identity = identity;
         self.slots = slots;
+        self.writable = writable;
         self.note(EventKind::Started(identity.reset));
         if let Some(crash) = identity.crash {
             self.note(EventKind::Crashed(crash));
@@ -106,6 +113,29 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 Ok(store) => self.load(store),
                 Err(error) => self.flash = FlashState::Failed(error),
             }
+        }
+        if self.records_damaged() {
+            self.note(EventKind::RecordsDamaged);
+        }
+    }
+
+    fn records_damaged(&self) -> bool {
+        matches!(self.flash, FlashState::Damaged | FlashState::Failed(_))
+    }
+
+    /// Whether anything that is stored is damaged or refused: [`crate::health::Faults::STORED`].
+    #[must_use]
+    pub fn stored_damaged(&self) -> bool {
+        self.refused || self.records_damaged()
+    }
+
+    /// Whether a configuration was stored and none is used: what the sensor's axes are is not known.
+    #[must_use]
+    pub fn configuration_lost(&self) -> bool {
+        match self.configuration_origin {
+            Origin::BuiltIn => self.records_damaged(),
+            Origin::Stored => false,
+            Origin::Refused(_) => true,
         }
     }
 
@@ -119,7 +149,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Ok(None) => {}
             Err(error) => {
                 self.configuration_origin = Origin::Refused(error);
-                self.note(EventKind::ConfigurationRefused(error));
+                self.refuse(EventKind::ConfigurationRefused(error));
             }
         }
         match store.get() {
@@ -130,12 +160,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Ok(None) => {}
             Err(error) => {
                 self.calibration_origin = Origin::Refused(error);
-                self.note(EventKind::CalibrationRefused(error));
+                self.refuse(EventKind::CalibrationRefused(error));
             }
         }
         match store.get() {
             Ok(accepted) => self.accepted = accepted.unwrap_or(Accepted::NONE),
-            Err(error) => self.note(EventKind::AcceptedRefused(error)),
+            Err(error) => self.refuse(EventKind::AcceptedRefused(error)),
         }
         self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
         self.store = Some(store);
@@ -159,11 +189,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.refused_slots = refused;
         for (slot, error) in Slot::ALL.into_iter().zip(refused) {
             if let Some(error) = error {
-                self.note(EventKind::SlotRefused(slot, error));
+                self.refuse(EventKind::SlotRefused(slot, error));
             }
         }
         if source == WeightSource::None {
-            self.note(EventKind::NoWeights);
+            self.refuse(EventKind::NoWeights);
         }
         weights
     }
@@ -291,6 +321,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
+    fn refuse(&mut self, kind: EventKind) {
+        self.refused = true;
+        self.note(kind);
+    }
+
     fn note(&mut self, kind: EventKind) {
         self.log.push(self.tick, kind);
     }
@@ -301,6 +336,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             identity: self.identity,
             record_versions: [Configuration::VERSION, Calibration::VERSION],
             flash: self.flash,
+            writable: self.writable,
             configuration: self.configuration_origin,
             calibration: self.calibration_origin,
             weights: self.weights,
@@ -311,7 +347,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn store(&mut self) -> Result<&mut Store<R>, StoreError> {
-        self.store.as_mut().ok_or(StoreError::NoFlash)
+        self.store.as_mut().filter(|_| self.writable).ok_or(StoreError::NoFlash)
+    }
+
+    fn slots(&mut self) -> Result<&mut W, SlotError> {
+        self.slots.as_mut().filter(|_| self.writable).ok_or(SlotError::NoFlash)
     }
 
     fn set_configuration(&mut self, found: u8, configuration: &Configuration) -> Result<(), Refusal> {
@@ -338,7 +378,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 if !matches!(self.calibration_state, State::Found(_)) {
                     return Err(Refusal::NothingFound);
                 }
-                let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
+                let store = self.store.as_mut().filter(|_| self.writable).ok_or(StoreError::NoFlash)?;
                 store.set(&self.calibration)?;
                 self.calibration_origin = Origin::Stored;
                 self.calibration_state = State::Idle;
@@ -366,14 +406,13 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
         let slot = self.unused_slot();
         self.uploading = None;
-        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        let upload = Upload::begin(flash, slot, length)?;
+        let upload = Upload::begin(self.slots()?, slot, length)?;
         self.uploading = Some(Uploading { upload, checked: None });
         Ok(())
     }
 
     fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
-        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
+        let flash = self.slots.as_mut().filter(|_| self.writable).ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
         // Every block but the last one is full, so a block that is there already ends where the
         // next one begins.
@@ -392,7 +431,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     #[inline(never)]
     fn weights_verify(&mut self) -> Result<(), Refusal> {
-        let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
+        let flash = self.slots.as_ref().filter(|_| self.writable).ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
         uploading.checked = Some(uploading.upload.verify(flash.slots())?);
         Ok(())

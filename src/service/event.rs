@@ -88,6 +88,8 @@ pub enum EventKind {
     WeightsAccepted(Slot),
     /// The weights in use no longer fit their checksum: the network is off.
     WeightsDamaged,
+    /// Stored records are damaged: what is used is older, or built in.
+    RecordsDamaged,
 }
 
 /// Something that happened.

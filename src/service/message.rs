@@ -10,7 +10,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Of the messages; raised when one changes.
-pub const PROTOCOL: u8 = 2;
+pub const PROTOCOL: u8 = 3;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -216,7 +216,7 @@ impl Identity {
 /// State of the flash.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum FlashState {
-    /// There is no controller (the emulator): nothing can be stored.
+    /// There is none that this image can read.
     Absent,
     /// All records are whole.
     Ready,
@@ -235,8 +235,10 @@ pub struct Info {
     pub identity: Identity,
     /// Layout of the configuration and of the calibration.
     pub record_versions: [u8; 2],
-    /// The flash.
+    /// What is stored.
     pub flash: FlashState,
+    /// Whether a controller answers, so that something can be stored; the emulator has none.
+    pub writable: bool,
     /// Of the configuration.
     pub configuration: Origin,
     /// Of the calibration.

@@ -15,7 +15,7 @@
 //!
 //! | request | answer | what |
 //! |---|---|---|
-//! | `Info` | `Info` | versions, part, reset, clock, flash, weights, status |
+//! | `Info` | `Info` | versions, part, reset, clock, what is stored and whether it can be, weights, status |
 //! | `GetConfiguration` | `Configuration` | whole, with its layout version and where it comes from |
 //! | `SetConfiguration` | `Done` | checked, stored whole; holds from the next start on |
 //! | `GetCalibration` | `Calibration` | what is known, and how a calibration goes |

@@ -114,7 +114,7 @@ pub enum FlashFault {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StoreError {
-    /// There is no flash controller (the emulator): nothing can be stored.
+    /// No flash controller answers (the emulator has none): nothing can be stored.
     NoFlash,
     /// The flash reports an error.
     Flash(FlashFault),
@@ -138,7 +138,7 @@ pub enum StoreError {
 impl core::fmt::Display for StoreError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::NoFlash => f.write_str("there is no flash controller: nothing can be stored"),
+            Self::NoFlash => f.write_str("no flash controller answers: nothing can be stored"),
             Self::Flash(FlashFault::NotAligned) => f.write_str("flash: not the start of a word or sector"),
             Self::Flash(FlashFault::OutOfBounds) => f.write_str("flash: beyond its end"),
             Self::Flash(FlashFault::Refused) => f.write_str("flash: did not take or finish the operation"),

@@ -124,6 +124,8 @@ pub struct Store<F> {
     /// Where the next record goes, while there is room.
     free: Option<u32>,
     damaged: bool,
+    /// A header is neither one nor blank: a sector that would count may be lost.
+    header_damaged: bool,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -133,7 +135,8 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Flash`].
     pub fn open(flash: F, start: u32) -> Result<Self, StoreError> {
         const { assert!(F::READ_SIZE <= WORD && WORD.is_multiple_of(F::WRITE_SIZE)) };
-        let mut store = Self { flash, start, current: None, free: None, damaged: false };
+        let mut store =
+            Self { flash, start, current: None, free: None, damaged: false, header_damaged: false };
         for sector in [0, 1] {
             let generation = store.generation(sector)?;
             let newest = store.current.map(|(_, generation)| generation);
@@ -149,11 +152,11 @@ impl<F: NorFlash> Store<F> {
         Ok(store)
     }
 
-    /// Whether a record was found that is not whole: a power cut tore it, or the flash has lost
-    /// bits. What is read is then the one before.
+    /// Whether a record or a sector's header was found that is not whole: a power cut tore it, or
+    /// the flash has lost bits. What is read is then the record before.
     #[must_use]
     pub fn damaged(&self) -> bool {
-        self.damaged
+        self.damaged || self.header_damaged
     }
 
     /// The newest whole record; `None` before the first one.
@@ -210,7 +213,11 @@ impl<F: NorFlash> Store<F> {
         let at = self.range(sector).start;
         let generation = u32::from_le_bytes(self.read(at)?);
         let crc = u32::from_le_bytes(self.read(at + WORD_U32)?);
-        Ok((crc == header_crc(generation)).then_some(generation))
+        let whole = crc == header_crc(generation);
+        // Flash that was never written reads as ones, the emulator's as zeros.
+        let blank = generation == crc && [0, u32::MAX].contains(&crc);
+        self.header_damaged |= !whole && !blank;
+        Ok(whole.then_some(generation))
     }
 
     /// Reads a record, where there is one.
@@ -257,7 +264,7 @@ impl<F: NorFlash> Store<F> {
                 }
                 // Nothing is put behind what may be half a record.
                 Place::Blank => {
-                    self.free = (!self.damaged).then_some(at);
+                    self.free = (!self.damaged()).then_some(at);
                     return Ok(found);
                 }
                 Place::End => {
@@ -298,6 +305,8 @@ impl<F: NorFlash> Store<F> {
         self.append(sector, at, newest)?.ok_or(StoreError::Full)?;
         self.flash.write(start, &generation.to_le_bytes()).map_err(fault)?;
         self.flash.write(start + WORD_U32, &header_crc(generation).to_le_bytes()).map_err(fault)?;
+        // The other sector's was good, if there was one.
+        self.header_damaged &= self.current.is_none();
         self.current = Some((sector, generation));
         Ok(())
     }

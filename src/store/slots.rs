@@ -93,7 +93,7 @@ impl Record for Accepted {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SlotError {
-    /// There is no flash controller (the emulator).
+    /// No flash controller answers (the emulator has none).
     NoFlash,
     /// The flash reports an error.
     Flash(FlashFault),
@@ -122,7 +122,7 @@ pub enum SlotError {
 impl core::fmt::Display for SlotError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::NoFlash => f.write_str("there is no flash controller: nothing can be stored"),
+            Self::NoFlash => f.write_str("no flash controller answers: nothing can be stored"),
             Self::Flash(_) => f.write_str("the flash did not take the operation"),
             Self::Empty => f.write_str("the slot is empty"),
             Self::Length(length) => {

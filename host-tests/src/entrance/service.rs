@@ -24,7 +24,7 @@ pub fn line(mut data: &[u8]) {
     let choice = byte(&mut data);
     let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
     let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(|| RamFlash::new(&[])));
-    board.begin((choice & 4 != 0).then_some(records), slots, Identity::UNKNOWN);
+    board.begin((choice & 4 != 0).then_some(records), slots, choice & 8 == 0, Identity::UNKNOWN);
     // As the asking side, which a board might talk nonsense to.
     let mut asker = Deframer::new();
     for byte in data {

@@ -68,6 +68,15 @@ struct Out {
     until: u64,
 }
 
+/// What was found at the start to be wrong with what is stored.
+#[derive(Clone, Copy)]
+pub struct Doubts {
+    /// Anything at all.
+    pub stored: bool,
+    /// The configuration itself: the built-in one stands in for it.
+    pub configuration: bool,
+}
+
 /// Everything that the output task owns, but its lines.
 pub struct Unconnected {
     pub guard: &'static mut Guard,
@@ -76,6 +85,7 @@ pub struct Unconnected {
     pub has_network: bool,
     /// Samples from a window's newest one to the one that its estimate is used with.
     pub delay: u32,
+    pub doubts: Doubts,
 }
 
 /// The output task.
@@ -88,6 +98,7 @@ pub struct Output {
     guard: &'static mut Guard,
     has_network: bool,
     delay: u32,
+    doubts: Doubts,
     out: Option<Out>,
     tick: u32,
     wheels: Option<WheelReceiver>,
@@ -118,7 +129,7 @@ type Ports = (ImuPort, FogPort, SlcanPort, Option<Bus>);
 impl Unconnected {
     #[inline]
     pub fn connect(self, (imu, fog, slcan, can): Ports, time: BoardTime, watchdog: Watchdog) -> Output {
-        let Self { guard, config, wheels, has_network, delay } = self;
+        let Self { guard, config, wheels, has_network, delay, doubts } = self;
         Output {
             imu,
             fog,
@@ -128,6 +139,7 @@ impl Unconnected {
             guard,
             has_network,
             delay,
+            doubts,
             out: None,
             tick: 0,
             wheels: wheels.and_then(|wheels| WheelReceiver::new(wheels).ok()),
@@ -282,6 +294,9 @@ impl Output {
     #[inline(never)]
     fn send(&mut self, mut vehicle: VehicleSample, time: Micros) {
         vehicle.yaw.faults = vehicle.yaw.faults.with(self.faults());
+        if self.doubts.configuration {
+            vehicle.doubt();
+        }
         for frame in &self.feeds.process::<DataFrame>(&vehicle) {
             self.transmit(*frame, time);
         }
@@ -313,7 +328,7 @@ impl Output {
         let lost = core::mem::replace(&mut self.dropped, dropped) < dropped;
         let off = self.can.as_ref().is_some_and(Bus::off);
         let bus = if lost || off { Faults::BUS } else { Faults::NONE };
-        if self.has_network { bus } else { bus.with(Faults::WEIGHTS) }
+        if self.has_network && !self.doubts.stored { bus } else { bus.with(Faults::STORED) }
     }
 
     fn frames_in(&mut self) {

@@ -3,7 +3,7 @@
 use crate::board::Board;
 use crate::chip::flash::{Flash, Records, Slots};
 use crate::idle::Stored;
-use crate::output::Unconnected;
+use crate::output::{Doubts, Unconnected};
 use core::mem::MaybeUninit;
 use gyronet::can::config::Config;
 use gyronet::can::wheel::WheelSettings;
@@ -38,7 +38,8 @@ pub fn parts(board: &Board) -> Option<Parts> {
         None => None,
     };
     let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(PARTS, FOGS) })?;
-    device.begin(flash.map(Records), flash.map(Slots), board.identity);
+    let writable = flash.is_some_and(Flash::writable);
+    device.begin(flash.map(Records), flash.map(Slots), writable, board.identity);
     // Without good weights the pipeline still runs: the status says degraded, and the rate is
     // the gyro's less its static bias.
     let blob = device.weights(flash.map(Flash::slots_at_start), &weights::DEFAULT.0);
@@ -47,12 +48,13 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let configuration = device.configuration();
     let pipeline = configuration.pipeline(device.calibration());
     let delay = pipeline.compensate.mode.delay();
+    let doubts = Doubts { stored: device.stored_damaged(), configuration: device.configuration_lost() };
     // What is stored has been checked.
     let config = Config::new(configuration.can).unwrap_or(Config::DEFAULT);
     let guard = cortex_m::singleton!(: MaybeUninit<Guard> = MaybeUninit::uninit())?;
     let guard = place(guard, || Guard::new(pipeline));
     Some(Parts {
-        output: Unconnected { guard, config, wheels: Some(WHEELS), has_network, delay },
+        output: Unconnected { guard, config, wheels: Some(WHEELS), has_network, delay, doubts },
         weights: blob,
         fog_network: fog_network(),
         device: (device, check),

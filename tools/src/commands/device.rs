@@ -161,7 +161,8 @@ fn print_info(info: &Info) {
         );
     }
     println!("status        {:?}", info.status);
-    println!("flash         {:?}", info.flash);
+    let writable = if info.writable { "" } else { ", no controller: nothing can be stored" };
+    println!("flash         {:?}{writable}", info.flash);
     println!("configuration {:?}, layout {}", info.configuration, info.record_versions[0]);
     println!("calibration   {:?}, layout {}", info.calibration, info.record_versions[1]);
     let crc = info.weights_crc.map(|crc| format!(", checksum {crc:08x}")).unwrap_or_default();

@@ -11,7 +11,7 @@ const FAULTS: [(Faults, &str); 8] = [
     (Faults::STUCK, "stuck"),
     (Faults::IMPLAUSIBLE, "implausible"),
     (Faults::LATE, "late"),
-    (Faults::WEIGHTS, "weights"),
+    (Faults::STORED, "stored"),
     (Faults::WHEELS, "wheels"),
     (Faults::BUS, "bus"),
 ];

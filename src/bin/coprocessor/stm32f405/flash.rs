@@ -1,4 +1,4 @@
-//! The flash controller (RM0090 3), which the emulator lacks.
+//! The flash (RM0090 3). Reading it wants no controller; the emulator has none, and writes nothing.
 #![allow(unsafe_code, reason = "flash is memory that is written by address; each block says why it is sound")]
 
 use core::cell::RefCell;
@@ -29,13 +29,16 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// The controller, if there is one: after a reset it is locked, and the emulator's nothing
-    /// reads as not locked.
+    /// The part's own, which can always be read.
     pub fn probe() -> Option<Self> {
         // SAFETY: the clock tree is done with it, and this is called once.
-        let registers = unsafe { pac::FLASH::steal() };
-        let locked = registers.cr().read().lock().bit_is_set();
-        locked.then(|| Self { registers: RefCell::new(registers) })
+        Some(Self { registers: RefCell::new(unsafe { pac::FLASH::steal() }) })
+    }
+
+    /// Whether the controller answers: it is locked but while it works, and the emulator's nothing
+    /// reads as not locked.
+    pub fn writable(&self) -> bool {
+        self.registers.try_borrow().is_ok_and(|registers| locked(&registers))
     }
 
     fn operate(
@@ -44,6 +47,9 @@ impl Flash {
     ) -> Result<(), FlashError> {
         let refused = FlashError(NorFlashErrorKind::Other);
         let registers = self.registers.try_borrow_mut().map_err(|_| refused)?;
+        if !locked(&registers) {
+            return Err(refused);
+        }
         for key in KEYS {
             registers.keyr().write(|w| unsafe {
                 // SAFETY: the two keys that unlock it, in order.
@@ -89,6 +95,10 @@ impl Flash {
             unsafe { core::slice::from_raw_parts((FLASH_BASE + offset) as *const u8, SLOT_SIZE) }
         })
     }
+}
+
+fn locked(registers: &pac::FLASH) -> bool {
+    registers.cr().read().lock().bit_is_set()
 }
 
 /// Waits until the controller is idle, and reports what went wrong.

@@ -26,6 +26,11 @@ impl Flash {
     }
 
     /// Of none.
+    pub fn writable(&self) -> bool {
+        match self.0 {}
+    }
+
+    /// Of none.
     pub fn slots_at_start(&self) -> [&'static [u8]; 2] {
         match self.0 {}
     }

@@ -1,0 +1,221 @@
+//! Everything connected: what comes over the lines of a board that has an MTi, a fibre-optic gyro that
+//! is simulated from the reference, and wheel frames over SLCAN; with a board in the emulator and
+//! one on the host taking the same, one input after the other.
+
+use crate::recordings::Row;
+use crate::{qemu, replay};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::bosch::TX1_ID;
+use gyronet::can::yaw::RateMessage;
+use gyronet::can::{DataFrame, slcan};
+use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
+use gyronet::sensor::xsens::MtData2;
+use gyronet::service::message::AllCounters;
+use gyronet::service::{Reply, Request};
+use gyronet_tools::device::{Device, line::Line};
+use std::time::{Duration, Instant};
+
+const LIMIT: Duration = Duration::from_secs(60);
+const IMU: usize = 1;
+const SLCAN: usize = 2;
+const FOG: usize = 3;
+const SERVICE: usize = 6;
+/// Lines that a board needs for it.
+pub const USARTS: usize = SERVICE;
+/// Messages of the gyro in 10 ms.
+const MESSAGES: usize = 10;
+/// Frames of one sample of the MTi.
+const SET: usize = 6;
+/// How TX1 begins when the sensor is silent: no rate, failed.
+const SILENT: &[u8] = b"t1748008020FF0080";
+/// Samples from one wheel frame to the next.
+const WHEELS: usize = 2;
+/// It stands for so many samples.
+const STANDING: usize = 600;
+
+/// What comes in 10 ms, in this order.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Of all four wheels.
+    pub wheels: Option<DataFrame>,
+    /// From the MTi.
+    pub imu: MtData2,
+    /// From the fibre-optic gyro.
+    pub fog: Vec<u8>,
+}
+
+impl Step {
+    /// What comes with a row.
+    #[must_use]
+    pub fn of(number: usize, row: &Row) -> Self {
+        let speed = if number < STANDING { 0.0 } else { 20.0 };
+        Self {
+            wheels: number.is_multiple_of(WHEELS).then(|| wheels(speed)),
+            imu: replay::message(number, row),
+            fog: fog(number, row),
+        }
+    }
+
+    fn inputs(self) -> impl Iterator<Item = Input> {
+        let wheels = self.wheels.map(Input::Wheels);
+        wheels.into_iter().chain([Input::Imu(self.imu.emit().to_vec()), Input::Fog(self.fog)])
+    }
+}
+
+/// What the gyro sends in the 10 ms that end with a row: a tenth of its turn each. It begins with the
+/// message that ends with the first row, so that a set of ours always comes with the last message.
+fn fog(number: usize, row: &Row) -> Vec<u8> {
+    let message = |part: usize| {
+        let sequence = ((number * MESSAGES + part) % 128) as u8;
+        let angle = (row.reference * 0.01 / MESSAGES as f64) as f32;
+        Message {
+            rotation: [0.0, 0.0, angle],
+            acceleration: [0.0; 3],
+            extra: Extra::Temperature(25),
+            validity: Validity::ALL,
+            sequence,
+        }
+    };
+    let first = if number == 0 { MESSAGES - 1 } else { 0 };
+    (first..MESSAGES).flat_map(|part| message(part).emit().to_vec()).collect()
+}
+
+/// All wheels at a speed, km/h.
+fn wheels(speed: f64) -> DataFrame {
+    let code = ((speed + 67.67) * 100.0).round() as u16;
+    let id = StandardId::new(0xAA).expect("11 bits");
+    DataFrame::new(id, &[code.to_be_bytes(); 4].concat()).expect("eight bytes")
+}
+
+/// What comes over one line.
+enum Input {
+    Wheels(DataFrame),
+    Imu(Vec<u8>),
+    Fog(Vec<u8>),
+}
+
+impl Input {
+    /// Whether what comes of it shows that all of it has been taken.
+    fn push(&self, host: &mut replay::Board) -> bool {
+        match self {
+            Self::Wheels(frame) => host.wheel(frame),
+            Self::Imu(bytes) => host.push(bytes),
+            Self::Fog(bytes) => {
+                let taken = host.fog().samples;
+                let (last, before) = bytes.split_last().expect("the gyro sends all the time");
+                host.push_fog(before);
+                let lines = host.lines.len();
+                host.push_fog(&[*last]);
+                return host.lines.len() > lines || host.fog().samples == taken;
+            }
+        }
+        true
+    }
+
+    fn line(&self) -> (usize, Vec<u8>) {
+        match self {
+            Self::Wheels(frame) => (SLCAN, slcan::emit(frame).expect("a data frame").to_vec()),
+            Self::Imu(bytes) => (IMU, bytes.clone()),
+            Self::Fog(bytes) => (FOG, bytes.clone()),
+        }
+    }
+}
+
+/// What both boards have made of the same.
+pub struct Outcome {
+    /// The host's, without what an emulated one says because its host is busy.
+    pub host: replay::Board,
+    /// The host's that has followed.
+    pub followed: replay::Board,
+    /// Frames of the emulated one.
+    pub sent: usize,
+    /// What it has counted.
+    pub counters: AllCounters,
+}
+
+/// Gives each input to the emulated board when it has taken the one before: which comes first is
+/// part of what both must make the same of. Every frame must be the host's.
+///
+/// # Panics
+/// When one is not, or frames are missing.
+#[must_use]
+pub fn run(board: &mut qemu::Board, steps: &[Step]) -> Outcome {
+    let port = board.serve(SERVICE).to_string();
+    let mut device = Device::new(Line::open(&port).expect("the harness listens"), &port);
+    board.send(SERVICE, &[0], LIMIT);
+    let mut host = replay::Board::new();
+    let mut answers = 0;
+    let inputs: Vec<Input> = steps.iter().cloned().flat_map(Step::inputs).collect();
+    let mut said_silent = 0;
+    for input in &inputs {
+        let before = host.lines.len();
+        let seen = input.push(&mut host);
+        said_silent += host.lines[before..].iter().filter(|line| line.starts_with(SILENT)).count();
+        let (usart, bytes) = input.line();
+        board.send(usart, &bytes, LIMIT);
+        answers += usize::from(usart == SLCAN);
+        let awaited = host.lines.len() + answers;
+        board.await_sent(SLCAN, LIMIT, |sent| {
+            let lines = sent.split_inclusive(|byte| *byte == b'\r');
+            let (all, silent) = lines.fold((0, 0), |(all, silent), line| {
+                (all + usize::from(line.ends_with(b"\r")), silent + usize::from(line.starts_with(SILENT)))
+            });
+            all + said_silent * SET >= awaited + silent * SET
+        });
+        let until = Instant::now() + LIMIT;
+        while !seen && counters(&mut device).fog.samples != host.fog().samples {
+            assert!(Instant::now() < until, "the gyro's messages are not taken");
+        }
+    }
+    let counters = counters(&mut device);
+    let sent = frames(&board.lines(SLCAN, b'\r', 0, LIMIT));
+    let mut followed = replay::Board::following(sent.clone());
+    for input in &inputs {
+        input.push(&mut followed);
+    }
+    for (number, (line, expected)) in sent.iter().zip(&followed.lines).enumerate() {
+        let text = |line: &[u8]| line.escape_ascii().to_string();
+        assert_eq!(text(line), text(expected), "frame {number}");
+    }
+    assert!(sent.len() >= followed.lines.len(), "{} of {}", sent.len(), followed.lines.len());
+    assert!(followed.followed < steps.len() as u64 / 10, "the host was busy: {}", followed.followed);
+    Outcome { host, followed, sent: sent.len(), counters }
+}
+
+fn counters(device: &mut Device<Line>) -> AllCounters {
+    match device.ask(&Request::Counters) {
+        Ok(Reply::Counters(counters)) => counters,
+        other => panic!("no counters: {other:?}"),
+    }
+}
+
+/// What the host alone makes of it.
+#[must_use]
+pub fn on_host(steps: &[Step]) -> replay::Board {
+    let mut host = replay::Board::new();
+    for input in steps.iter().cloned().flat_map(Step::inputs) {
+        input.push(&mut host);
+    }
+    host
+}
+
+/// Frames among lines; the answers to the wheel frames left out.
+fn frames(lines: &[Vec<u8>]) -> Vec<Vec<u8>> {
+    lines.iter().filter(|line| line.starts_with(b"t")).cloned().collect()
+}
+
+/// Frames with an identifier of 11 bits among lines, each with the number of the MTi's sample before it.
+pub fn of(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, DataFrame)> {
+    let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+    let frames = lines.iter().map(|line| slcan::parse::<DataFrame>(line).expect("a frame"));
+    let numbered = frames.scan(0, move |samples, frame| {
+        *samples += usize::from(frame.id() == Id::Standard(TX1_ID));
+        Some((samples.saturating_sub(1), frame))
+    });
+    numbered.filter(move |(_, frame)| frame.id() == id)
+}
+
+/// Rates with an identifier.
+pub fn rates(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, RateMessage)> {
+    of(lines, id).map(|(samples, frame)| (samples, RateMessage::parse(frame.data()).expect("a rate")))
+}

@@ -1,0 +1,107 @@
+//! What is stored in the emulated board's flash: written by the library's own store to the mock of
+//! the F405's flash, and laid into the emulator's memory, which is mapped though it has no controller.
+
+use crate::flash::{F405, Region};
+use gyronet::model::blob::CRC;
+use gyronet::model::weights;
+use gyronet::store::layout::{self, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE};
+use gyronet::store::slots::Upload;
+use gyronet::store::{Accepted, Record, Slot, Store, StoreError};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::path::Path;
+use std::rc::Rc;
+
+/// The records of a flash.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, StoreError> {
+    Store::open(Region::new(flash, layout::STORE), 0)
+}
+
+/// Both weight slots of a flash.
+#[must_use]
+pub fn slots(flash: &F405) -> [&[u8]; 2] {
+    let bytes = &flash.bytes()[layout::SLOTS.start as usize..layout::SLOTS.end as usize];
+    bytes.split_at(SLOT_SIZE).into()
+}
+
+/// Uploads a file to a slot, checks it and accepts it, as the board does.
+///
+/// # Errors
+/// What the slot or the store says.
+pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), String> {
+    let text = |error: &dyn std::error::Error| error.to_string();
+    let mut region = Region::<SLOT_SIZE>::new(flash, layout::SLOTS);
+    let mut upload = Upload::begin(&mut region, slot, file.len() as u32).map_err(|e| text(&e))?;
+    for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
+        upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
+    }
+    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?;
+    let mut store = open(flash).map_err(|e| text(&e))?;
+    let accepted = store.get::<Accepted>().map_err(|e| text(&e))?.unwrap_or(Accepted::NONE);
+    store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))
+}
+
+/// The built-in weights with these bits of the output's bias flipped (bits 8 to 15 of it), and a
+/// checksum that fits.
+#[must_use]
+pub fn other_weights(bits: u8) -> Vec<u8> {
+    let mut file = weights::DEFAULT.0.to_vec();
+    let end = file.len() - 4;
+    // Behind it: two bytes of its own, multiplier, the other row (120 weights, 8 bytes), the unit.
+    file[end - (2 + 1 + 4 + 2 * 120 + 8 + 4)] ^= bits;
+    let crc = CRC.checksum(&file[..end]);
+    file[end..].copy_from_slice(&crc.to_le_bytes());
+    file
+}
+
+/// A board's flash before it starts.
+#[derive(Debug, Default)]
+pub struct Stored(Rc<RefCell<F405>>);
+
+impl Stored {
+    /// With a record.
+    ///
+    /// # Panics
+    /// When it is refused.
+    #[must_use]
+    pub fn record<R: Record>(self, record: &R) -> Self {
+        open(&self.0).and_then(|mut store| store.set(record)).expect("it is stored");
+        self
+    }
+
+    /// With an accepted weight file; the last one is the one to be used.
+    ///
+    /// # Panics
+    /// When it is refused.
+    #[must_use]
+    pub fn weights(self, slot: Slot, file: &[u8]) -> Self {
+        upload(&self.0, slot, file).expect("it is accepted");
+        self
+    }
+
+    /// With bits of a byte flipped, at an offset into the flash.
+    #[must_use]
+    pub fn damaged(self, offset: u32, bits: u8) -> Self {
+        self.0.borrow_mut().damage(offset as usize, bits);
+        self
+    }
+
+    /// QEMU's arguments that lay it into the board's memory; its files go to `folder`.
+    ///
+    /// # Panics
+    /// When they cannot be written.
+    #[must_use]
+    pub fn arguments(&self, folder: &Path, test: &str) -> Vec<String> {
+        let flash = self.0.borrow();
+        let lay = |Range { start, end }: Range<u32>| {
+            let file = folder.join(format!("{test}_{start:x}.bin"));
+            std::fs::write(&file, &flash.bytes()[start as usize..end as usize]).expect("a file for QEMU");
+            let address = FLASH_BASE + start;
+            ["-device".into(), format!("loader,file={},addr={address:#x},force-raw=on", file.display())]
+        };
+        [layout::STORE, layout::SLOTS].into_iter().flat_map(lay).collect()
+    }
+}

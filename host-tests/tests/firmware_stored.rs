@@ -1,0 +1,244 @@
+//! What is stored, in the emulated image: a configuration and weights take effect, damaged ones do
+//! not, and the bus and the service line say so from the first frame on. Every frame is held
+//! against the host's, byte for byte.
+
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::config::{Settings, YawSettings};
+use gyronet::can::yaw::{AngleMessage, Faults, Quality, RateMessage, Source};
+use gyronet::can::{DataFrame, slcan};
+use gyronet::model::{Blob, weights};
+use gyronet::service::event::EventKind;
+use gyronet::service::message::{FlashState, Info, Origin, Refusal};
+use gyronet::service::{Reply, Request};
+use gyronet::store::layout::{SLOT_SIZE, SLOTS, STORE};
+use gyronet::store::slots::{SlotError, WeightSource};
+use gyronet::store::{Configuration, FieldError, ImuPart, Mounting, Record, Slot, StoreError};
+use gyronet_host_tests::recordings::{self, workspace};
+use gyronet_host_tests::stored::{Stored, other_weights};
+use gyronet_host_tests::{image, qemu, replay};
+use gyronet_tools::device::line::Line;
+use gyronet_tools::device::{Device, DeviceError};
+use std::path::Path;
+use std::time::Duration;
+
+const LIMIT: Duration = Duration::from_secs(120);
+const IMU: usize = 1;
+const SLCAN: usize = 2;
+const SERVICE: usize = 6;
+/// By then the network corrects.
+const SAMPLES: usize = 360;
+const RATE: u16 = 0x1A0;
+
+/// Samples of the simulated drive as bytes.
+fn drive() -> Vec<u8> {
+    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
+    rows.iter().take(SAMPLES).enumerate().flat_map(|(k, row)| replay::message(k, row).emit()).collect()
+}
+
+fn blob(file: Vec<u8>) -> Blob<'static> {
+    let words: Vec<u32> = file.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    Blob::new_checked(bytemuck::cast_slice(Vec::leak(words))).expect("a weight file")
+}
+
+fn built_in() -> Blob<'static> {
+    Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library")
+}
+
+/// What a board says that has run for [`SAMPLES`].
+struct Told {
+    frames: Vec<DataFrame>,
+    device: Device<Line>,
+    /// For as long as it is asked.
+    _board: qemu::Board,
+}
+
+impl Told {
+    /// Of a board that starts with this flash and sends what the one on the host sends; `None` where
+    /// it cannot be run.
+    fn by(test: &str, stored: &Stored, host: impl Fn() -> replay::Board) -> Option<Self> {
+        let scratch = env!("CARGO_TARGET_TMPDIR");
+        let elf = image::coprocessor(test, scratch)?;
+        let arguments = stored.arguments(Path::new(scratch), test);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let mut board = qemu::Board::boot(&elf, SERVICE, &arguments);
+        let bytes = drive();
+        let mut alone = host();
+        alone.push(&bytes);
+        board.send(IMU, &bytes, LIMIT);
+        let lines = board.lines(SLCAN, b'\r', alone.lines.len(), LIMIT);
+        let mut host = host().beside(lines);
+        host.push(&bytes);
+        let lines = board.lines(SLCAN, b'\r', host.lines.len(), LIMIT);
+        for (number, (line, expected)) in lines.iter().zip(&host.lines).enumerate() {
+            let text = |line: &[u8]| line.escape_ascii().to_string();
+            assert_eq!(text(line), text(expected), "{test}: frame {number}");
+        }
+        println!("{test}: {} frames as the host's", host.lines.len());
+        let lines = &lines[..host.lines.len()];
+        let frames = lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect();
+        board.send(SERVICE, &[0], LIMIT);
+        let port = board.serve(SERVICE).to_string();
+        let device = Device::new(Line::open(&port).expect("the harness listens"), &port);
+        Some(Self { frames, device, _board: board })
+    }
+
+    fn of(&self, id: u16) -> impl Iterator<Item = &[u8]> {
+        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+        self.frames.iter().filter(move |frame| frame.id() == id).map(Frame::data)
+    }
+
+    fn rates(&self, id: u16) -> Vec<RateMessage> {
+        self.of(id).map(|data| RateMessage::parse(data).expect("eight bytes")).collect()
+    }
+
+    /// Whether the bus says from the first sample's frames on, 10 ms, that something stored is
+    /// damaged; it never says so for a part of the time.
+    fn flagged(&self) -> bool {
+        let faults = self.of(RATE + 1).map(|data| AngleMessage::parse(data).expect("eight bytes").faults);
+        let flags: Vec<bool> = faults.map(|faults| faults.0 & Faults::STORED.0 != 0).collect();
+        assert!(flags.windows(2).all(|pair| pair[0] == pair[1]) && flags.len() >= SAMPLES);
+        flags[0]
+    }
+
+    /// Samples whose rate is marked good, or whatever is asked for.
+    fn marked(&self, quality: Quality) -> usize {
+        self.rates(RATE).iter().filter(|rate| rate.quality == quality).count()
+    }
+
+    fn info(&mut self) -> Info {
+        match self.device.ask(&Request::Info) {
+            Ok(Reply::Info(info)) => info,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn events(&mut self) -> Vec<EventKind> {
+        match self.device.ask(&Request::Log { after: 0 }) {
+            Ok(Reply::Log(page)) => page.events.iter().map(|event| event.kind).collect(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn refusal(&mut self, request: &Request) -> Refusal {
+        match self.device.ask(request) {
+            Err(DeviceError::Refused(refusal)) => refusal,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn stored_configuration_takes_effect() {
+    const OTHER: u16 = 0x2B0;
+    let yaw = Settings::DEFAULT.yaw.map(|yaw| YawSettings { ids: [OTHER, OTHER + 1, OTHER + 2], ..yaw });
+    let configuration = Configuration {
+        can: Settings { yaw, bosch: None, ..Settings::DEFAULT },
+        mounting: Mounting { roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 90.0 },
+        latitude_deg: Some(48.1),
+        ..Configuration::DEFAULT
+    };
+    let stored = Stored::default().record(&configuration);
+    let host = || replay::Board::configured(&configuration, built_in());
+    let Some(mut board) = Told::by("stored_configuration_takes_effect", &stored, host) else { return };
+    assert_eq!((board.of(RATE).count(), board.rates(OTHER).len() >= SAMPLES), (0, true));
+    assert!(board.rates(OTHER).iter().any(|rate| rate.source == Source::GyroNet));
+    let info = board.info();
+    assert_eq!((info.flash, info.writable, info.configuration), (FlashState::Ready, false, Origin::Stored));
+    // What is stored can be read without a controller, but not changed.
+    let set = Request::SetConfiguration { version: Configuration::VERSION, configuration };
+    assert_eq!(board.refusal(&set), Refusal::Store(StoreError::NoFlash));
+    let begin = Request::WeightsBegin { length: 64 };
+    assert_eq!(board.refusal(&begin), Refusal::Slot(SlotError::NoFlash));
+}
+
+/// The configuration cannot be used: built-in values, the bus and the log say so, nothing is good.
+fn lost(test: &str, stored: &Stored, flash: FlashState, event: EventKind) {
+    let host = || replay::Board::new().damaged(true);
+    let Some(mut board) = Told::by(test, stored, host) else { return };
+    assert!(board.flagged());
+    assert_eq!(board.marked(Quality::Good), 0);
+    assert!(board.marked(Quality::Degraded) >= SAMPLES - 310, "it runs on");
+    let info = board.info();
+    assert_eq!(info.flash, flash);
+    assert!(info.configuration != Origin::Stored, "{:?}", info.configuration);
+    assert!(board.events().contains(&event), "{:?}", board.events());
+}
+
+#[test]
+fn corrupt_configuration() {
+    let stored = Stored::default().record(&Configuration::DEFAULT).damaged(STORE.start + 20, 4);
+    lost("corrupt_configuration", &stored, FlashState::Damaged, EventKind::RecordsDamaged);
+}
+
+#[test]
+fn corrupt_header_of_the_records() {
+    let stored = Stored::default().record(&Configuration::DEFAULT).damaged(STORE.start + 1, 0x80);
+    lost("corrupt_header_of_the_records", &stored, FlashState::Damaged, EventKind::RecordsDamaged);
+}
+
+#[test]
+fn configuration_for_another_image() {
+    let other = Configuration { imu: ImuPart::Adis16465, ..Configuration::DEFAULT };
+    let event = EventKind::ConfigurationRefused(StoreError::Field(FieldError::PartNotInImage));
+    lost("configuration_for_another_image", &Stored::default().record(&other), FlashState::Ready, event);
+}
+
+/// Two files that differ from each other and from the built-in one.
+fn files() -> [Vec<u8>; 2] {
+    [other_weights(0x10), other_weights(0x20)]
+}
+
+/// A byte of the weights in a slot.
+fn in_slot(slot: Slot) -> u32 {
+    SLOTS.start + slot.offset() + SLOT_SIZE as u32 / 2
+}
+
+/// What a board on these weights sends.
+fn lines_on(blob: Blob<'static>) -> Vec<Vec<u8>> {
+    let mut host = replay::Board::configured(&Configuration::DEFAULT, blob);
+    host.push(&drive());
+    host.lines
+}
+
+#[test]
+fn stored_weights_are_used() {
+    let [a, b] = files();
+    let [of_a, of_b, of_none] = [blob(a.clone()), blob(b.clone()), built_in()].map(lines_on);
+    assert!(of_a != of_b && of_b != of_none && of_a != of_none, "whose weights they are can be seen");
+    let stored = Stored::default().weights(Slot::A, &a).weights(Slot::B, &b);
+    let host = || replay::Board::configured(&Configuration::DEFAULT, blob(b.clone()));
+    let Some(mut board) = Told::by("stored_weights_are_used", &stored, host) else { return };
+    assert!(!board.flagged());
+    assert_eq!(board.info().weights, WeightSource::Slot(Slot::B));
+}
+
+#[test]
+fn corrupt_slot() {
+    let [a, b] = files();
+    let stored = Stored::default().weights(Slot::A, &a).weights(Slot::B, &b);
+    let host = || replay::Board::configured(&Configuration::DEFAULT, blob(a.clone())).damaged(false);
+    let stored = stored.damaged(in_slot(Slot::B), 0x10);
+    let Some(mut board) = Told::by("corrupt_slot", &stored, host) else { return };
+    assert!(board.flagged());
+    // These weights were accepted once and are whole: their rates are good.
+    assert!(board.marked(Quality::Good) > 0);
+    let info = board.info();
+    assert_eq!(info.weights, WeightSource::Slot(Slot::A));
+    assert!(matches!(info.refused_slots, [None, Some(SlotError::Blob(_))]), "{:?}", info.refused_slots);
+    assert!(board.events().iter().any(|event| matches!(event, EventKind::SlotRefused(Slot::B, _))));
+}
+
+#[test]
+fn both_slots_corrupt() {
+    let [a, b] = files();
+    let stored = Stored::default().weights(Slot::A, &a).weights(Slot::B, &b);
+    let stored = stored.damaged(in_slot(Slot::A), 1).damaged(in_slot(Slot::B), 0x80);
+    let host = || replay::Board::new().damaged(false);
+    let Some(mut board) = Told::by("both_slots_corrupt", &stored, host) else { return };
+    assert!(board.flagged());
+    let info = board.info();
+    assert_eq!((info.weights, info.weights_crc), (WeightSource::BuiltIn, Some(built_in().crc)));
+    assert!(info.refused_slots.iter().all(Option::is_some), "{:?}", info.refused_slots);
+    let refused = |event: &EventKind| matches!(event, EventKind::SlotRefused(..));
+    assert_eq!(board.events().iter().filter(|event| refused(event)).count(), 2);
+}
