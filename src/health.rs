@@ -93,7 +93,7 @@ impl Faults {
     pub const STORED: Self = Self(1 << 5);
     /// The wheels are silent, or say that the vehicle stands while the gyro says that it turns.
     pub const WHEELS: Self = Self(1 << 6);
-    /// Frames were dropped because the bus did not take them.
+    /// Frames were dropped because the bus did not take them, or came and found no room.
     pub const BUS: Self = Self(1 << 7);
 
     /// These less others.

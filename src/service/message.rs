@@ -284,6 +284,8 @@ pub struct LineCounters {
     pub overruns: u32,
     /// Service frames that were none.
     pub service_errors: u32,
+    /// Frames of the CAN bus that passed the filters and found no room.
+    pub frames_lost: u32,
 }
 
 impl LineCounters {
@@ -296,5 +298,6 @@ impl LineCounters {
         fog_errors: 0,
         overruns: 0,
         service_errors: 0,
+        frames_lost: 0,
     };
 }

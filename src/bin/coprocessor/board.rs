@@ -2,15 +2,16 @@
 #![allow(unsafe_code, reason = "an interrupt's priority; the block says why it is sound")]
 
 use crate::chip::bus::Bus;
-use crate::chip::usart::Usart;
 use crate::chip::watchdog::Watchdog;
-use crate::chip::{CAN_INTERRUPT, Chip, pac};
-use crate::clock::BoardTime;
+use crate::chip::{CAN_INTERRUPT, pac};
+use crate::clock::{BoardTime, Clocks};
 use crate::crash;
 use crate::queue::Queue;
 use crate::serial;
+use crate::usart::Usart;
 use cortex_m::peripheral::{NVIC, SYST};
 use gyronet::health::supervisor::Supervisor;
+use gyronet::service::event::ResetCause;
 use gyronet::service::message::Identity;
 use pac::Interrupt;
 
@@ -39,6 +40,22 @@ static FOG: Queue<u8, FOG_QUEUE> = Queue::new();
 static SLCAN: Queue<u8, SLCAN_QUEUE> = Queue::new();
 static SERVICE: Queue<u8, SERVICE_QUEUE> = Queue::new();
 static TO_LINES: [Queue<u8, SENDING>; 4] = [const { Queue::new() }; 4];
+
+/// What the part has started, and says of itself.
+pub struct Chip {
+    pub clocks: Clocks,
+    /// Where the controller answers and the clock is exact enough for it.
+    pub can: Option<Bus>,
+    pub watchdog: Watchdog,
+    /// `None`: nothing answers where a part would say what it is, which is so in the emulator.
+    pub device_id: Option<u32>,
+    pub reset: ResetCause,
+}
+
+/// Of reset flags. The pin's is set by every reset, and a brown-out's by power-on, so the order matters.
+pub fn most_telling(causes: [(bool, ResetCause); 6]) -> ResetCause {
+    causes.into_iter().find_map(|(set, cause)| set.then_some(cause)).unwrap_or(ResetCause::Unknown)
+}
 
 /// What the tasks use.
 pub struct Board {

@@ -1,12 +1,38 @@
-//! The board's own time, from SysTick (PM0214 4.5).
+//! What the clocks run at, and the board's own time from SysTick (PM0214 4.5).
 
-use crate::chip::Clocks;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use gyronet::units::Micros;
 
 /// SysTick is fed by an eighth of the processor's clock.
 const SYSTICK_DIVIDER: u32 = 8;
+
+/// Polls before a step of the clock tree is given up: above 10 ms on a reset clock of 16 MHz, 2 ms on
+/// one of 64, and a crystal wants 2 ms.
+const POLLS: u32 = 40_000;
+
+/// What the clocks run at. How they are started, the part's folder knows.
+#[derive(Clone, Copy)]
+pub struct Clocks {
+    /// Of the processor.
+    pub core_hz: u32,
+    /// Of USART2, USART3 and CAN.
+    pub apb1_hz: u32,
+    /// Of USART1, USART6 and SPI1.
+    pub apb2_hz: u32,
+}
+
+impl Clocks {
+    /// Whether the crystal drives them.
+    pub fn exact(self) -> bool {
+        self.core_hz == Self::FULL.core_hz
+    }
+}
+
+/// Waits for a step of the clock tree; `None` when it does not come.
+pub fn within(ready: impl Fn() -> bool) -> Option<()> {
+    (0..POLLS).any(|_| ready()).then_some(())
+}
 
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 

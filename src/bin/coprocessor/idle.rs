@@ -1,8 +1,8 @@
 //! What is done when nothing else is to do: the service line, and the weights' own checksum.
 
-use crate::chip::flash::{Records, Slots};
 use crate::fog_network::FogNetwork;
 use crate::queue::Queue;
+use crate::regions::{Records, Slots};
 use crate::{board, clock, serial};
 use embedded_io::{Write, WriteReady};
 use gyronet::health::Status;

@@ -51,9 +51,15 @@ mod output;
 #[cfg(target_os = "none")]
 mod queue;
 #[cfg(target_os = "none")]
+mod received;
+#[cfg(target_os = "none")]
+mod regions;
+#[cfg(target_os = "none")]
 mod serial;
 #[cfg(target_os = "none")]
 mod start;
+#[cfg(target_os = "none")]
+mod usart;
 
 /// Vector and priority of each task below: RTIC has them in instructions alone, the bound of the
 /// stack wants them as data. A test holds them against the running image.

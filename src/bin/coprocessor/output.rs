@@ -11,6 +11,7 @@ use crate::chip::watchdog::Watchdog;
 use crate::clock::BoardTime;
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::queue::Queue;
+use crate::received::{self, FRAMES};
 use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
@@ -36,8 +37,6 @@ const QUEUE: usize = 24;
 /// Bytes of the sensor in one turn: all that can wait.
 const TURN: usize = board::IMU_QUEUE;
 
-/// Frames that the bus has brought: of wheels alone, for which there is a turn every millisecond.
-pub static FRAMES: Queue<DataFrame, 8> = Queue::new();
 /// The window that is due, until it has been run.
 static WINDOWS: Queue<DueWindow, 1> = Queue::new();
 /// Its estimate.
@@ -116,7 +115,7 @@ pub struct Output {
     heard: Micros,
     time: BoardTime,
     lines: LineCounters,
-    /// Frames dropped when the last sample was sent.
+    /// Frames dropped or lost when the last sample was sent.
     dropped: u32,
     watchdog: Watchdog,
 }
@@ -323,8 +322,9 @@ impl Output {
 
     /// What the pipeline cannot know.
     fn faults(&mut self) -> Faults {
-        let dropped = self.port.dropped().saturating_add(self.queue.dropped());
-        self.lines.unsent = dropped;
+        self.lines.unsent = self.port.dropped().saturating_add(self.queue.dropped());
+        self.lines.frames_lost = received::lost();
+        let dropped = self.lines.unsent.saturating_add(self.lines.frames_lost);
         let lost = core::mem::replace(&mut self.dropped, dropped) < dropped;
         let off = self.can.as_ref().is_some_and(Bus::off);
         let bus = if lost || off { Faults::BUS } else { Faults::NONE };

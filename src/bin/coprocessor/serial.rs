@@ -2,8 +2,8 @@
 #![allow(unsafe_code, reason = "the interrupt mask; the block says why it is sound")]
 
 use crate::board::SENDING;
-use crate::chip::usart::Usart;
 use crate::queue::Queue;
+use crate::usart::Usart;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};

@@ -1,9 +1,10 @@
 //! Makes what the tasks own, where it stays.
 
 use crate::board::Board;
-use crate::chip::flash::{Flash, Records, Slots};
+use crate::chip::flash::Flash;
 use crate::idle::Stored;
 use crate::output::{Doubts, Unconnected};
+use crate::regions::{Records, Slots};
 use core::mem::MaybeUninit;
 use gyronet::can::config::Config;
 use gyronet::can::wheel::WheelSettings;

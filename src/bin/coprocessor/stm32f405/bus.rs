@@ -5,7 +5,7 @@
 //! until then frames wait in their queue, where old ones give way.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use crate::output::FRAMES;
+use crate::received::{self, Received};
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId, nb::Can};
 use gyronet::can::DataFrame;
 use gyronet::can::wheel::WheelSettings;
@@ -105,14 +105,11 @@ impl Can for Bus {
 
 #[interrupt]
 fn CAN1_RX0() {
-    while let Some((frame, _lost)) = receive() {
-        // A wheel's speed that finds no room is followed by a newer one.
-        let _ = frame.map(|frame| FRAMES.push(frame));
-    }
+    received::take(receive);
 }
 
-/// The oldest data frame that has come, and whether one was lost before it.
-fn receive() -> Option<(Option<DataFrame>, bool)> {
+/// The oldest frame that has come.
+fn receive() -> Option<Received> {
     // SAFETY: the sending half touches none of these registers after `Bus::start`.
     let can = unsafe { &*pac::CAN1::ptr() };
     let state = can.rfr(0).read();
@@ -125,14 +122,10 @@ fn receive() -> Option<(Option<DataFrame>, bool)> {
         true => ExtendedId::new(head.bits() >> 3).map(Id::Extended),
         false => StandardId::new((head.bits() >> 21) as u16).map(Id::Standard),
     };
-    let [a, b, c, d] = mailbox.rdlr().read().bits().to_le_bytes();
-    let [e, f, g, h] = mailbox.rdhr().read().bits().to_le_bytes();
-    let length = usize::from(mailbox.rdtr().read().dlc().bits()).min(8);
-    let data = [a, b, c, d, e, f, g, h];
-    let frame = id
-        .filter(|_| head.rtr().bit_is_clear())
-        .and_then(|id| DataFrame::new(id, data.get(..length).unwrap_or_default()));
+    let words = [mailbox.rdlr().read().bits(), mailbox.rdhr().read().bits()];
+    let length = mailbox.rdtr().read().dlc().bits().into();
+    let id = id.filter(|_| head.rtr().bit_is_clear());
     // Written as a whole: the other bits are cleared by ones, and only those that were read.
     can.rfr(0).write(|w| w.fovr().bit(lost).rfom().set_bit());
-    Some((frame, lost))
+    Some(Received::new(id, words, length, lost))
 }

@@ -5,35 +5,18 @@
 //! stays on the reset clock of 16 MHz and says so.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
+use crate::clock::{Clocks, within};
 use stm32f4::stm32f405 as pac;
 
 /// The crystal of a Netduino Plus 2, which is what the emulator is.
 const HSE_MHZ: u8 = 25;
 const RESET_HZ: u32 = 16_000_000;
 const FULL_HZ: u32 = 168_000_000;
-/// Polls before a step is given up: above 10 ms on the reset clock, and a crystal wants 2 ms.
-const POLLS: u32 = 40_000;
-
-/// What the clocks run at.
-#[derive(Clone, Copy)]
-pub struct Clocks {
-    /// Of the processor.
-    pub core_hz: u32,
-    /// Of USART2, USART3 and CAN.
-    pub apb1_hz: u32,
-    /// Of USART1 and USART6.
-    pub apb2_hz: u32,
-}
 
 impl Clocks {
     /// The reset clock: 1 % off at best, which a UART bears and CAN does not.
     const RESET: Self = Self { core_hz: RESET_HZ, apb1_hz: RESET_HZ, apb2_hz: RESET_HZ };
-    const FULL: Self = Self { core_hz: FULL_HZ, apb1_hz: FULL_HZ / 4, apb2_hz: FULL_HZ / 2 };
-
-    /// Whether the crystal drives them.
-    pub fn exact(self) -> bool {
-        self.core_hz == FULL_HZ
-    }
+    pub const FULL: Self = Self { core_hz: FULL_HZ, apb1_hz: FULL_HZ / 4, apb2_hz: FULL_HZ / 2 };
 
     /// Starts the crystal and the PLL; the reset clock where they do not come.
     pub fn start(rcc: &pac::RCC, flash: &pac::FLASH, pwr: &pac::PWR) -> Self {
@@ -70,8 +53,4 @@ impl Clocks {
         rcc.cr().modify(|_, w| w.csson().on());
         Some(())
     }
-}
-
-fn within(ready: impl Fn() -> bool) -> Option<()> {
-    (0..POLLS).any(|_| ready()).then_some(())
 }

@@ -1,27 +1,16 @@
 //! The flash (RM0090 3). Reading it wants no controller; the emulator has none, and writes nothing.
 #![allow(unsafe_code, reason = "flash is memory that is written by address; each block says why it is sound")]
 
+use crate::regions::{FlashError, WORD};
 use core::cell::RefCell;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
-use gyronet::service::MappedSlots;
-use gyronet::store::layout::{FLASH_BASE, RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector_at};
+use embedded_storage::nor_flash::NorFlashErrorKind;
+use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, SLOTS, sector_at};
 use stm32f4::stm32f405 as pac;
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// Polls before an operation is given up. Code runs from the same flash and stands still while
 /// it is busy, so this many are never needed.
 const POLLS: u32 = 10_000_000;
-const WORD: usize = 4;
-
-/// What the controller or the caller did wrong.
-#[derive(Debug, Clone, Copy)]
-pub struct FlashError(NorFlashErrorKind);
-
-impl NorFlashError for FlashError {
-    fn kind(&self) -> NorFlashErrorKind {
-        self.0
-    }
-}
 
 /// The controller, locked but while it works.
 pub struct Flash {
@@ -62,7 +51,16 @@ impl Flash {
         result
     }
 
-    fn erase(&self, offset: u32) -> Result<(), FlashError> {
+    /// From an offset on; inside the regions that there are.
+    pub fn read(&self, offset: u32, bytes: &mut [u8]) {
+        for (at, byte) in (FLASH_BASE + offset..).zip(bytes) {
+            // SAFETY: inside a region, which is always there and readable.
+            *byte = unsafe { (at as *const u8).read_volatile() };
+        }
+    }
+
+    /// The sector that begins there.
+    pub fn erase(&self, offset: u32) -> Result<(), FlashError> {
         let sector = sector_at(offset).ok_or(FlashError(NorFlashErrorKind::NotAligned))?;
         self.operate(|registers| {
             // SAFETY: a number from the part's own table, and words of 32 bits.
@@ -72,12 +70,13 @@ impl Flash {
         })
     }
 
-    fn write(&self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+    /// Whole words, into an erased place.
+    pub fn write(&self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         self.operate(|registers| {
             // SAFETY: words of 32 bits.
             registers.cr().write(|w| unsafe { w.pg().set_bit().psize().bits(2) });
             for (at, word) in (FLASH_BASE + offset..).step_by(WORD).zip(bytes.as_chunks::<WORD>().0) {
-                // SAFETY: inside the records or the weight slots, as the regions below check; on
+                // SAFETY: inside the records or the weight slots, as `regions` checks; on
                 // a word boundary. No reference to these bytes is alive: records are only copied
                 // out, and a slot in use is not written.
                 unsafe { (at as *mut u32).write_volatile(u32::from_le_bytes(*word)) };
@@ -123,69 +122,5 @@ fn flush_cache(registers: &pac::FLASH) {
         registers.acr().modify(|_, w| w.dcen().clear_bit());
         registers.acr().modify(|_, w| w.dcrst().set_bit());
         registers.acr().modify(|_, w| w.dcrst().clear_bit().dcen().set_bit());
-    }
-}
-
-/// Offsets of a region as offsets into the flash.
-fn absolute(region: &core::ops::Range<u32>, offset: u32, len: usize, unit: usize) -> Result<u32, FlashError> {
-    let start = region.start.checked_add(offset).ok_or(FlashError(NorFlashErrorKind::OutOfBounds))?;
-    let end = u32::try_from(len).ok().and_then(|len| start.checked_add(len));
-    if end.is_none_or(|end| end > region.end) {
-        return Err(FlashError(NorFlashErrorKind::OutOfBounds));
-    }
-    let aligned = (start as usize).is_multiple_of(unit) && len.is_multiple_of(unit);
-    if aligned { Ok(start) } else { Err(FlashError(NorFlashErrorKind::NotAligned)) }
-}
-
-macro_rules! region {
-    ($name:ident, $range:expr, $sector:expr, $doc:literal) => {
-        #[doc = $doc]
-        pub struct $name(pub &'static Flash);
-
-        impl ErrorType for $name {
-            type Error = FlashError;
-        }
-
-        impl ReadNorFlash for $name {
-            const READ_SIZE: usize = 1;
-
-            fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-                let start = absolute(&$range, offset, bytes.len(), 1)?;
-                for (at, byte) in (FLASH_BASE + start..).zip(bytes) {
-                    // SAFETY: inside the region, which is always there and readable.
-                    *byte = unsafe { (at as *const u8).read_volatile() };
-                }
-                Ok(())
-            }
-
-            fn capacity(&self) -> usize {
-                $range.len()
-            }
-        }
-
-        impl NorFlash for $name {
-            const WRITE_SIZE: usize = WORD;
-            const ERASE_SIZE: usize = $sector;
-
-            fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-                let len = to.checked_sub(from).ok_or(FlashError(NorFlashErrorKind::OutOfBounds))? as usize;
-                let start = absolute(&$range, from, len, $sector)?;
-                (start..start + len as u32).step_by($sector).try_for_each(|sector| self.0.erase(sector))
-            }
-
-            fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-                let start = absolute(&$range, offset, bytes.len(), WORD)?;
-                self.0.write(start, bytes)
-            }
-        }
-    };
-}
-
-region!(Records, STORE, RECORD_SECTOR, "The sectors of records.");
-region!(Slots, SLOTS, SLOT_SIZE, "The weight slots.");
-
-impl MappedSlots for Slots {
-    fn slots(&self) -> [&[u8]; 2] {
-        self.0.slots_at_start()
     }
 }

@@ -1,45 +1,12 @@
-//! A USART's registers (RM0090 30), as `serial` uses them.
-#![allow(unsafe_code, reason = "registers by address; each block says why it is sound")]
+//! A USART's registers (RM0090 30).
+#![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::pac::{Interrupt, usart1::RegisterBlock};
-
-/// Where a line's registers are, and its interrupt.
-#[derive(Clone, Copy)]
-pub struct Usart {
-    /// A USART of this part.
-    pub registers: *const RegisterBlock,
-    /// Its interrupt.
-    pub interrupt: Interrupt,
-}
-
-// SAFETY: an address that is always there. The handler alone reads and writes data; others only
-// read the status, or set a bit that the handler clears.
-unsafe impl Send for Usart {}
-
-/// What a line says of itself.
-pub struct Status {
-    /// A byte has come, or one was lost before it was taken.
-    pub received: bool,
-    /// The next byte is damaged, or one before it was lost.
-    pub damaged: bool,
-    /// The data register takes a byte.
-    pub room: bool,
-    /// All that was written has left.
-    pub sent: bool,
-}
+use crate::usart::{Status, Usart};
 
 impl Usart {
-    fn registers(&self) -> &RegisterBlock {
-        // SAFETY: see above.
-        unsafe { &*self.registers }
-    }
-
-    /// Lets it run at the rate that is nearest to `baud`; 8N1, both ways.
-    pub fn start(self, clock_hz: u32, baud: u32) {
-        let divider = ((clock_hz + baud / 2) / baud) as u16;
+    pub fn set_divider(&self, divider: u16) {
         // SAFETY: any 16-bit value is a valid divider (RM0090 30.3.4).
         self.registers().brr().write(|w| unsafe { w.bits(divider) });
-        self.registers().cr1().write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
     }
 
     /// Before `read`: that clears the errors (RM0090 30.6.1).
@@ -63,10 +30,5 @@ impl Usart {
     pub fn write(&self, byte: u8) {
         // SAFETY: the data register takes any byte.
         self.registers().dr().write(|w| unsafe { w.bits(byte.into()) });
-    }
-
-    /// Whether room for a byte raises the interrupt.
-    pub fn wants_room(&self, wants: bool) {
-        self.registers().cr1().modify(|_, w| w.txeie().bit(wants));
     }
 }

@@ -6,7 +6,7 @@
 //! way.
 #![allow(unsafe_code, reason = "raw register values and the message memory; each block says why it is sound")]
 
-use crate::output::FRAMES;
+use crate::received::{self, Received};
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId, nb::Can};
 use gyronet::can::DataFrame;
 use gyronet::can::wheel::WheelSettings;
@@ -159,14 +159,11 @@ impl Can for Bus {
 
 #[interrupt]
 fn FDCAN1_IT0() {
-    while let Some((frame, _lost)) = receive() {
-        // A wheel's speed that finds no room is followed by a newer one.
-        let _ = frame.map(|frame| FRAMES.push(frame));
-    }
+    received::take(receive);
 }
 
-/// The oldest data frame that has come, and whether one was lost before it.
-fn receive() -> Option<(Option<DataFrame>, bool)> {
+/// The oldest frame that has come.
+fn receive() -> Option<Received> {
     // SAFETY: the sending half touches none of these registers after `Bus::start`.
     let can = unsafe { &*pac::FDCAN1::ptr() };
     // Flags are cleared by ones; before the FIFO is looked at, so that no frame is missed.
@@ -183,14 +180,9 @@ fn receive() -> Option<(Option<DataFrame>, bool)> {
         true => ExtendedId::new(first & 0x1FFF_FFFF).map(Id::Extended),
         false => StandardId::new((first >> 18 & 0x7FF) as u16).map(Id::Standard),
     };
-    let [a, b, c, d] = get(at + 2).to_le_bytes();
-    let [e, f, g, h] = get(at + 3).to_le_bytes();
-    let data = [a, b, c, d, e, f, g, h];
-    let length = (second >> 16 & 0xF).min(8) as usize;
-    let frame = id
-        .filter(|_| first & REMOTE_FRAME == 0)
-        .and_then(|id| DataFrame::new(id, data.get(..length).unwrap_or_default()));
+    let id = id.filter(|_| first & REMOTE_FRAME == 0);
+    let received = Received::new(id, [get(at + 2), get(at + 3)], second >> 16 & 0xF, lost);
     // SAFETY: the place that was just read.
     can.rxf0a().write(|w| unsafe { w.f0ai().bits(place) });
-    Some((frame, lost))
+    Some(received)
 }

@@ -4,6 +4,7 @@
 //! does not come the board stays on the reset clock of 64 MHz and says so.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
+use crate::clock::{Clocks, within};
 use stm32h7::stm32h743v as pac;
 
 /// The crystal.
@@ -14,29 +15,11 @@ const FULL_HZ: u32 = 400_000_000;
 const SCALE_1: u8 = 3;
 /// Of a bus clock of 200 MHz at scale 1 (RM0433, table 17).
 const WAIT_STATES: u8 = 2;
-/// Polls before a step is given up: above 2 ms on the reset clock.
-const POLLS: u32 = 40_000;
-
-/// What the clocks run at.
-#[derive(Clone, Copy)]
-pub struct Clocks {
-    /// Of the processor.
-    pub core_hz: u32,
-    /// Of USART2.
-    pub apb1_hz: u32,
-    /// Of USART1 and USART6.
-    pub apb2_hz: u32,
-}
 
 impl Clocks {
     /// The reset clock, which a UART bears and CAN does not.
     const RESET: Self = Self { core_hz: RESET_HZ, apb1_hz: RESET_HZ, apb2_hz: RESET_HZ };
-    const FULL: Self = Self { core_hz: FULL_HZ, apb1_hz: FULL_HZ / 4, apb2_hz: FULL_HZ / 4 };
-
-    /// Whether the crystal drives them.
-    pub fn exact(self) -> bool {
-        self.core_hz == FULL_HZ
-    }
+    pub const FULL: Self = Self { core_hz: FULL_HZ, apb1_hz: FULL_HZ / 4, apb2_hz: FULL_HZ / 4 };
 
     /// Starts the crystal and the PLL; the reset clock where they do not come.
     pub fn start(rcc: &pac::RCC, flash: &pac::FLASH, pwr: &pac::PWR) -> Self {
@@ -86,8 +69,4 @@ impl Clocks {
         rcc.cr().modify(|_, w| w.hsecsson().on());
         Some(())
     }
-}
-
-fn within(ready: impl Fn() -> bool) -> Option<()> {
-    (0..POLLS).any(|_| ready()).then_some(())
 }

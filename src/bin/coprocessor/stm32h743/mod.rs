@@ -9,12 +9,13 @@
 pub mod bus;
 mod clocks;
 pub mod flash;
-pub mod usart;
+mod usart;
 pub mod watchdog;
 
-pub use clocks::Clocks;
 pub use stm32h7::stm32h743v as pac;
 
+use crate::board::{Chip, most_telling};
+use crate::clock::Clocks;
 use crate::start::WHEELS;
 use bus::Bus;
 use gyronet::service::event::ResetCause;
@@ -22,17 +23,6 @@ use watchdog::Watchdog;
 
 /// Raised by frames that have come.
 pub const CAN_INTERRUPT: pac::Interrupt = pac::Interrupt::FDCAN1_IT0;
-
-/// What the part has started, and says of itself.
-pub struct Chip {
-    pub clocks: Clocks,
-    /// Where the controller answers and the clock is exact enough for it.
-    pub can: Option<Bus>,
-    pub watchdog: Watchdog,
-    /// `None`: nothing answers where a part would say what it is.
-    pub device_id: Option<u32>,
-    pub reset: ResetCause,
-}
 
 impl Chip {
     /// Starts clocks, pins, CAN and watchdog.
@@ -77,8 +67,7 @@ fn pins(a: &pac::GPIOA, b: &pac::GPIOB, c: &pac::GPIOC) {
     c.pupdr().modify(|_, w| w.pupdr7().pull_up());
 }
 
-/// Reads the reset flags and clears them for the next time. The pin's is set by every reset, and
-/// a brown-out's by power-on, so the most telling one comes first.
+/// Reads the reset flags and clears them for the next time, the most telling one first.
 fn reset_cause(rcc: &pac::RCC) -> ResetCause {
     let flags = rcc.rsr().read();
     let causes = [
@@ -90,5 +79,5 @@ fn reset_cause(rcc: &pac::RCC) -> ResetCause {
         (flags.pinrstf().bit_is_set(), ResetCause::Pin),
     ];
     rcc.rsr().modify(|_, w| w.rmvf().set_bit());
-    causes.into_iter().find_map(|(set, cause)| set.then_some(cause)).unwrap_or(ResetCause::Unknown)
+    most_telling(causes)
 }
