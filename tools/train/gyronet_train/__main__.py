@@ -57,7 +57,7 @@ def line(what: str, validation: Validation) -> str:
 def main() -> None:
     args = arguments()
     torch.set_num_threads(args.threads)
-    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in tqdm(args.train, "reading")]
+    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in tqdm(args.train, "reading", disable=None)]
     validation_drive = load_drive(args.data / f"trial{args.validate}_100hz.csv")
     make = with_scale if args.scale_of else best_of_seeds
     model, provenance = make(args, drives, validation_drive)

@@ -96,7 +96,7 @@ def run(name: str, spans: Spans, test: list[Drive], args: argparse.Namespace) ->
     network = NETWORKS[name](spans)
     optimiser = torch.optim.Adam(network.parameters(), lr=args.lr)
     history = []
-    for _ in tqdm(range(args.epochs), name):
+    for _ in tqdm(range(args.epochs), name, disable=None):
         network.train()
         for x, gyro_error in spans.batches(args.batch):
             loss = (network(x) - gyro_error).abs().mean()

@@ -56,7 +56,7 @@ def arguments() -> argparse.Namespace:
 
 def load(args: argparse.Namespace) -> tuple[list[Seconds], Seconds]:
     if args.layout == "kaist":
-        return [load_kaist(d) for d in tqdm(args.train, "reading")], load_kaist(args.validate)
+        return [load_kaist(d) for d in tqdm(args.train, "reading", disable=None)], load_kaist(args.validate)
     drive = load_kingston(args.train[0])
     adapt = int(ADAPT_SHARE * len(drive.turn))
     split = int((1 - VALIDATE_SHARE) * adapt)
@@ -139,7 +139,7 @@ def main() -> None:
         model.train()
         losses = torch.zeros(2)
         rows_of_epoch = epoch_rows(data, batches * args.batch, args.padded)
-        for rows in tqdm(rows_of_epoch.split(args.batch), f"epoch {epoch}/{args.epochs}"):
+        for rows in tqdm(rows_of_epoch.split(args.batch), f"epoch {epoch}/{args.epochs}", disable=None):
             x, label = data.take(rows)
             correction, f1, fog = model(x)
             loss1 = (correction - label).abs().mean() / scale  # Eq. 14

@@ -80,7 +80,10 @@ def train(
     for epoch in range(1, settings.epochs + 1):
         model.train()
         batches = tqdm(
-            spans.batches(settings.batch), f"epoch {epoch}/{settings.epochs}", spans.epoch(settings.batch)
+            spans.batches(settings.batch),
+            f"epoch {epoch}/{settings.epochs}",
+            spans.epoch(settings.batch),
+            disable=None,
         )
         for x, gyro_error in batches:
             x = turn(x) if settings.turns else x
