@@ -9,7 +9,7 @@ use gyronet::can::yaw_feed::YawFeed;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::fog::FogConfig;
 use gyronet::fog::lane::{FogCounters, FogLane};
-use gyronet::guard::{Guard, TIMEOUT_US};
+use gyronet::guard::{Guard, START_US, TIMEOUT_US};
 use gyronet::health::Faults;
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
@@ -236,13 +236,14 @@ impl Board {
         }
     }
 
-    /// The sensor is silent for so many message sets.
+    /// The sensor is silent for so many message sets; from the start, where it has sent nothing yet.
     ///
     /// # Panics
     /// When the guard does not say so.
     pub fn silence(&mut self, sets: u64) {
+        let begin = if self.lines.is_empty() { START_US } else { TIMEOUT_US };
         for set in self.silent..self.silent + sets {
-            let now = Micros(TIMEOUT_US + set * PERIOD_US);
+            let now = Micros(begin + set * PERIOD_US);
             let vehicle = self.guard.poll(now).expect("the sensor is silent");
             self.send(vehicle);
         }

@@ -6,8 +6,9 @@ use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::config::{Settings, YawSettings};
 use gyronet::can::yaw::{AngleMessage, Faults, Quality, RateMessage, Source};
 use gyronet::can::{DataFrame, slcan};
+use gyronet::health::Status;
 use gyronet::model::{Blob, weights};
-use gyronet::service::event::EventKind;
+use gyronet::service::event::{EventKind, SensorFault};
 use gyronet::service::message::{FlashState, Info, Origin, Refusal};
 use gyronet::service::{Reply, Request};
 use gyronet::store::layout::{SLOT_SIZE, SLOTS, STORE};
@@ -181,6 +182,42 @@ fn configuration_for_another_image() {
     let other = Configuration { imu: ImuPart::Adis16465, ..Configuration::DEFAULT };
     let event = EventKind::ConfigurationRefused(StoreError::Field(FieldError::PartNotInImage));
     lost("configuration_for_another_image", &Stored::default().record(&other), FlashState::Ready, event);
+}
+
+/// A part on SPI that does not answer (the emulator has none): it is named, there is no rate, and all
+/// else goes on.
+#[test]
+fn part_on_spi_does_not_answer() {
+    const NAME: &str = "part_on_spi_does_not_answer";
+    const SETS: usize = 20;
+    let scratch = env!("CARGO_TARGET_TMPDIR");
+    let Some(elf) = image::coprocessor(NAME, scratch) else { return };
+    let configuration = Configuration { imu: ImuPart::Icm42688, ..Configuration::DEFAULT };
+    let arguments = Stored::default().record(&configuration).arguments(Path::new(scratch), NAME);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let mut board = qemu::Board::boot(&elf, SERVICE, &arguments);
+    // Nothing of an MTi is listened to.
+    board.send(IMU, &drive()[..4_000], LIMIT);
+    let _ = board.lines(SLCAN, b'\r', SETS * 6, LIMIT);
+    board.send(SLCAN, b"V\r", LIMIT);
+    let lines = board.lines_until(SLCAN, b'\r', LIMIT, |lines| lines.contains(&b"V0101".to_vec()));
+    let mut host = replay::Board::new();
+    host.silence(SETS as u64);
+    let frames: Vec<Vec<u8>> = lines.into_iter().filter(|line| line.starts_with(b"t")).collect();
+    assert_eq!(frames[..SETS * 6], host.lines[..]);
+    board.send(SERVICE, &[0], LIMIT);
+    let port = board.serve(SERVICE).to_string();
+    let device = Device::new(Line::open(&port).expect("the harness listens"), &port);
+    let frames = frames.iter().map(|line| slcan::parse(line).expect("a frame")).collect();
+    let mut told = Told { frames, device, _board: board };
+    assert!(told.rates(RATE).iter().all(|rate| rate.quality == Quality::Unusable));
+    let info = told.info();
+    assert_eq!((info.configuration, info.status), (Origin::Stored, Status::Silent));
+    assert_eq!(info.sensor, Some(SensorFault::Identity(0)));
+    // Once, though it is tried every second.
+    let events = told.events();
+    let named = |event: &&EventKind| **event == EventKind::Sensor(Some(SensorFault::Identity(0)));
+    assert_eq!(events.iter().filter(named).count(), 1, "{events:?}");
 }
 
 /// Two files that differ from each other and from the built-in one.

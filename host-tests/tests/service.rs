@@ -5,7 +5,7 @@ use gyronet::health::Status;
 use gyronet::model::weights;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
-use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause};
+use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
 use gyronet::service::frame::{Deframer, FrameError, MAX_FRAME, emit};
 use gyronet::service::message::{AllCounters, Calibrate, FlashState, Identity, Origin, Refusal};
 use gyronet::service::{Device, Reply, Request};
@@ -139,6 +139,20 @@ fn damaged_record_is_noted() {
     assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Reply::Done);
     let board = start(&flash);
     assert!(!board.stored_damaged() && !board.configuration_lost());
+}
+
+#[test]
+fn sensor_that_does_not_answer_is_noted_once() {
+    let mut board = bare();
+    let absent = SensorFault::Identity(0xFF);
+    for result in [Err(absent), Err(absent), Err(SensorFault::Reset), Err(absent), Ok(()), Ok(())] {
+        board.sensor(result);
+        assert_eq!(info(&mut board).sensor, result.err());
+    }
+    let Reply::Log(page) = ask(&mut board, &Request::Log { after: 2 }) else { panic!("no log") };
+    let kinds: Vec<EventKind> = page.events.iter().map(|event| event.kind).collect();
+    let failed = [Some(absent), Some(SensorFault::Reset), Some(absent), None, None];
+    assert_eq!(kinds, failed.map(EventKind::Sensor));
 }
 
 /// As in the emulator, whose flash is mapped but has no controller.

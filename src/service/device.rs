@@ -4,7 +4,7 @@
 //! records, is then there only while they run.
 
 use super::calibrate::{Calibrator, State, Task};
-use super::event::{EventKind, EventLog};
+use super::event::{EventKind, EventLog, SensorFault};
 use super::frame::{Deframer, Frame, FrameError, emit};
 use super::message::{
     AllCounters, BLOCK, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal,
@@ -57,6 +57,7 @@ pub struct Device<R: NorFlash, W> {
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
     uploading: Option<Uploading>,
+    sensor: Option<SensorFault>,
     status: Status,
     tick: u32,
     log: EventLog,
@@ -89,6 +90,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights_crc: None,
             refused_slots: [None; 2],
             uploading: None,
+            sensor: None,
             status: Status::Init,
             tick: 0,
             log: EventLog::new(),
@@ -224,6 +226,15 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.restart
     }
 
+    /// How setting the sensor up went; the same again is not noted again.
+    pub fn sensor(&mut self, result: Result<(), SensorFault>) {
+        let fault = result.err();
+        if fault.is_none() || fault != self.sensor {
+            self.note(EventKind::Sensor(fault));
+        }
+        self.sensor = fault;
+    }
+
     /// Takes every sample of the sensor (`None` while it is silent), with the status of what was made of it.
     pub fn observe(&mut self, sample: Option<&ImuSample>, tick: u32, status: Status) {
         self.tick = tick;
@@ -341,6 +352,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             calibration: self.calibration_origin,
             weights: self.weights,
             weights_crc: self.weights_crc,
+            sensor: self.sensor,
             refused_slots: self.refused_slots,
             status: self.status,
         }

@@ -57,6 +57,28 @@ pub struct Crash {
     pub count: u32,
 }
 
+/// Why a part on SPI gives no samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SensorFault {
+    /// The controller did not answer.
+    Bus,
+    /// The part did not come back from its reset.
+    Reset,
+    /// Another part answers, or none (0 or 255): its identity.
+    Identity(u8),
+    /// A register does not hold what was written.
+    Setting {
+        /// Of the register.
+        bank: u8,
+        /// In the bank.
+        address: u8,
+        /// What it holds.
+        got: u8,
+    },
+}
+
 /// What can happen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -90,6 +112,8 @@ pub enum EventKind {
     WeightsDamaged,
     /// Stored records are damaged: what is used is older, or built in.
     RecordsDamaged,
+    /// The part on SPI was set up; or why not: it is tried again every second.
+    Sensor(Option<SensorFault>),
 }
 
 /// Something that happened.

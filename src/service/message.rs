@@ -1,7 +1,7 @@
 //! Requests and replies.
 
 use super::calibrate::{State, Task};
-use super::event::{Crash, LogPage, ResetCause};
+use super::event::{Crash, LogPage, ResetCause, SensorFault};
 use crate::fog::lane::FogCounters;
 use crate::health::{Counters, Status, WatchCounters};
 use crate::store::slots::{SlotError, WeightSource};
@@ -247,6 +247,8 @@ pub struct Info {
     pub weights: WeightSource,
     /// Their checksum.
     pub weights_crc: Option<u32>,
+    /// Why the sensor could not be set up, where the board does so.
+    pub sensor: Option<SensorFault>,
     /// Why each slot that should be used is not.
     pub refused_slots: [Option<SlotError>; 2],
     /// Of the corrected yaw rate.

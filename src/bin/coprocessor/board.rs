@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "an interrupt's priority; the block says why it is sound")]
 
 use crate::chip::bus::Bus;
+use crate::chip::spi::Spi;
 use crate::chip::watchdog::Watchdog;
 use crate::chip::{CAN_INTERRUPT, pac};
 use crate::clock::{BoardTime, Clocks};
@@ -46,6 +47,8 @@ pub struct Chip {
     pub clocks: Clocks,
     /// Where the controller answers and the clock is exact enough for it.
     pub can: Option<Bus>,
+    /// Where it is driven.
+    pub spi: Option<Spi>,
     pub watchdog: Watchdog,
     /// `None`: nothing answers where a part would say what it is, which is so in the emulator.
     pub device_id: Option<u32>,
@@ -65,6 +68,8 @@ pub struct Board {
     pub service: serial::Port<SERVICE_QUEUE>,
     /// Where the controller answers and the clock is exact enough for it.
     pub can: Option<Bus>,
+    /// Where it is driven.
+    pub spi: Option<Spi>,
     pub time: BoardTime,
     pub watchdog: Watchdog,
     /// Known since the start.
@@ -84,7 +89,7 @@ impl Board {
     #[inline(never)]
     pub fn start(p: pac::Peripherals, systick: SYST) -> (Self, Handlers) {
         release_can();
-        let Chip { clocks, can, watchdog, device_id, reset } = Chip::start(p);
+        let Chip { clocks, can, spi, watchdog, device_id, reset } = Chip::start(p);
         let identity = Identity {
             firmware: version(),
             device_id,
@@ -110,7 +115,7 @@ impl Board {
         let time = BoardTime::start(systick, clocks, identity.device_id.is_none());
         let handlers =
             Handlers { imu: imu_handler, fog: fog_handler, slcan: slcan_handler, service: service_handler };
-        (Self { imu, fog, slcan, service, can, time, watchdog, identity }, handlers)
+        (Self { imu, fog, slcan, service, can, spi, time, watchdog, identity }, handlers)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What is done when nothing else is to do: the service line, and the weights' own checksum.
 
 use crate::fog_network::FogNetwork;
+use crate::imu::BringUp;
 use crate::queue::Queue;
 use crate::regions::{Records, Slots};
 use crate::{board, clock, serial};
@@ -35,6 +36,7 @@ pub struct Idle {
     check: Option<BackgroundCheck<'static>>,
     service: serial::Port<{ board::SERVICE_QUEUE }>,
     fog_network: FogNetwork,
+    bring_up: Option<BringUp>,
     /// An answer on its way out, and how much of it is.
     answer: Frame,
     sent: usize,
@@ -50,9 +52,10 @@ impl Idle {
         (device, check): Stored,
         service: serial::Port<{ board::SERVICE_QUEUE }>,
         fog_network: Option<&'static mut FogNet<'static, 'static>>,
+        bring_up: Option<BringUp>,
     ) -> Self {
         let fog_network = FogNetwork::new(fog_network);
-        Self { device, check, service, fog_network, answer: Frame::new(), sent: 0, milliseconds: 0 }
+        Self { device, check, service, fog_network, bring_up, answer: Frame::new(), sent: 0, milliseconds: 0 }
     }
 
     /// A bounded piece of work; whether the weights were found to be damaged.
@@ -60,6 +63,9 @@ impl Idle {
     pub fn turn(&mut self, counters: &AllCounters) -> bool {
         while let Some(Observation { sample, tick, status }) = OBSERVATIONS.pop() {
             self.device.observe(sample.as_ref(), tick, status);
+        }
+        if let Some(result) = self.bring_up.as_mut().and_then(BringUp::turn) {
+            self.device.sensor(result);
         }
         self.answer(counters);
         self.check()

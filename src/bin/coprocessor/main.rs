@@ -3,6 +3,7 @@
 //! | pin | function |
 //! |---|---|
 //! | PA10 (PA9) | USART1 RX (TX), 115200 8N1, Xsens MTi |
+//! | PA5, PA6, PA7, PA4 | SPI1 clock, in, out, select: ICM-42688-P, where one is configured |
 //! | PB11 (PB10) | USART3 RX (TX), 921600 8N1, KVH DSP-1760 |
 //! | PA2, PA3 | USART2 TX, RX, 921600 8N1, SLCAN |
 //! | PC6, PC7 | USART6 TX, RX, 115200 8N1, service line |
@@ -18,7 +19,7 @@
 //! | 0 | `idle` | the rest | FoGNet in pieces, service line, weights against their checksum |
 //!
 //! Tasks hand things over in queues of fixed length; what does not fit is counted. An estimate is
-//! used two samples after its window, so when it was ready changes no frame; see `output.rs` for
+//! used two samples after its window, so when it was ready changes no frame; see `window.rs` for
 //! one that is late. A crash leaves its reason in RAM and resets.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -47,6 +48,8 @@ mod fog_network;
 #[cfg(target_os = "none")]
 mod idle;
 #[cfg(target_os = "none")]
+mod imu;
+#[cfg(target_os = "none")]
 mod output;
 #[cfg(target_os = "none")]
 mod queue;
@@ -60,6 +63,8 @@ mod serial;
 mod start;
 #[cfg(target_os = "none")]
 mod usart;
+#[cfg(target_os = "none")]
+mod window;
 
 /// Vector and priority of each task below: RTIC has them in instructions alone, the bound of the
 /// stack wants them as data. A test holds them against the running image.
@@ -91,7 +96,9 @@ static PRIORITIES: [[u8; 2]; 8] = {
 mod app {
     use crate::chip::pac::Interrupt;
     use crate::idle::Idle;
-    use crate::output::{Output, WindowTask};
+    use crate::imu::BringUp;
+    use crate::output::Output;
+    use crate::window::WindowTask;
     use crate::{board, clock, serial, start};
     use core::mem::MaybeUninit;
     use gyronet::fog::FogConfig;
@@ -132,12 +139,13 @@ mod app {
         let network = weights.map(|blob| start::place(cx.local.network_place, || GyroNet::new(blob)));
         let network = WindowTask { network };
         let service = board.service;
+        let bring_up = BringUp::of(output.part, board.spi);
         let ports = (board.imu, board.fog, board.slcan, board.can);
         let has_network = fog_network.is_some();
         let fog = start::place(cx.local.fog_place, || FogLane::new(FogConfig::DEFAULT, has_network));
         let sender =
             start::place(cx.local.sender_place, || output.connect(ports, board.time, board.watchdog));
-        let rest = start::place(cx.local.rest_place, || Idle::new(device, service, fog_network));
+        let rest = start::place(cx.local.rest_place, || Idle::new(device, service, fog_network, bring_up));
         let board::Handlers { imu, fog: fog_handler, slcan, service } = handlers;
         let shared = Shared { counters: AllCounters::default(), weights_damaged: false, fog };
         (shared, Local { imu, fog_handler, slcan, service, sender, network, rest })

@@ -1,17 +1,13 @@
 //! The output task: samples, pipeline, frames. Nothing in it waits.
-//!
-//! An estimate has as many sample periods of board time as the pipeline uses it later, from when its window was handed out. Until
-//! then the next sample's bytes stay in their queue, should they come faster than 100 times a
-//! second (an emulated part sends at the host's pace); after that it is late, which the pipeline
-//! counts and flags.
 
 use crate::board::SUPERVISOR;
 use crate::chip::bus::Bus;
 use crate::chip::watchdog::Watchdog;
 use crate::clock::BoardTime;
 use crate::idle::{OBSERVATIONS, Observation};
-use crate::queue::Queue;
+use crate::imu::{Imu, TURN};
 use crate::received::{self, FRAMES};
+use crate::window::Windows;
 use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
@@ -23,50 +19,15 @@ use gyronet::can::yaw_feed::YawFeed;
 use gyronet::fog::lane::FogLane;
 use gyronet::guard::{Guard, TIMEOUT_US};
 use gyronet::health::{Faults, Status, count};
-use gyronet::model::{Estimate, GyroNet, WindowNetwork};
-use gyronet::pipeline::DueWindow;
-use gyronet::sample::{ImuSample, PERIOD_US, WheelSample};
+use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
-use gyronet::sensor::xsens::Mti;
 use gyronet::service::message::{AllCounters, LineCounters};
+use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 use gyronet::vehicle::VehicleSample;
 
 /// Frames that may wait for a line: what older ones say is of no use to anybody.
 const QUEUE: usize = 24;
-/// Bytes of the sensor in one turn: all that can wait.
-const TURN: usize = board::IMU_QUEUE;
-
-/// The window that is due, until it has been run.
-static WINDOWS: Queue<DueWindow, 1> = Queue::new();
-/// Its estimate.
-static ESTIMATES: Queue<(u32, Estimate), 1> = Queue::new();
-
-/// The network's task.
-pub struct WindowTask {
-    pub network: Option<&'static mut GyroNet<'static>>,
-}
-
-impl WindowTask {
-    /// Runs the window that is due; whether there was one. It stays in its queue while it runs,
-    /// so that no second one is handed over; but not when its estimate is out, since the output
-    /// task may come in between and have the next one.
-    pub fn run(&mut self) -> bool {
-        let Some(due) = WINDOWS.peek() else { return false };
-        let (end, network) = (due.end, self.network.as_mut());
-        let estimate = network.map(|network| network.estimate(&due.features));
-        let _ = WINDOWS.pop();
-        // There is room: the estimate before was taken.
-        estimate.is_some_and(|estimate| ESTIMATES.push((end, estimate)))
-    }
-}
-
-/// A window that was handed out.
-struct Out {
-    end: u32,
-    until: u64,
-}
-
 /// What was found at the start to be wrong with what is stored.
 #[derive(Clone, Copy)]
 pub struct Doubts {
@@ -81,24 +42,20 @@ pub struct Unconnected {
     pub guard: &'static mut Guard,
     pub config: Config,
     pub wheels: Option<WheelSettings>,
-    pub has_network: bool,
-    /// Samples from a window's newest one to the one that its estimate is used with.
-    pub delay: u32,
+    pub windows: Windows,
+    pub part: ImuPart,
     pub doubts: Doubts,
 }
 
 /// The output task.
 pub struct Output {
-    imu: ImuPort,
+    imu: Imu,
     fog: FogPort,
     dsp1760: Dsp1760,
     fog_feed: YawFeed,
-    mti: Mti,
     guard: &'static mut Guard,
-    has_network: bool,
-    delay: u32,
+    windows: Windows,
     doubts: Doubts,
-    out: Option<Out>,
     tick: u32,
     wheels: Option<WheelReceiver>,
     wheels_known: Option<WheelSample>,
@@ -120,26 +77,23 @@ pub struct Output {
     watchdog: Watchdog,
 }
 
-type ImuPort = serial::Port<{ board::IMU_QUEUE }>;
 type FogPort = serial::Port<{ board::FOG_QUEUE }>;
 type SlcanPort = serial::Port<{ board::SLCAN_QUEUE }>;
+type ImuPort = serial::Port<{ board::IMU_QUEUE }>;
 type Ports = (ImuPort, FogPort, SlcanPort, Option<Bus>);
 
 impl Unconnected {
     #[inline]
     pub fn connect(self, (imu, fog, slcan, can): Ports, time: BoardTime, watchdog: Watchdog) -> Output {
-        let Self { guard, config, wheels, has_network, delay, doubts } = self;
+        let Self { guard, config, wheels, windows, part, doubts } = self;
         Output {
-            imu,
+            imu: Imu::new(part, imu),
             fog,
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
             fog_feed: YawFeed::fog(),
-            mti: Mti::new(),
             guard,
-            has_network,
-            delay,
+            windows,
             doubts,
-            out: None,
             tick: 0,
             wheels: wheels.and_then(|wheels| WheelReceiver::new(wheels).ok()),
             wheels_known: None,
@@ -163,27 +117,25 @@ impl Output {
     /// Does what there is to do. `weights_damaged`: what idle has found out.
     #[inline(never)]
     pub fn turn(&mut self, counters: &mut AllCounters, weights_damaged: bool, lane: &mut FogLane) {
-        self.has_network &= !weights_damaged;
+        self.windows.has_network &= !weights_damaged;
         let now = self.time.now();
         self.frames_in();
         self.fog_in(lane, now);
-        for _ in 0..TURN {
-            self.take_estimate();
-            if self.must_wait(now) {
+        let mut turn = TURN;
+        loop {
+            self.windows.deliver(self.guard.pipeline());
+            if self.windows.must_wait(self.tick, now) {
                 self.guard.wait(now);
                 break;
             }
-            let Some(byte) = self.imu.receive() else { break };
-            self.mti.push(byte);
-            while let Some(sample) = self.mti.next_sample() {
-                match sample {
-                    Ok(sample) => {
-                        self.process(sample, now);
-                        self.fog_out(lane, now);
-                        self.frames_out();
-                    }
-                    Err(_) => count(&mut self.lines.sensor_errors, 1),
+            match self.imu.next_sample(&mut turn) {
+                Some(Ok(sample)) => {
+                    self.process(sample, now);
+                    self.fog_out(lane, now);
+                    self.frames_out();
                 }
+                Some(Err(())) => count(&mut self.lines.sensor_errors, 1),
+                None => break,
             }
         }
         if let Some(vehicle) = self.guard.poll(now) {
@@ -202,21 +154,6 @@ impl Output {
         }
     }
 
-    fn take_estimate(&mut self) {
-        while let Some((end, estimate)) = ESTIMATES.pop() {
-            if self.has_network {
-                self.guard.pipeline().deliver(end, estimate);
-            }
-            self.out.take_if(|out| out.end == end);
-        }
-    }
-
-    /// Whether the next sample is the one that wants the estimate, which is not late yet.
-    fn must_wait(&self, now: Micros) -> bool {
-        let wanted = |out: &Out| self.tick.wrapping_sub(out.end) + 1 >= self.delay && now.0 < out.until;
-        self.out.as_ref().is_some_and(wanted)
-    }
-
     #[inline(never)]
     fn process(&mut self, sample: ImuSample, now: Micros) {
         self.sample_time = sample.time;
@@ -230,7 +167,8 @@ impl Output {
         self.heard = now;
         self.tick = output.prompt.tick;
         self.send(output.vehicle, sample.time);
-        self.hand_out(output.window.as_ref(), now);
+        let taken = self.windows.hand_out(output.window.as_ref(), now);
+        count(&mut self.lines.overruns, u32::from(!taken));
         self.note(Some(sample), self.tick, output.prompt.status);
     }
 
@@ -308,18 +246,6 @@ impl Output {
         }
     }
 
-    #[inline(never)]
-    fn hand_out(&mut self, due: Option<&DueWindow>, now: Micros) {
-        let Some(due) = due.filter(|_| self.has_network) else { return };
-        let end = due.end;
-        if WINDOWS.push(*due) {
-            self.out = Some(Out { end, until: now.0 + u64::from(self.delay) * PERIOD_US });
-        } else {
-            // The one before is not done: this one's turn passes, and is counted as late.
-            count(&mut self.lines.overruns, 1);
-        }
-    }
-
     /// What the pipeline cannot know.
     fn faults(&mut self) -> Faults {
         self.lines.unsent = self.port.dropped().saturating_add(self.queue.dropped());
@@ -328,7 +254,7 @@ impl Output {
         let lost = core::mem::replace(&mut self.dropped, dropped) < dropped;
         let off = self.can.as_ref().is_some_and(Bus::off);
         let bus = if lost || off { Faults::BUS } else { Faults::NONE };
-        if self.has_network && !self.doubts.stored { bus } else { bus.with(Faults::STORED) }
+        if self.windows.has_network && !self.doubts.stored { bus } else { bus.with(Faults::STORED) }
     }
 
     fn frames_in(&mut self) {
@@ -346,9 +272,9 @@ impl Output {
         if let Some(can) = self.can.as_mut() {
             self.queue.service(can);
         }
-        self.lines.line_errors =
-            self.imu.lost().saturating_add(self.fog.lost()).saturating_add(self.slcan.lost());
-        self.lines.held = self.imu.held().saturating_add(self.fog.held()).saturating_add(self.slcan.held());
+        let [lost, held] = self.imu.line_faults();
+        self.lines.line_errors = lost.saturating_add(self.fog.lost()).saturating_add(self.slcan.lost());
+        self.lines.held = held.saturating_add(self.fog.held()).saturating_add(self.slcan.held());
     }
 }
 

@@ -1,10 +1,11 @@
 //! Makes what the tasks own, where it stays.
 
 use crate::board::Board;
-use crate::chip::flash::Flash;
+use crate::chip::{PARTS, flash::Flash};
 use crate::idle::Stored;
 use crate::output::{Doubts, Unconnected};
 use crate::regions::{Records, Slots};
+use crate::window::Windows;
 use core::mem::MaybeUninit;
 use gyronet::can::config::Config;
 use gyronet::can::wheel::WheelSettings;
@@ -13,10 +14,8 @@ use gyronet::model::background::BackgroundCheck;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{Blob, FogBlob, FogNet, weights};
 use gyronet::service::Device;
-use gyronet::store::{FogPart, ImuPart};
+use gyronet::store::FogPart;
 
-/// What the image drives.
-const PARTS: &[ImuPart] = &[ImuPart::XsensMti];
 /// A fibre-optic gyro is listened to whether one is configured or not.
 const FOGS: &[FogPart] = &[FogPart::Dsp1760];
 /// Whose wheel frames are understood.
@@ -45,17 +44,17 @@ pub fn parts(board: &Board) -> Option<Parts> {
     // the gyro's less its static bias.
     let blob = device.weights(flash.map(Flash::slots_at_start), &weights::DEFAULT.0);
     let check = blob.as_ref().map(BackgroundCheck::new);
-    let has_network = blob.is_some();
     let configuration = device.configuration();
     let pipeline = configuration.pipeline(device.calibration());
-    let delay = pipeline.compensate.mode.delay();
+    let windows = Windows::new(blob.is_some(), pipeline.compensate.mode.delay());
+    let part = configuration.imu;
     let doubts = Doubts { stored: device.stored_damaged(), configuration: device.configuration_lost() };
     // What is stored has been checked.
     let config = Config::new(configuration.can).unwrap_or(Config::DEFAULT);
     let guard = cortex_m::singleton!(: MaybeUninit<Guard> = MaybeUninit::uninit())?;
     let guard = place(guard, || Guard::new(pipeline));
     Some(Parts {
-        output: Unconnected { guard, config, wheels: Some(WHEELS), has_network, delay, doubts },
+        output: Unconnected { guard, config, wheels: Some(WHEELS), windows, part, doubts },
         weights: blob,
         fog_network: fog_network(),
         device: (device, check),

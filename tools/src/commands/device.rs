@@ -161,6 +161,9 @@ fn print_info(info: &Info) {
         );
     }
     println!("status        {:?}", info.status);
+    if let Some(fault) = info.sensor {
+        println!("sensor        {fault:?}");
+    }
     let writable = if info.writable { "" } else { ", no controller: nothing can be stored" };
     println!("flash         {:?}{writable}", info.flash);
     println!("configuration {:?}, layout {}", info.configuration, info.record_versions[0]);

@@ -3,6 +3,7 @@
 pub mod bus;
 mod clocks;
 pub mod flash;
+pub mod spi;
 mod usart;
 pub mod watchdog;
 
@@ -13,8 +14,12 @@ use crate::clock::Clocks;
 use crate::start::WHEELS;
 use bus::Bus;
 use gyronet::service::event::ResetCause;
+use gyronet::store::ImuPart;
+use spi::Spi;
 use watchdog::Watchdog;
 
+/// What is driven.
+pub const PARTS: &[ImuPart] = &[ImuPart::XsensMti, ImuPart::Icm42688];
 /// Raised by frames that have come.
 pub const CAN_INTERRUPT: pac::Interrupt = pac::Interrupt::CAN1_RX0;
 
@@ -27,9 +32,10 @@ impl Chip {
         p.RCC.apb2enr().modify(|_, w| w.usart1en().enabled().usart6en().enabled());
         pins(&p.GPIOA, &p.GPIOB, &p.GPIOC);
         let can = if clocks.exact() { Bus::start(p.CAN1, Some(&WHEELS)) } else { None };
+        let spi = Spi::start(&p.RCC, &p.GPIOA, &p.SPI1);
         let id = p.DBGMCU.idcode().read().bits();
         let watchdog = Watchdog::start(p.IWDG, &p.DBGMCU);
-        Self { clocks, can, watchdog, device_id: (id != 0).then_some(id), reset: reset_cause(&p.RCC) }
+        Self { clocks, can, spi, watchdog, device_id: (id != 0).then_some(id), reset: reset_cause(&p.RCC) }
     }
 }
 

@@ -9,6 +9,7 @@
 pub mod bus;
 mod clocks;
 pub mod flash;
+pub mod spi;
 mod usart;
 pub mod watchdog;
 
@@ -19,8 +20,11 @@ use crate::clock::Clocks;
 use crate::start::WHEELS;
 use bus::Bus;
 use gyronet::service::event::ResetCause;
+use gyronet::store::ImuPart;
 use watchdog::Watchdog;
 
+/// What is driven.
+pub const PARTS: &[ImuPart] = &[ImuPart::XsensMti];
 /// Raised by frames that have come.
 pub const CAN_INTERRUPT: pac::Interrupt = pac::Interrupt::FDCAN1_IT0;
 
@@ -37,7 +41,14 @@ impl Chip {
         let can = if clocks.exact() { Bus::start(p.FDCAN1, Some(&WHEELS)) } else { None };
         let id = p.DBGMCU.idc().read().bits();
         let watchdog = Watchdog::start(p.IWDG, &p.DBGMCU);
-        Self { clocks, can, watchdog, device_id: (id != 0).then_some(id), reset: reset_cause(&p.RCC) }
+        Self {
+            clocks,
+            can,
+            spi: None,
+            watchdog,
+            device_id: (id != 0).then_some(id),
+            reset: reset_cause(&p.RCC),
+        }
     }
 }
 

@@ -1,0 +1,150 @@
+//! The inertial sensor that is configured: an MTi on USART1, or an ICM-42688-P on SPI1.
+//!
+//! The part on SPI is brought up in idle time, for that takes it 50 ms, and again every second
+//! for as long as it does not answer. Between the two ends it is handed over through [`READY`];
+//! [`WANTED`] says whose turn it is with the bus.
+
+use crate::chip::spi::Spi;
+use crate::queue::Queue;
+use crate::{board, clock, serial};
+use core::sync::atomic::{AtomicBool, Ordering};
+use embedded_hal::delay::DelayNs;
+use gyronet::sample::ImuSample;
+use gyronet::sensor::icm42688::{Icm42688, Icm42688Config, Icm42688Error, OutputRate, packet::Resolution};
+use gyronet::sensor::xsens::Mti;
+use gyronet::service::event::SensorFault;
+use gyronet::store::ImuPart;
+
+/// Bytes of a line in one turn: all that can wait.
+pub const TURN: usize = board::IMU_QUEUE;
+/// What a look at the part on SPI counts as: four a turn.
+const LOOK: usize = TURN / 4;
+/// From one attempt to bring it up to the next one.
+const RETRY_MS: u32 = 1_000;
+/// Looks at the time before a delay is given up, should it stand still: a millisecond is some ten
+/// thousands.
+const LOOKS_PER_MS: u32 = 1_000_000;
+
+const ICM: Icm42688Config = Icm42688Config { rate: OutputRate::Hz100, resolution: Resolution::Bits20 };
+
+type Part = Icm42688<Spi>;
+
+static READY: Queue<Part, 1> = Queue::new();
+static WANTED: AtomicBool = AtomicBool::new(true);
+
+/// The output task's end.
+#[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; there is one of them")]
+pub enum Imu {
+    Line(serial::Port<{ board::IMU_QUEUE }>, Mti),
+    /// `None`: not brought up.
+    Spi(Option<Part>),
+}
+
+impl Imu {
+    /// Of the part that is configured. What the image does not drive, no configuration has.
+    #[inline]
+    pub fn new(part: ImuPart, line: serial::Port<{ board::IMU_QUEUE }>) -> Self {
+        if part == ImuPart::Icm42688 { Self::Spi(None) } else { Self::Line(line, Mti::new()) }
+    }
+
+    /// The next sample, or that there is none where one was due; `None`: nothing waits, or the turn
+    /// is over.
+    pub fn next_sample(&mut self, turn: &mut usize) -> Option<Result<ImuSample, ()>> {
+        match self {
+            Self::Line(port, mti) => loop {
+                if let Some(sample) = mti.next_sample() {
+                    return Some(sample.map_err(drop));
+                }
+                *turn = turn.checked_sub(1)?;
+                mti.push(port.receive()?);
+            },
+            Self::Spi(part) => {
+                *turn = turn.checked_sub(LOOK)?;
+                look(part)
+            }
+        }
+    }
+
+    /// Bytes that came damaged, and bytes that had to wait.
+    pub fn line_faults(&self) -> [u32; 2] {
+        match self {
+            Self::Line(port, _) => [port.lost(), port.held()],
+            Self::Spi(_) => [0; 2],
+        }
+    }
+}
+
+/// Looks whether the part on SPI has a sample.
+#[inline(never)]
+fn look(part: &mut Option<Part>) -> Option<Result<ImuSample, ()>> {
+    if part.is_none() {
+        *part = READY.pop();
+    }
+    match part.as_mut()?.next_sample().transpose()? {
+        Ok(sample) => Some(Ok(sample)),
+        Err(Icm42688Error::Packet(_) | Icm42688Error::NoReading) => Some(Err(())),
+        // It must be set anew.
+        Err(_) => {
+            *part = None;
+            WANTED.store(true, Ordering::Release);
+            Some(Err(()))
+        }
+    }
+}
+
+/// Idle's end of a part on SPI.
+pub struct BringUp {
+    spi: Spi,
+    tried: Option<u32>,
+}
+
+impl BringUp {
+    /// Where such a part is configured.
+    pub fn of(part: ImuPart, spi: Option<Spi>) -> Option<Self> {
+        let spi = spi.filter(|_| part == ImuPart::Icm42688)?;
+        Some(Self { spi, tried: None })
+    }
+
+    /// Tries to bring the part up, where it is not and it is time to.
+    #[inline(never)]
+    pub fn turn(&mut self) -> Option<Result<(), SensorFault>> {
+        let now = clock::milliseconds();
+        let soon = |tried: u32| now.wrapping_sub(tried) < RETRY_MS;
+        if !WANTED.load(Ordering::Acquire) || self.tried.is_some_and(soon) {
+            return None;
+        }
+        self.tried = Some(now);
+        let part = match Icm42688::new(self.spi, ICM, &mut Delay) {
+            Ok(part) => part,
+            Err(error) => return Some(Err(fault(error))),
+        };
+        WANTED.store(false, Ordering::Release);
+        // There is room: the part before was taken, or this one would not be wanted.
+        let _ = READY.push(part);
+        Some(Ok(()))
+    }
+}
+
+fn fault<E>(error: Icm42688Error<E>) -> SensorFault {
+    match error {
+        Icm42688Error::Reset => SensorFault::Reset,
+        Icm42688Error::Identity { got } => SensorFault::Identity(got),
+        Icm42688Error::Setting { register, got, .. } => {
+            SensorFault::Setting { bank: register.bank, address: register.address, got }
+        }
+        _ => SensorFault::Bus,
+    }
+}
+
+/// By the board's clock, which interrupts idle.
+struct Delay;
+
+impl DelayNs for Delay {
+    fn delay_ns(&mut self, ns: u32) {
+        // The millisecond that has begun does not count.
+        let wait = ns.div_ceil(1_000_000) + 1;
+        let begin = clock::milliseconds();
+        let over = |_| clock::milliseconds().wrapping_sub(begin) >= wait;
+        let _ = (0..wait.saturating_mul(LOOKS_PER_MS)).any(over);
+    }
+}
