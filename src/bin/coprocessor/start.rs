@@ -47,14 +47,14 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let configuration = device.configuration();
     let pipeline = configuration.pipeline(device.calibration());
     let windows = Windows::new(blob.is_some(), pipeline.compensate.mode.delay());
-    let part = configuration.imu;
+    let (part, fog_ids) = (configuration.imu, configuration.fog_ids);
     let doubts = Doubts { stored: device.stored_damaged(), configuration: device.configuration_lost() };
     // What is stored has been checked.
     let config = Config::new(configuration.can).unwrap_or(Config::DEFAULT);
     let guard = cortex_m::singleton!(: MaybeUninit<Guard> = MaybeUninit::uninit())?;
     let guard = place(guard, || Guard::new(pipeline));
     Some(Parts {
-        output: Unconnected { guard, config, wheels: Some(WHEELS), windows, part, doubts },
+        output: Unconnected { guard, config, wheels: Some(WHEELS), windows, part, fog_ids, doubts },
         weights: blob,
         fog_network: fog_network(),
         device: (device, check),
