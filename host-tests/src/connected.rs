@@ -8,10 +8,12 @@ use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::bosch::TX1_ID;
 use gyronet::can::yaw::RateMessage;
 use gyronet::can::{DataFrame, slcan};
+use gyronet::model::{Blob, weights};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::xsens::MtData2;
 use gyronet::service::message::AllCounters;
 use gyronet::service::{Reply, Request};
+use gyronet::store::Configuration;
 use gyronet_tools::device::{Device, line::Line};
 use std::time::{Duration, Instant};
 
@@ -139,11 +141,12 @@ pub struct Outcome {
 /// # Panics
 /// When one is not, or frames are missing.
 #[must_use]
-pub fn run(board: &mut qemu::Board, steps: &[Step]) -> Outcome {
+pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step]) -> Outcome {
     let port = board.serve(SERVICE).to_string();
     let mut device = Device::new(Line::open(&port).expect("the harness listens"), &port);
     board.send(SERVICE, &[0], LIMIT);
-    let mut host = replay::Board::new();
+    let weights = || Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+    let mut host = replay::Board::configured(configuration, weights());
     let mut answers = 0;
     let inputs: Vec<Input> = steps.iter().cloned().flat_map(Step::inputs).collect();
     let mut said_silent = 0;
@@ -169,7 +172,7 @@ pub fn run(board: &mut qemu::Board, steps: &[Step]) -> Outcome {
     }
     let counters = counters(&mut device);
     let sent = frames(&board.lines(SLCAN, b'\r', 0, LIMIT));
-    let mut followed = replay::Board::following(sent.clone());
+    let mut followed = replay::Board::configured(configuration, weights()).beside(sent.clone());
     for input in &inputs {
         input.push(&mut followed);
     }

@@ -4,8 +4,8 @@
 use crate::recordings::Row;
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
+use gyronet::can::fog_feed::FogFeed;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::can::yaw_feed::YawFeed;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::fog::FogConfig;
 use gyronet::fog::lane::{FogCounters, FogLane};
@@ -74,7 +74,7 @@ pub struct Board {
     dsp1760: Dsp1760,
     lane: FogLane,
     fog_network: FogNet<'static, 'static>,
-    fog_feed: YawFeed,
+    fog_feed: FogFeed,
     sample_time: Micros,
     stored_damaged: bool,
     configuration_lost: bool,
@@ -124,7 +124,7 @@ impl Board {
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
             lane: FogLane::new(FogConfig::DEFAULT, true),
             fog_network: FogNet::new(fog_blob, Box::leak(Box::new(FogNetState::ZERO))),
-            fog_feed: YawFeed::fog(),
+            fog_feed: FogFeed::new(configuration.fog_ids),
             sample_time: Micros(0),
             stored_damaged: false,
             configuration_lost: false,
@@ -226,7 +226,7 @@ impl Board {
         let inertial = self.guard.pipeline().inertial();
         self.follow();
         while let Some(yaw) = self.lane.next_step(self.sample_time, inertial, self.wheels_known.as_ref()) {
-            for frame in self.fog_feed.fog_frames::<DataFrame>(&yaw) {
+            for frame in self.fog_feed.process::<DataFrame>(&yaw) {
                 self.lines.push(line(&frame));
             }
             if let Some((number, window)) = self.lane.window() {

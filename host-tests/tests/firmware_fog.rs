@@ -3,6 +3,7 @@
 //! run, and every frame equals the host's.
 
 use gyronet::can::yaw::{FOG_IDS, Quality, RateMessage, Source};
+use gyronet::store::Configuration;
 use gyronet_host_tests::connected::{self, Step};
 use gyronet_host_tests::{image, qemu, recordings};
 use std::time::Instant;
@@ -20,7 +21,7 @@ fn board_with_everything_connected() {
     let start = Instant::now();
     let steps: Vec<Step> =
         rows.iter().take(SAMPLES).enumerate().map(|(number, row)| Step::of(number, row)).collect();
-    let outcome = connected::run(&mut board, &steps);
+    let outcome = connected::run(&mut board, &Configuration::DEFAULT, &steps);
     let lines = &outcome.followed.lines;
     println!("{NAME}: {} frames in {:.1?}", outcome.sent, start.elapsed());
     println!("{NAME}: {} sets because the host was busy", outcome.followed.followed);

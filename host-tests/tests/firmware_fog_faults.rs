@@ -8,6 +8,7 @@ use embedded_can::Frame;
 use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
 use gyronet::can::yaw::{AngleMessage, FOG_IDS, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage};
 use gyronet::guard::{HOLD, STUCK_AFTER};
+use gyronet::store::Configuration;
 use gyronet_host_tests::connected::{self, Step};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::recordings::{self, Row, workspace};
@@ -40,7 +41,7 @@ impl Told {
         let undamaged = Self(connected::on_host(&steps).lines);
         (BEGIN..end).zip(&mut steps[BEGIN..end]).for_each(|(number, step)| fail(number, step));
         let mut board = qemu::Board::boot(&elf, connected::USARTS, &[]);
-        let outcome = connected::run(&mut board, &steps);
+        let outcome = connected::run(&mut board, &Configuration::DEFAULT, &steps);
         let told = Self(outcome.host.lines);
         println!("{test}: {} frames, {} because the host was busy", outcome.sent, outcome.followed.followed);
         // Until then nothing is wrong, and in the end nothing is.

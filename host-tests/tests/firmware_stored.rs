@@ -4,7 +4,7 @@
 
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::config::{Settings, YawSettings};
-use gyronet::can::yaw::{AngleMessage, Faults, Quality, RateMessage, Source};
+use gyronet::can::yaw::{AngleMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Status;
 use gyronet::model::{Blob, weights};
@@ -14,6 +14,7 @@ use gyronet::service::{Reply, Request};
 use gyronet::store::layout::{SLOT_SIZE, SLOTS, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, FieldError, ImuPart, Mounting, Record, Slot, StoreError};
+use gyronet_host_tests::connected::{self, Step};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::{Stored, other_weights};
 use gyronet_host_tests::{image, qemu, replay};
@@ -150,6 +151,23 @@ fn stored_configuration_takes_effect() {
     assert_eq!(board.refusal(&set), Refusal::Store(StoreError::NoFlash));
     let begin = Request::WeightsBegin { length: 64 };
     assert_eq!(board.refusal(&begin), Refusal::Slot(SlotError::NoFlash));
+}
+
+#[test]
+fn fibre_optic_gyro_under_other_identifiers() {
+    const NAME: &str = "fibre_optic_gyro_under_other_identifiers";
+    const OTHER: u16 = 0x3C0;
+    let scratch = env!("CARGO_TARGET_TMPDIR");
+    let Some(elf) = image::coprocessor(NAME, scratch) else { return };
+    let configuration = Configuration { fog_ids: [OTHER, OTHER + 1, OTHER + 2], ..Configuration::DEFAULT };
+    let arguments = Stored::default().record(&configuration).arguments(Path::new(scratch), NAME);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let mut board = qemu::Board::boot(&elf, connected::USARTS, &arguments);
+    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
+    let steps: Vec<Step> = rows.iter().take(50).enumerate().map(|(k, row)| Step::of(k, row)).collect();
+    let outcome = connected::run(&mut board, &configuration, &steps);
+    let sent = |id| connected::rates(&outcome.followed.lines, id).count();
+    assert!(sent(OTHER) >= 48 && sent(FOG_IDS[0]) == 0, "{} {}", sent(OTHER), sent(FOG_IDS[0]));
 }
 
 /// The configuration cannot be used: built-in values, the bus and the log say so, nothing is good.

@@ -1,6 +1,7 @@
 //! The service line against the board's own code on a mock flash: every request, every refusal,
 //! noise, and the frame format byte by byte.
 
+use gyronet::can::config::{ConfigError, Settings};
 use gyronet::health::Status;
 use gyronet::model::weights;
 use gyronet::sample::{ImuSample, PERIOD_US};
@@ -8,7 +9,7 @@ use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
 use gyronet::service::frame::{Deframer, FrameError, MAX_FRAME, emit};
 use gyronet::service::message::{AllCounters, Calibrate, FlashState, Identity, Origin, Refusal};
-use gyronet::service::{Device, Reply, Request};
+use gyronet::service::{Device, Drives, Reply, Request};
 use gyronet::store::layout::{self, RECORD_SECTOR};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{
@@ -22,6 +23,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
+const DRIVES: Drives =
+    Drives { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], bits_per_second: &[500_000] };
 const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
     device_id: Some(0x413),
@@ -33,7 +36,7 @@ const IDENTITY: Identity = Identity {
 
 fn start(flash: &Rc<RefCell<F405>>) -> Board {
     let records = Region::new(flash, layout::STORE);
-    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
+    let mut board = Board::new(&DRIVES);
     board.begin(Some(records), Some(MappedRegion::new(flash)), true, IDENTITY);
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &weights::DEFAULT.0);
@@ -43,7 +46,7 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
 
 /// Without a flash controller, as in the emulator.
 fn bare() -> Board {
-    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
+    let mut board = Board::new(&DRIVES);
     board.begin(None, None, false, IDENTITY);
     board.weights(None, &weights::DEFAULT.0);
     board
@@ -102,7 +105,7 @@ fn configuration_is_kept_whole() {
     let mut board = start(&flash);
     assert_eq!(
         ask(&mut board, &Request::GetConfiguration),
-        Reply::Configuration { version: 1, origin: Origin::Stored, configuration: wanted }
+        Reply::Configuration { version: 2, origin: Origin::Stored, configuration: wanted }
     );
     assert_eq!(*board.configuration(), wanted);
     // Refused, and named, and the old one stays.
@@ -116,10 +119,18 @@ fn configuration_is_kept_whole() {
     let refused = |error| Reply::Refused(Refusal::Store(StoreError::Field(error)));
     let other_part = Configuration { imu: ImuPart::Adis16465, ..wanted };
     assert_eq!(ask(&mut board, &set(other_part)), refused(FieldError::PartNotInImage));
+    let can = Settings { bits_per_second: 250_000, ..wanted.can };
+    assert_eq!(
+        ask(&mut board, &set(Configuration { can, ..wanted })),
+        refused(FieldError::BitRateNotInImage(250_000))
+    );
+    let twice = Configuration { fog_ids: [0x1A0, 0x1A5, 0x1A6], ..wanted };
+    let duplicate = FieldError::Can(ConfigError::DuplicateIdentifier(0x1A0));
+    assert_eq!(ask(&mut board, &set(twice)), refused(duplicate));
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
     assert_eq!(ask(&mut board, &set(with_fog)), refused(FieldError::PartNotInImage));
     let request = Request::SetConfiguration { version: 9, configuration: wanted };
-    assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 1 }));
+    assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 2 }));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 
@@ -161,7 +172,7 @@ fn what_is_stored_is_read_without_a_controller() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
     assert_eq!(ask(&mut start(&flash), &set(wanted)), Reply::Done);
-    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
+    let mut board = Board::new(&DRIVES);
     let records = Region::new(&flash, layout::STORE);
     board.begin(Some(records), Some(MappedRegion::new(&flash)), false, IDENTITY);
     assert_eq!(*board.configuration(), wanted);

@@ -2,6 +2,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use gyronet::can::config::{ConfigError, YawSettings};
+use gyronet::model::blob::CRC;
 use gyronet::sample::RATE_HZ;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
@@ -146,9 +147,38 @@ fn another_layout_is_named() {
     let flash = Flash::default();
     let mut store = open(&flash);
     store.set(&Later { value: 7 }).expect("it is stored");
-    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 2, expected: 1 }));
+    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 3, expected: 2 }));
     store.set(&Alien { value: [200; 3] }).expect("it is stored");
     assert_eq!(store.get::<Configuration>(), Err(StoreError::Encoding));
+}
+
+/// The default of layout 1 but for its latitude, 48.1: it had no `fog_ids`.
+const LAYOUT_1: &[u8] = &[
+    0, 0, 160, 194, 30, 1, 0, 1, 160, 3, 161, 3, 162, 3, 10, 0, 0, 160, 3, 161, 3, 162, 3, 0, 1, 102, 102,
+    64, 66, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 205, 204, 76, 61, 0, 0, 192, 63, 111, 18, 131, 59, 143, 194,
+    245, 61, 88, 202, 178, 61, 2, 5, 7, 208, 238, 217, 6, 160, 210, 130, 67, 154, 250, 157, 2,
+];
+
+/// What is stored stays stored when the firmware is replaced.
+#[test]
+fn an_older_layout_is_read() {
+    let flash = Flash::default();
+    let word = |words: &mut Vec<u8>| {
+        words.resize(words.len().next_multiple_of(4), 0xFF);
+        words.extend(CRC.checksum(words).to_le_bytes());
+    };
+    let mut record = vec![Configuration::KEY, 1, LAYOUT_1.len() as u8, 0];
+    record.extend(LAYOUT_1);
+    word(&mut record);
+    let header = CRC.checksum(&(1 ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
+    let sector = [&1_u32.to_le_bytes()[..], &header.to_le_bytes(), &record].concat();
+    region(&flash).write(0, &sector).expect("it is blank");
+    let mut store = open(&flash);
+    let mut wanted = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    assert_eq!(store.get(), Ok(Some(wanted)));
+    wanted.fog_ids = [0x2A4, 0x2A5, 0x2A6];
+    store.set(&wanted).expect("it is stored");
+    assert_eq!(open(&flash).get(), Ok(Some(wanted)));
 }
 
 #[test]

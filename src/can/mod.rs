@@ -5,6 +5,7 @@ pub mod carry;
 pub mod config;
 pub mod e2e;
 pub mod feeds;
+pub mod fog_feed;
 pub mod frame;
 pub mod j1939;
 pub mod load;

@@ -1,15 +1,13 @@
 //! The sending side of the yaw messages: samples in, three protected messages out.
 
 use super::carry::{RoundingCarry, Scale};
-use super::e2e::{DataIdMode, P01, Profile, Protector};
+use super::e2e::{Profile, Protector};
 use super::yaw::{
-    AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle,
+    AngleMessage, DetailMessage, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle,
     encode_latency, encode_sigma,
 };
 use crate::units::AngularRate;
 use crate::vehicle::YawSample;
-use embedded_can::{Frame, StandardId};
-use heapless::Vec;
 
 /// Turns samples into messages, one set for every `every` samples.
 ///
@@ -39,24 +37,6 @@ impl YawFeed {
             correction: Mean::new(Scale::FIFTH_MILLI_DEG_PER_SEC),
             faults: Faults::NONE,
         }
-    }
-
-    /// For a fibre-optic gyro: [`FOG_IDS`] under E2E profile 1, a set for each sample.
-    #[must_use]
-    pub fn fog() -> Self {
-        Self::new(FOG_IDS.map(|data_id| Profile::P01(P01 { data_id, mode: DataIdMode::Both })), 1)
-    }
-
-    /// The frames of one sample of a fibre-optic gyro, in a driver's own type.
-    #[inline(never)]
-    pub fn fog_frames<F: Frame>(&mut self, sample: &YawSample) -> Vec<F, 3> {
-        let messages = self.process(sample);
-        let mut frames = Vec::new();
-        for (message, id) in messages.iter().flatten().zip(FOG_IDS) {
-            // There is room for three.
-            let _ = StandardId::new(id).and_then(|id| F::new(id, message)).map(|frame| frames.push(frame));
-        }
-        frames
     }
 
     /// Takes a sample; gives rate, angle and detail message when they are due.

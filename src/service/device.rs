@@ -32,15 +32,24 @@ struct Uploading {
     checked: Option<u32>,
 }
 
+/// What an image drives; a configuration of anything else is refused.
+#[derive(Debug)]
+pub struct Drives {
+    /// Inertial sensors.
+    pub imus: &'static [ImuPart],
+    /// Fibre-optic gyros.
+    pub fogs: &'static [FogPart],
+    /// Bit rates of the bus.
+    pub bits_per_second: &'static [u32],
+}
+
 /// What the board keeps beside the pipeline.
 ///
 /// Owns the flash: records in `R`, weight slots in `W`, `None` where none can be read.
 pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
-    /// Parts that the image drives.
-    parts: &'static [ImuPart],
-    fogs: &'static [FogPart],
+    drives: &'static Drives,
     identity: Identity,
     flash: FlashState,
     writable: bool,
@@ -69,12 +78,11 @@ pub struct Device<R: NorFlash, W> {
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// With built-in values, before [`Device::begin`]. A constant: it can be made where it stays.
     #[must_use]
-    pub const fn new(parts: &'static [ImuPart], fogs: &'static [FogPart]) -> Self {
+    pub const fn new(drives: &'static Drives) -> Self {
         Self {
             store: None,
             slots: None,
-            parts,
-            fogs,
+            drives,
             identity: Identity::UNKNOWN,
             flash: FlashState::Absent,
             writable: false,
@@ -174,11 +182,15 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let fog = configuration.fog.is_none_or(|fog| self.fogs.contains(&fog));
-        if fog && self.parts.contains(&configuration.imu) {
+        let Drives { imus, fogs, bits_per_second } = self.drives;
+        if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
+            return Err(StoreError::Field(FieldError::PartNotInImage));
+        }
+        let rate = configuration.can.bits_per_second;
+        if bits_per_second.contains(&rate) {
             Ok(())
         } else {
-            Err(StoreError::Field(FieldError::PartNotInImage))
+            Err(StoreError::Field(FieldError::BitRateNotInImage(rate)))
         }
     }
 

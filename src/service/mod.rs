@@ -38,6 +38,6 @@ pub mod event;
 pub mod frame;
 pub mod message;
 
-pub use device::{Device, MappedSlots};
+pub use device::{Device, Drives, MappedSlots};
 pub use frame::{Deframer, FrameError};
 pub use message::{Reply, Request};

@@ -5,6 +5,7 @@ use super::record::Record;
 use super::{Calibration, Level};
 use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
+use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::mounting::{Levelling, Rotation};
 use crate::pipeline::PipelineConfig;
@@ -72,6 +73,8 @@ pub struct Configuration {
     pub static_init: StaticConfig,
     /// How much correction is believed.
     pub compensate: CompensateConfig,
+    /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
+    pub fog_ids: [u16; 3],
 }
 
 impl Configuration {
@@ -84,6 +87,7 @@ impl Configuration {
         mounting: Mounting { roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 0.0 },
         static_init: StaticConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
+        fog_ids: FOG_IDS,
     };
 }
 
@@ -111,10 +115,16 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 1;
+    const VERSION: u8 = 2;
+
+    /// Layout 1 ended before `fog_ids`: those were [`FOG_IDS`], here as varints.
+    fn missing(version: u8) -> Option<&'static [u8]> {
+        (version == 1).then_some(&[0xA4, 3, 0xA5, 3, 0xA6, 3])
+    }
 
     fn check(&self) -> Result<(), FieldError> {
-        Config::new(self.can).map_err(FieldError::Can)?;
+        let config = Config::new(self.can).map_err(FieldError::Can)?;
+        config.check_further(self.fog_ids).map_err(FieldError::Can)?;
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
         // What modes and lags there are, their types say.

@@ -74,6 +74,8 @@ pub enum FieldError {
     Can(ConfigError),
     /// This firmware image does not drive the part.
     PartNotInImage,
+    /// This firmware image does not drive the bus at this rate, bit/s.
+    BitRateNotInImage(u32),
 }
 
 impl core::fmt::Display for FieldError {
@@ -83,6 +85,9 @@ impl core::fmt::Display for FieldError {
                 write!(f, "{}: {value} is not within {low} to {high}", field.name())
             }
             Self::Can(error) => write!(f, "can: {error}"),
+            Self::BitRateNotInImage(rate) => {
+                write!(f, "can.bits_per_second: this firmware image does not drive the bus at {rate} bit/s")
+            }
             Self::PartNotInImage => f.write_str("sensor: this firmware image does not drive the part"),
         }
     }

@@ -40,6 +40,12 @@ pub trait Record: Serialize + DeserializeOwned {
     /// Of its layout; raised with every change of it.
     const VERSION: u8;
 
+    /// What a record of an older layout lacks at its end, as it would be encoded; `None`: this firmware
+    /// does not read that layout.
+    fn missing(_version: u8) -> Option<&'static [u8]> {
+        None
+    }
+
     /// Whether all values are inside their ranges.
     ///
     /// # Errors
@@ -92,10 +98,11 @@ impl Raw {
 
     fn decode<R: Record>(&self) -> Result<R, StoreError> {
         let [_, found, ..] = self.words;
-        if found != R::VERSION {
-            return Err(StoreError::Version { found, expected: R::VERSION });
-        }
-        let content = self.words.get(WORD..WORD + self.len).ok_or(StoreError::Encoding)?;
+        let missing = if found == R::VERSION { Some(&[][..]) } else { R::missing(found) };
+        let missing = missing.ok_or(StoreError::Version { found, expected: R::VERSION })?;
+        let mut content = self.words;
+        let content = content.get_mut(WORD..WORD + self.len + missing.len()).ok_or(StoreError::Encoding)?;
+        content.get_mut(self.len..).ok_or(StoreError::Encoding)?.copy_from_slice(missing);
         let (record, rest) = postcard::take_from_bytes::<R>(content).map_err(|_| StoreError::Encoding)?;
         if !rest.is_empty() {
             return Err(StoreError::Encoding);

@@ -11,9 +11,12 @@ use gyronet::model::blob::CRC;
 use gyronet::service::calibrate::Task;
 use gyronet::service::frame::{Deframer, MAX_MESSAGE, emit};
 use gyronet::service::message::{AllCounters, Calibrate, Identity};
-use gyronet::service::{Device, Reply, Request};
+use gyronet::service::{Device, Drives, Reply, Request};
 use gyronet::store::layout::SLOT_SIZE;
 use gyronet::store::{Configuration, FogPart, ImuPart, Record};
+
+const DRIVES: Drives =
+    Drives { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], bits_per_second: &[250_000, 500_000] };
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
 
@@ -22,7 +25,7 @@ type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
 /// side reads; what is stored by them, a board starts with.
 pub fn line(mut data: &[u8]) {
     let choice = byte(&mut data);
-    let mut board = Board::new(&[ImuPart::XsensMti], &[FogPart::Dsp1760]);
+    let mut board = Board::new(&DRIVES);
     let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(|| RamFlash::new(&[])));
     board.begin((choice & 4 != 0).then_some(records), slots, choice & 8 == 0, Identity::UNKNOWN);
     // As the asking side, which a board might talk nonsense to.

@@ -12,10 +12,10 @@ use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
+use gyronet::can::fog_feed::FogFeed;
 use gyronet::can::queue::TransmitQueue;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::can::yaw_feed::YawFeed;
 use gyronet::fog::lane::FogLane;
 use gyronet::guard::{Guard, TIMEOUT_US};
 use gyronet::health::{Faults, Status, count};
@@ -44,6 +44,7 @@ pub struct Unconnected {
     pub wheels: Option<WheelSettings>,
     pub windows: Windows,
     pub part: ImuPart,
+    pub fog_ids: [u16; 3],
     pub doubts: Doubts,
 }
 
@@ -52,7 +53,7 @@ pub struct Output {
     imu: Imu,
     fog: FogPort,
     dsp1760: Dsp1760,
-    fog_feed: YawFeed,
+    fog_feed: FogFeed,
     guard: &'static mut Guard,
     windows: Windows,
     doubts: Doubts,
@@ -85,12 +86,12 @@ type Ports = (ImuPort, FogPort, SlcanPort, Option<Bus>);
 impl Unconnected {
     #[inline]
     pub fn connect(self, (imu, fog, slcan, can): Ports, time: BoardTime, watchdog: Watchdog) -> Output {
-        let Self { guard, config, wheels, windows, part, doubts } = self;
+        let Self { guard, config, wheels, windows, part, fog_ids, doubts } = self;
         Output {
             imu: Imu::new(part, imu),
             fog,
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
-            fog_feed: YawFeed::fog(),
+            fog_feed: FogFeed::new(fog_ids),
             guard,
             windows,
             doubts,
@@ -197,7 +198,7 @@ impl Output {
         let inertial = self.guard.pipeline().inertial().filter(|_| fresh);
         let wheels = self.wheels_known;
         while let Some(yaw) = lane.next_step(time, inertial, wheels.as_ref()) {
-            for frame in &self.fog_feed.fog_frames::<DataFrame>(&yaw) {
+            for frame in &self.fog_feed.process::<DataFrame>(&yaw) {
                 self.transmit(*frame, self.sample_time);
             }
         }

@@ -1,7 +1,7 @@
 //! Makes what the tasks own, where it stays.
 
 use crate::board::Board;
-use crate::chip::{PARTS, flash::Flash};
+use crate::chip::{PARTS, bus::BITS_PER_SECOND, flash::Flash};
 use crate::idle::Stored;
 use crate::output::{Doubts, Unconnected};
 use crate::regions::{Records, Slots};
@@ -13,11 +13,11 @@ use gyronet::guard::Guard;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{Blob, FogBlob, FogNet, weights};
-use gyronet::service::Device;
+use gyronet::service::{Device, Drives};
 use gyronet::store::FogPart;
 
 /// A fibre-optic gyro is listened to whether one is configured or not.
-const FOGS: &[FogPart] = &[FogPart::Dsp1760];
+const DRIVES: Drives = Drives { imus: PARTS, fogs: &[FogPart::Dsp1760], bits_per_second: &[BITS_PER_SECOND] };
 /// Whose wheel frames are understood.
 pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
 
@@ -37,7 +37,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
         Some(flash) => Some(&*cortex_m::singleton!(: Flash = flash)?),
         None => None,
     };
-    let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(PARTS, FOGS) })?;
+    let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(&DRIVES) })?;
     let writable = flash.is_some_and(Flash::writable);
     device.begin(flash.map(Records), flash.map(Slots), writable, board.identity);
     // Without good weights the pipeline still runs: the status says degraded, and the rate is
@@ -47,14 +47,14 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let configuration = device.configuration();
     let pipeline = configuration.pipeline(device.calibration());
     let windows = Windows::new(blob.is_some(), pipeline.compensate.mode.delay());
-    let part = configuration.imu;
+    let (part, fog_ids) = (configuration.imu, configuration.fog_ids);
     let doubts = Doubts { stored: device.stored_damaged(), configuration: device.configuration_lost() };
     // What is stored has been checked.
     let config = Config::new(configuration.can).unwrap_or(Config::DEFAULT);
     let guard = cortex_m::singleton!(: MaybeUninit<Guard> = MaybeUninit::uninit())?;
     let guard = place(guard, || Guard::new(pipeline));
     Some(Parts {
-        output: Unconnected { guard, config, wheels: Some(WHEELS), windows, part, doubts },
+        output: Unconnected { guard, config, wheels: Some(WHEELS), windows, part, fog_ids, doubts },
         weights: blob,
         fog_network: fog_network(),
         device: (device, check),

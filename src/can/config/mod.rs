@@ -93,6 +93,14 @@ impl Config {
         messages
     }
 
+    /// Checks identifiers of further messages, those of [`super::fog_feed`]: none of them is ours.
+    ///
+    /// # Errors
+    /// [`ConfigError::Identifier`], [`ConfigError::DuplicateIdentifier`].
+    pub fn check_further(&self, ids: [u16; 3]) -> Result<(), ConfigError> {
+        check_ids(ids, |id| self.sends(Id::Standard(id)))
+    }
+
     /// Whether a message with this identifier is ours: an input must not have it.
     #[must_use]
     pub fn sends(&self, id: Id) -> bool {
@@ -130,19 +138,23 @@ fn bosch_ids(bosch: Option<BoschSettings>) -> impl Iterator<Item = StandardId> {
 }
 
 fn check_yaw(yaw: &YawSettings, bosch: Option<BoschSettings>) -> Result<(), ConfigError> {
-    for (k, id) in yaw.ids.into_iter().enumerate() {
-        if id > StandardId::MAX.as_raw() || DIAGNOSIS.contains(&id) {
-            return Err(ConfigError::Identifier(id));
-        }
-        let earlier = yaw.ids.get(..k).unwrap_or_default();
-        if earlier.contains(&id) || bosch_ids(bosch).any(|other| other.as_raw() == id) {
-            return Err(ConfigError::DuplicateIdentifier(id));
-        }
-    }
+    check_ids(yaw.ids, |id| bosch_ids(bosch).any(|other| other == id))?;
     if yaw.period_ms == 0 || yaw.period_ms > MAX_PERIOD_MS || !yaw.period_ms.is_multiple_of(SAMPLE_MS) {
         return Err(ConfigError::Period(yaw.period_ms));
     }
     check_e2e(&yaw.e2e)
+}
+
+/// All are valid, and none is another one or `taken`.
+fn check_ids(ids: [u16; 3], taken: impl Fn(StandardId) -> bool) -> Result<(), ConfigError> {
+    for (k, raw) in ids.into_iter().enumerate() {
+        let id = StandardId::new(raw).filter(|_| !DIAGNOSIS.contains(&raw));
+        let id = id.ok_or(ConfigError::Identifier(raw))?;
+        if ids.get(..k).unwrap_or_default().contains(&raw) || taken(id) {
+            return Err(ConfigError::DuplicateIdentifier(raw));
+        }
+    }
+    Ok(())
 }
 
 fn check_e2e(e2e: &E2e) -> Result<(), ConfigError> {

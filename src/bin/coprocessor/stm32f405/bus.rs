@@ -13,6 +13,8 @@ use stm32f4::stm32f405::{self as pac, interrupt};
 
 /// Polls before the controller is taken for missing; it answers within a frame's time.
 const POLLS: u32 = 10_000;
+/// What the segments below give.
+pub const BITS_PER_SECOND: u32 = 500_000;
 /// 42 MHz / 6 / (1 + 11 + 2) = 500 kbit/s, sampled at 86 %.
 const PRESCALER: u16 = 6;
 const SEGMENTS: [u8; 2] = [11, 2];

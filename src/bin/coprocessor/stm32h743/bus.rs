@@ -14,6 +14,8 @@ use stm32h7::stm32h743v::{self as pac, interrupt};
 
 /// Polls before the controller is taken for missing.
 const POLLS: u32 = 10_000;
+/// What the segments below give.
+pub const BITS_PER_SECOND: u32 = 500_000;
 /// 25 MHz (the crystal) / 1 / (1 + 42 + 7) = 500 kbit/s, sampled at 86 %.
 const SEGMENTS: [u8; 2] = [42, 7];
 
