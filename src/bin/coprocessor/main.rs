@@ -50,6 +50,8 @@ mod idle;
 #[cfg(target_os = "none")]
 mod imu;
 #[cfg(target_os = "none")]
+mod outgoing;
+#[cfg(target_os = "none")]
 mod output;
 #[cfg(target_os = "none")]
 mod queue;
@@ -63,6 +65,8 @@ mod serial;
 mod start;
 #[cfg(target_os = "none")]
 mod usart;
+#[cfg(target_os = "none")]
+mod wheels;
 #[cfg(target_os = "none")]
 mod window;
 

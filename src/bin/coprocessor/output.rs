@@ -6,28 +6,26 @@ use crate::chip::watchdog::Watchdog;
 use crate::clock::BoardTime;
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{Imu, TURN};
+use crate::outgoing::{Outgoing, SlcanPort};
 use crate::received::{self, FRAMES};
+use crate::wheels::Wheels;
 use crate::window::Windows;
 use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::can::fog_feed::FogFeed;
-use gyronet::can::queue::TransmitQueue;
-use gyronet::can::slcan::port::Port;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::can::wheel::WheelSettings;
 use gyronet::fog::lane::FogLane;
 use gyronet::guard::{Guard, TIMEOUT_US};
 use gyronet::health::{Faults, Status, count};
-use gyronet::sample::{ImuSample, WheelSample};
+use gyronet::sample::ImuSample;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 use gyronet::vehicle::VehicleSample;
 
-/// Frames that may wait for a line: what older ones say is of no use to anybody.
-const QUEUE: usize = 24;
 /// What was found at the start to be wrong with what is stored.
 #[derive(Clone, Copy)]
 pub struct Doubts {
@@ -58,15 +56,9 @@ pub struct Output {
     windows: Windows,
     doubts: Doubts,
     tick: u32,
-    wheels: Option<WheelReceiver>,
-    wheels_known: Option<WheelSample>,
-    /// A wheel frame has come; a vehicle that sends none is not at fault.
-    wheels_heard: bool,
+    wheels: Wheels,
     feeds: Feeds,
-    slcan: SlcanPort,
-    port: Port<QUEUE>,
-    can: Option<Bus>,
-    queue: TransmitQueue<DataFrame, QUEUE>,
+    outgoing: Outgoing,
     /// Time stamp of the newest sample.
     sample_time: Micros,
     /// When it came, by the board's clock.
@@ -79,7 +71,6 @@ pub struct Output {
 }
 
 type FogPort = serial::Port<{ board::FOG_QUEUE }>;
-type SlcanPort = serial::Port<{ board::SLCAN_QUEUE }>;
 type ImuPort = serial::Port<{ board::IMU_QUEUE }>;
 type Ports = (ImuPort, FogPort, SlcanPort, Option<Bus>);
 
@@ -96,14 +87,9 @@ impl Unconnected {
             windows,
             doubts,
             tick: 0,
-            wheels: wheels.and_then(|wheels| WheelReceiver::new(wheels).ok()),
-            wheels_known: None,
-            wheels_heard: false,
+            wheels: Wheels::new(wheels),
             feeds: Feeds::new(config),
-            slcan,
-            port: Port::new(config.settings().bits_per_second),
-            can,
-            queue: TransmitQueue::new(),
+            outgoing: Outgoing::new(slcan, config.settings().bits_per_second, can),
             sample_time: Micros(0),
             heard: Micros(0),
             time,
@@ -158,9 +144,7 @@ impl Output {
     #[inline(never)]
     fn process(&mut self, sample: ImuSample, now: Micros) {
         self.sample_time = sample.time;
-        if let (true, Some(wheels)) = (self.wheels_heard, self.wheels.as_mut()) {
-            let known = wheels.poll(sample.time);
-            self.wheels_known = Some(known);
+        if let Some(known) = self.wheels.at(sample.time) {
             self.guard.wheels(known);
         }
         // What has no place in time is counted and gives no frame.
@@ -196,10 +180,9 @@ impl Output {
     fn fog_out(&mut self, lane: &mut FogLane, now: Micros) {
         let (time, fresh) = self.stream_time(now);
         let inertial = self.guard.pipeline().inertial().filter(|_| fresh);
-        let wheels = self.wheels_known;
-        while let Some(yaw) = lane.next_step(time, inertial, wheels.as_ref()) {
+        while let Some(yaw) = lane.next_step(time, inertial, self.wheels.known.as_ref()) {
             for frame in &self.fog_feed.process::<DataFrame>(&yaw) {
-                self.transmit(*frame, self.sample_time);
+                self.outgoing.push(*frame, self.sample_time);
             }
         }
     }
@@ -236,50 +219,32 @@ impl Output {
             vehicle.doubt();
         }
         for frame in &self.feeds.process::<DataFrame>(&vehicle) {
-            self.transmit(*frame, time);
-        }
-    }
-
-    fn transmit(&mut self, frame: DataFrame, time: Micros) {
-        self.port.push(frame, time);
-        if self.can.is_some() {
-            self.queue.push(frame);
+            self.outgoing.push(*frame, time);
         }
     }
 
     /// What the pipeline cannot know.
     fn faults(&mut self) -> Faults {
-        self.lines.unsent = self.port.dropped().saturating_add(self.queue.dropped());
+        self.lines.unsent = self.outgoing.dropped();
         self.lines.frames_lost = received::lost();
         let dropped = self.lines.unsent.saturating_add(self.lines.frames_lost);
         let lost = core::mem::replace(&mut self.dropped, dropped) < dropped;
-        let off = self.can.as_ref().is_some_and(Bus::off);
-        let bus = if lost || off { Faults::BUS } else { Faults::NONE };
+        let bus = if lost || self.outgoing.off() { Faults::BUS } else { Faults::NONE };
         if self.windows.has_network && !self.doubts.stored { bus } else { bus.with(Faults::STORED) }
     }
 
     fn frames_in(&mut self) {
         while let Some(frame) = FRAMES.pop() {
-            let Self { wheels, wheels_heard, sample_time, .. } = self;
-            wheel(wheels, wheels_heard, &frame, *sample_time);
+            self.wheels.take(&frame, self.sample_time);
         }
     }
 
     #[inline(never)]
     fn frames_out(&mut self) {
-        let Self { port, wheels, wheels_heard, sample_time, .. } = self;
-        // A byte that the line lost is answered as a bad line, or missing in it.
-        let _ = port.service(&mut self.slcan, |frame| wheel(wheels, wheels_heard, &frame, *sample_time));
-        if let Some(can) = self.can.as_mut() {
-            self.queue.service(can);
-        }
-        let [lost, held] = self.imu.line_faults();
-        self.lines.line_errors = lost.saturating_add(self.fog.lost()).saturating_add(self.slcan.lost());
-        self.lines.held = held.saturating_add(self.fog.held()).saturating_add(self.slcan.held());
+        let Self { outgoing, wheels, sample_time, .. } = self;
+        outgoing.service(|frame| wheels.take(&frame, *sample_time));
+        let ([lost, held], [slcan_lost, slcan_held]) = (self.imu.line_faults(), outgoing.line_faults());
+        self.lines.line_errors = lost.saturating_add(self.fog.lost()).saturating_add(slcan_lost);
+        self.lines.held = held.saturating_add(self.fog.held()).saturating_add(slcan_held);
     }
-}
-
-fn wheel(wheels: &mut Option<WheelReceiver>, heard: &mut bool, frame: &DataFrame, now: Micros) {
-    let taken = wheels.as_mut().and_then(|wheels| wheels.process(frame, now));
-    *heard |= matches!(taken, Some(Ok(_)));
 }
