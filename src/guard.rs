@@ -9,6 +9,7 @@
 //! | silent | no sample for [`TIMEOUT_US`] | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
 //! | stuck | [`STUCK_AFTER`] equal samples of gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
 //! | wrong | a reading that is further from the last one than a vehicle goes in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
+//! | accumulated yaw changed in memory | its step is neither the rate nor zero | fault bit `IMPLAUSIBLE` | at once |
 //! | saturated | the part says so | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
 
 mod jump;
@@ -114,6 +115,14 @@ impl Guard {
         }
         if stuck {
             output.prompt.status = Status::Stuck;
+        }
+        // The accumulated yaw goes on by the rate that goes out with it, or not at all: else a bit of it
+        // has flipped in memory.
+        let YawSample { yaw, rate, faults, .. } = &mut output.vehicle.yaw;
+        let turned = yaw.0.wrapping_sub(self.newest.0.0);
+        if turned != 0 && turned != i64::from(rate.0) {
+            count(&mut self.counters.wrong, 1);
+            *faults = faults.with(Faults::IMPLAUSIBLE);
         }
         self.newest = (output.vehicle.yaw.yaw, output.vehicle.tick);
         result

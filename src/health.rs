@@ -85,7 +85,8 @@ impl Faults {
     pub const CLIPPED: Self = Self(1 << 1);
     /// The part's readings stand still.
     pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate is not believed, or a reading of the part is not.
+    /// The network's estimate is not believed, a reading of the part is not, or the rates owe more
+    /// than a window's revision.
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
@@ -140,7 +141,7 @@ pub struct Counters {
     pub windows: u32,
     /// Network inputs clamped to its range.
     pub clamped_inputs: u32,
-    /// Windows not believed.
+    /// Windows not believed, and bias and levelling whose memory has changed.
     pub implausible: u32,
     /// Windows whose estimate came too late or not at all.
     pub late: u32,
@@ -160,7 +161,8 @@ pub struct WatchCounters {
     pub stuck: u32,
     /// Samples not trusted because it had just been saturated.
     pub held: u32,
-    /// Readings further from the last one than a vehicle goes in 10 ms.
+    /// Readings further from the last one than a vehicle goes in 10 ms, and steps of the
+    /// accumulated yaw that are not its rate.
     pub wrong: u32,
 }
 

@@ -15,4 +15,5 @@ pub mod require;
 pub mod stored;
 pub mod stream;
 pub mod synthetic;
+pub mod upset;
 pub mod wire;

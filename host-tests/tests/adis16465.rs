@@ -56,6 +56,8 @@ fn what_the_part_says_of_itself() {
             assert!(sample.is_ok(), "bit {bit}");
         }
     }
+    // Bits 1 to 3 of DIAG_STAT, which spoil no reading.
+    assert_eq!([DiagStat::OVERRUN, DiagStat::FLASH_UPDATE, DiagStat::SPI].map(|bit| bit.0), [2, 4, 8]);
     let clipped = Burst { rate: [0, 0, -32_768], ..burst() };
     assert!(clipped.sample(Model::Adis16465_1, Micros(0)).expect("in range").clipped);
     assert_eq!(Burst::parse(&[0; BURST]), Err(BurstError::Silent));

@@ -80,3 +80,24 @@ fn the_campaign_sees_what_is_there() {
     let twice = outcome(&scene, Some(fault(Kind::Duplicate, 200, 0.0)));
     assert!(twice.is_harmless() && twice.counted && twice.moved == 0.0, "{twice:?}");
 }
+
+/// The part's clock is the only one that the pipeline integrates by: a drift scales the turn, and a
+/// crystal's is far below what counts.
+#[test]
+fn a_clock_that_drifts_moves_yaw_by_that_share_of_the_turn() {
+    let drive = drive();
+    for part in Part::ALL {
+        let scene = Scene::new(&drive, part, &mut GyroNet::new(blob()));
+        for ppm in [50.0, 200.0, 1_000.0, 5_000.0, 20_000.0] {
+            let drift = outcome(&scene, Some(fault(Kind::ClockDrift, 650, ppm)));
+            let Outcome { moved, moved_sigmas, told_after, .. } = drift;
+            println!(
+                "{}: {ppm} ppm: {moved:.1e} rad, {moved_sigmas:.2} sigma, told after {told_after:?} s",
+                part.name()
+            );
+            // 0.7 rad/s is the fastest turn of the drives.
+            assert!(moved <= 0.7e-6 * ppm + 5e-4, "{}: {ppm} ppm: {drift:?}", part.name());
+            assert!(ppm > 200.0 || drift.is_harmless(), "{}: {ppm} ppm: {drift:?}", part.name());
+        }
+    }
+}

@@ -92,6 +92,7 @@ fn e2e_identifiers_tell_the_messages_apart() {
     assert_eq!(refused(E2e::P01 { mode: Both, data_ids: [1, 2, 1] }), duplicate);
     assert_eq!(refused(E2e::P01 { mode: Low, data_ids: [0x101, 0x201, 2] }), duplicate);
     assert_eq!(refused(E2e::P01 { mode: Alternating, data_ids: [0x101, 0x102, 0x203] }), duplicate);
+    assert_eq!(refused(E2e::P01 { mode: Alternating, data_ids: [0x101, 0x201, 0x302] }), duplicate);
     assert_eq!(refused(E2e::P01 { mode: Nibble, data_ids: [1, 2, 0x1000] }), ConfigError::DataId(0x1000));
     assert_eq!(refused(E2e::P11 { mode: P11Mode::Nibble, data_ids: [1, 2, 2] }), duplicate);
     assert_eq!(refused(E2e::P05 { data_ids: [1, 1, 2] }), duplicate);
@@ -161,6 +162,9 @@ fn every_feed_says_that_the_rate_is_not_to_be_used() {
         unusable.prompt.quality = quality;
         let frames = feeds.process::<DataFrame>(&unusable);
         assert_eq!(frames[0].data()[2] >> 4, nibble);
+        // What the part has not passed on is no acceleration either.
+        let force = if quality == Quality::Unusable { 2 } else { 0 };
+        assert_eq!(frames[0].data()[6] >> 4, force);
         assert_eq!(frames[3].data()[3..7], i32::to_le_bytes(rate));
         assert_eq!(frames[6].data()[3..5], u16::to_le_bytes(vdc2));
     }

@@ -114,13 +114,35 @@ fn crcs_have_the_published_check_values() {
 }
 
 #[test]
+fn what_a_verdict_lets_through() {
+    for verdict in [Verdict::First, Verdict::Ok, Verdict::Lost(1)] {
+        assert!(verdict.usable(), "{verdict:?}");
+    }
+    for verdict in [Verdict::Repeated, Verdict::WrongSequence { delta: 9 }] {
+        assert!(!verdict.usable(), "{verdict:?}");
+    }
+}
+
+#[test]
 fn lengths_and_counters_that_cannot_be() {
+    let lengths = [p01(DataIdMode::Both), p02(0, 0), p05(), p11(P11Mode::Both)].map(|p| p.header_len());
+    assert_eq!(lengths, [2, 2, 3, 2]);
     for profile in all() {
         for len in (0..profile.header_len()).chain([65]) {
             let mut data = vec![0; len];
             assert_eq!(profile.protect(&mut data, 0), Err(Fault::Length(len)), "{profile:?}");
             assert_eq!(profile.check(&data), Err(Fault::Length(len)), "{profile:?}");
         }
+    }
+    for (profile, longest) in
+        [(p01(DataIdMode::Both), 30), (p11(P11Mode::Both), 30), (p02(0, 0), 14), (p05(), 64)]
+    {
+        let mut data = vec![0; longest];
+        assert_eq!(profile.protect(&mut data, 1), Ok(()), "{profile:?}");
+        assert_eq!(profile.check(&data), Ok(1), "{profile:?}");
+        let mut data = vec![0; longest + 1];
+        assert_eq!(profile.protect(&mut data, 1), Err(Fault::Length(longest + 1)), "{profile:?}");
+        assert_eq!(profile.check(&data), Err(Fault::Length(longest + 1)), "{profile:?}");
     }
     assert_eq!(p01(DataIdMode::Both).protect(&mut [0; 8], 15), Err(Fault::Counter(15)));
     assert_eq!(p02(0, 0).protect(&mut [0; 8], 16), Err(Fault::Counter(16)));

@@ -2,11 +2,11 @@
 //! still, saturation, and the weights' checksum in the background.
 
 use gyronet::guard::{AXIS_STUCK_AFTER, Guard, HOLD, START_US, STUCK_AFTER, TIMEOUT_US};
-use gyronet::health::{Faults, Quality, Status};
+use gyronet::health::{Faults, Quality, Source, Status};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::{Blob, BlobError, weights};
 use gyronet::pipeline::PipelineConfig;
-use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sample::{ImuSample, PERIOD_US, Standstill, WHEELS, WheelSample};
 use gyronet::units::Micros;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::idling;
@@ -49,11 +49,33 @@ fn silence_has_no_rate_and_ends_with_a_sample() {
 }
 
 #[test]
+fn silence_keeps_the_yaw() {
+    let (mut guard, mut noise) = fed(400);
+    let output = guard.process(idling(400, 0.001, &mut noise), at(400)).expect("in time");
+    let set = guard.poll(Micros(at(400).0 + TIMEOUT_US)).expect("told");
+    assert_ne!(set.yaw.yaw.0, 0);
+    assert_eq!((set.yaw.yaw, set.yaw.source), (output.vehicle.yaw.yaw, Source::Raw));
+}
+
+#[test]
 fn a_part_has_time_to_start() {
     let mut guard = Guard::new(PipelineConfig::DEFAULT);
     assert!(guard.poll(Micros(START_US - 1)).is_none());
     let set = guard.poll(Micros(START_US)).expect("told");
     assert_eq!(set.yaw.quality, Quality::Unusable);
+}
+
+#[test]
+fn what_is_known_of_the_wheels_is_handed_on() {
+    let (mut guard, mut noise) = fed(400);
+    let silent = WheelSample { time: Micros(0), speeds: [None; WHEELS], standstill: Standstill::Unknown };
+    let mut told = |guard: &mut Guard, tick| {
+        let output = guard.process(idling(tick, 0.001, &mut noise), at(tick)).expect("in time");
+        output.vehicle.yaw.faults == output.vehicle.yaw.faults.with(Faults::WHEELS)
+    };
+    assert!(!told(&mut guard, 400));
+    guard.wheels(silent);
+    assert!(told(&mut guard, 401));
 }
 
 #[test]

@@ -77,6 +77,24 @@ fn what_is_not_valid_is_not_a_value() {
 }
 
 #[test]
+fn each_signal_can_say_error() {
+    let good = encode(rate(1.0));
+    assert!(!good.has_error());
+    assert!(Vdc2 { yaw_rate: 0xFE00, ..good }.has_error());
+    assert!(Vdc2 { lateral: 0xFE00, ..good }.has_error());
+    assert!(Vdc2 { longitudinal: 0xFE, ..good }.has_error());
+}
+
+#[test]
+fn the_largest_value_is_one_and_leaves_its_remainder() {
+    let mut encoder = Vdc2Encoder::default();
+    // Three tenths of a code below it: the second must be a code less.
+    let rate = AngularRate::from_rad_per_sec((64_254.7 / 8192.0 - 3.92) as f32).expect("in range");
+    let codes = [0, 1].map(|_| encoder.encode(rate, Validity::Valid, &AT_REST).yaw_rate);
+    assert_eq!(codes, [64_255, 64_254]);
+}
+
+#[test]
 fn integral_is_exact_although_zero_is_no_code() {
     for parked in [0.0, 0.001, -0.004] {
         let mut encoder = Vdc2Encoder::default();

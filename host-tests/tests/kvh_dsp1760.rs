@@ -1,6 +1,7 @@
 //! KVH DSP-1760: recorded and constructed frames, damage, lost messages, commands.
 
 use gyronet::sample::FogSample;
+use gyronet::sensor::ByteSource;
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::command::{Command, Reply, setup};
 use gyronet::sensor::dsp1760::message::{Extra, Format, Message, MessageError, Validity};
@@ -107,6 +108,14 @@ fn samples_carry_angle_time_and_temperature() {
 }
 
 #[test]
+fn there_are_three_axes() {
+    let good = |axis| (Validity(0xFF).gyro(axis), Validity(0xFF).accelerometer(axis));
+    assert_eq!([0, 1, 2, 3].map(good), [(true, true), (true, true), (true, true), (false, false)]);
+    let bad = |axis| (Validity(0).gyro(axis), Validity(0).accelerometer(axis));
+    assert_eq!([0, 1, 2].map(bad), [(false, false); 3]);
+}
+
+#[test]
 fn resynchronises() {
     let (recorded, other) = (bytes(RECORDED), bytes(PLUS_10_DPS));
     let false_start = [0xFE, 0x81, 0xFE, 0x81, 0xFF];
@@ -117,8 +126,8 @@ fn resynchronises() {
     let mut damaged = other.clone();
     damaged[20] ^= 1;
     let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
-    assert_eq!(feed(part, &[&damaged[..], &recorded].concat()).len(), 1);
-    assert_eq!(part.bad_checksums(), 1);
+    assert_eq!(feed(part, &[&damaged[..], &damaged, &recorded].concat()).len(), 1);
+    assert_eq!((part.bad_checksums(), ByteSource::bad_checksums(part)), (2, 2));
     // A header inside the payload: an acceleration whose bits are FE 81 FF 55.
     let hidden = Message { acceleration: [f32::from_bits(0xFE81_FF55), 0.0, 0.0], ..message(3, 1e-5) }.emit();
     assert_eq!(feed_new(&[&hidden[10..], &hidden[..], &recorded[..]].concat()).len(), 2);

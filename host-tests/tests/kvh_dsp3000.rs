@@ -65,6 +65,19 @@ fn a_lost_byte() {
 }
 
 #[test]
+fn words_of_another_kind_are_no_readings() {
+    for (mode, sync) in [(Mode::Incremental, 0), (Mode::Rate, 1)] {
+        let mut part = Dsp3000Binary::new(Mode::Rate, 0);
+        let words = (0..200).map(|n| Word { mode, sync, ..rate(166_667 - 37 * n) });
+        let readings = words.flat_map(|word| word.emit()).filter_map(|byte| part.push(byte));
+        // In another phase some may look as if they were.
+        for word in readings {
+            assert_eq!((word.mode, word.sync), (Mode::Rate, 0));
+        }
+    }
+}
+
+#[test]
 fn samples() {
     let expected = 0.1f64.to_radians();
     let word = rate(166_667).sample(Micros(5), 10_000).expect("a rate");

@@ -64,6 +64,7 @@ fn a_bus_that_is_gone_costs_the_oldest_frames() {
     for number in 0..6_000 {
         queue.push(frame(number));
         assert_eq!(queue.service(&mut gone), 0);
+        assert!(!queue.is_empty());
     }
     assert_eq!(gone.tries, 6_000, "one try a turn");
     assert_eq!((queue.len(), queue.dropped(), queue.errors()), (7, 5_993, 0));

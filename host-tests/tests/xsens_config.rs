@@ -121,3 +121,14 @@ fn a_part_that_wakes_up() {
     assert_eq!(sent(&mut dialogue, 1), WAKE_UP_ACK);
     assert_eq!(sent(&mut dialogue, 2), SET_OUTPUT_CONFIGURATION);
 }
+
+#[test]
+fn a_part_that_wakes_up_again_and_again() {
+    let mut dialogue = Dialogue::new();
+    for now in 0..u64::from(ATTEMPTS) {
+        push(&mut dialogue, &frame(mid::WAKE_UP, &[]));
+        assert_eq!(sent(&mut dialogue, now), WAKE_UP_ACK);
+    }
+    push(&mut dialogue, &frame(mid::WAKE_UP, &[]));
+    assert_eq!(dialogue.poll(Micros(9)), Err(DialogueError::Restarts));
+}

@@ -101,6 +101,16 @@ fn a_rate_that_is_unusable_is_not_sent() {
 }
 
 #[test]
+fn every_judgement_is_read_as_it_was_sent() {
+    for source in [Source::Raw, Source::Static, Source::GyroNet, Source::FogNet, Source::Held] {
+        for quality in [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable] {
+            let message = RateMessage { rate: -7, source, quality };
+            assert_eq!(RateMessage::parse(&message.emit()), Ok(message));
+        }
+    }
+}
+
+#[test]
 fn a_fault_between_two_messages_is_not_lost() {
     let mut feed = YawFeed::new(p01(), 3);
     let with = |faults| YawSample { faults, ..sample(AngularRate::ZERO, Yaw(0)) };

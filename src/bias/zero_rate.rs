@@ -110,9 +110,10 @@ pub struct ZeroRate {
     block: Spread,
     waiting: Option<Measurement>,
     refused: bool,
-    /// 2^-20 rad/s x samples turned in this second of standing, by the newest samples.
-    turned: i32,
-    turned_for: u8,
+    /// 2^-20 rad/s x samples turned while standing, by the newest samples: in this quarter of a second
+    /// and the four before it; and how many more are in it.
+    turned: [i32; 5],
+    turning_for: u8,
     since_walk: u32,
     temperature: Option<CentiCelsius>,
 }
@@ -133,8 +134,8 @@ impl ZeroRate {
             block: Spread::default(),
             waiting: None,
             refused: false,
-            turned: 0,
-            turned_for: 0,
+            turned: [0; 5],
+            turning_for: 0,
             since_walk: 0,
             temperature: None,
         }
@@ -181,21 +182,23 @@ impl ZeroRate {
     /// vehicle stands, has not gone out yet for the sample that tells.
     pub fn watch(&mut self, rate: AngularRate) -> bool {
         if self.proof != Proof::Wheels {
-            (self.turned, self.turned_for) = (0, 0);
+            self.turned = [0; 5];
             return false;
         }
-        if u32::from(self.turned_for) == RATE_HZ {
-            (self.turned, self.turned_for) = (0, 0);
+        if self.turning_for == 0 {
+            // Whatever second ends now lies within the five.
+            self.turned.rotate_right(1);
+            (self.turned[0], self.turning_for) = (0, RATE_HZ as u8 / 4);
         }
-        // A hundred of them fit.
-        self.turned += rate.0.saturating_sub(self.bias().0) >> TURNED_SHIFT;
-        self.turned_for += 1;
+        // 125 of them fit.
+        self.turned[0] += rate.0.saturating_sub(self.bias().0) >> TURNED_SHIFT;
+        self.turning_for -= 1;
         let per_rad = (AngularRate::PER_RAD_PER_SEC / (1 << TURNED_SHIFT) as f32) * RATE_HZ as f32;
-        let turned = self.turned as f32 / per_rad;
+        let turned = self.turned.iter().sum::<i32>() as f32 / per_rad;
         if libm::fabsf(turned) <= self.wheels_gate() {
             return false;
         }
-        (self.turned, self.turned_for) = (0, 0);
+        self.turned = [0; 5];
         if core::mem::replace(&mut self.refused, true) {
             return false;
         }

@@ -64,6 +64,8 @@ impl CompensateConfig {
     };
 }
 
+/// What is owed is told of when it takes so many samples to pay: 0.25 deg with the default bound.
+const LONG: u64 = 25;
 /// Samples that are kept: the newest, and as many before it as a window can still change.
 const KEPT: usize = Lag::MAX.samples() + 1;
 
@@ -168,9 +170,10 @@ impl Compensator {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
             entry.sum += i64::from(correction.0);
             entry.count += 1;
-            let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0) as i32;
-            let revision = i64::from(estimate) - i64::from(entry.estimate);
-            entry.estimate = estimate;
+            let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
+            let estimate = believable(estimate, max_single);
+            let revision = estimate - i64::from(entry.estimate);
+            entry.estimate = estimate as i32;
             self.prompt_carry += revision;
             let age = KEPT - 1 - (oldest + place);
             match (age >= lag.samples(), entry.held) {
@@ -195,7 +198,7 @@ impl Compensator {
     /// What is owed is not paid in a rate that a receiver drops: a clipped one.
     pub fn prompt(&mut self, bias: AngularRate) -> Option<Emitted> {
         let entry = self.kept[KEPT - 1]?;
-        let taken = i64::from(entry.estimate) + i64::from(bias.0);
+        let taken = believable(entry.estimate.into(), self.config.max_single) + i64::from(bias.0);
         Some(emit(&entry, taken, &mut self.prompt_carry, self.config.max_carry))
     }
 
@@ -204,9 +207,10 @@ impl Compensator {
     ///
     /// `stands`: the vehicle has stood since before that sample was taken, so its rate is zero.
     pub fn navigation(&mut self, bias: AngularRate, stands: bool) -> Option<Emitted> {
+        let max_single = self.config.max_single;
         let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && !entry.clipped;
-        let mut taken = i64::from(entry.estimate) + i64::from(bias.0);
+        let mut taken = believable(entry.estimate.into(), max_single) + i64::from(bias.0);
         if entry.held {
             self.held[1] += i64::from(entry.rate) - taken;
             taken = i64::from(entry.rate);
@@ -244,6 +248,14 @@ impl Compensator {
         self.navigation_carry -= before + since;
     }
 
+    /// Whether the navigation rates are to carry more than a window revises: the wheels stood while
+    /// the vehicle turned, or a bit has flipped in memory. They are off until it is paid.
+    #[must_use]
+    pub fn owes_much(&self) -> bool {
+        let much = LONG * u64::from(self.config.max_carry.0.unsigned_abs());
+        self.navigation_carry.unsigned_abs() > much
+    }
+
     /// What the sum of the prompt rates has yet to get, codes x samples: revisions that are not
     /// carried yet.
     #[must_use]
@@ -278,6 +290,12 @@ fn emit(entry: &Entry, taken: i64, carry: &mut i64, max_carry: AngularRate) -> E
         clipped: entry.clipped,
         held: entry.held,
     }
+}
+
+/// An estimate is within the limit of what it is the mean of, unless a bit of it has flipped.
+fn believable(estimate: i64, max_single: AngularRate) -> i64 {
+    let limit = i64::from(max_single.0.unsigned_abs());
+    estimate.clamp(-limit, limit)
 }
 
 /// Mean of some corrections, towards zero.

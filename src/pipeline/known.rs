@@ -2,10 +2,11 @@
 
 use super::{Pipeline, PipelineConfig, YawRate};
 use crate::bias::{QuietDetector, Rest, StaticError, ZeroPoint, ZeroRate};
-use crate::health::{Status, count};
+use crate::health::{Faults, Status, count};
 use crate::mounting::Rotation;
 use crate::sample::{Frame, ImuSample, Standstill};
 use crate::units::{AngularRate, Yaw};
+use core::hash::{Hash, Hasher};
 
 /// What is known once static initialisation has succeeded.
 #[derive(Debug, Clone)]
@@ -13,16 +14,34 @@ pub(super) struct Known {
     /// Beyond the configured mounting.
     pub(super) levelling: Rotation,
     pub(super) zero: ZeroPoint,
+    /// Of mounting, levelling and zero point, which stay as they are: a bit that flips in them shows.
+    seal: u32,
     pub(super) quiet: QuietDetector,
     pub(super) zero_rate: Option<ZeroRate>,
 }
 
 impl Pipeline {
-    /// Levels a sample, and says what the gyro reads at rest; `None` before that is known.
-    pub(super) fn turned(&self, sample: &mut ImuSample) -> Option<ZeroPoint> {
+    /// Levels a sample, and says what the gyro reads at rest; `None` before that is known, and when
+    /// its memory has changed.
+    pub(super) fn turned(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
         let known = self.known.as_ref()?;
+        let mounting = seal(SEAL, &self.config.mounting);
+        if known.seal != seal(mounting, &(known.levelling, known.zero)) {
+            self.forget();
+            return None;
+        }
         *sample = known.levelling.sample(sample);
         Some(known.zero)
+    }
+
+    /// What was known is not what it was: static initialisation begins anew.
+    #[cold]
+    fn forget(&mut self) {
+        self.known = None;
+        self.prompt_yaw = self.navigation_yaw;
+        self.break_window();
+        self.estimate_faults = Faults::IMPLAUSIBLE;
+        count(&mut self.counters.implausible, 1);
     }
 
     #[inline(never)]
@@ -45,14 +64,41 @@ impl Pipeline {
     fn know(&mut self, rest: &Rest) -> Result<(), StaticError> {
         let PipelineConfig { levelling, static_init, earth_rate, zero_rate, quiet, .. } = self.config;
         let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
+        let zero = ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate);
         self.known = Some(Known {
             levelling,
-            zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
+            zero,
+            // Not of the mounting as it is by now.
+            seal: seal(self.mounting_seal, &(levelling, zero)),
             quiet: QuietDetector::new(quiet, &static_init, rest),
             zero_rate: zero_rate.map(ZeroRate::new),
         });
         Ok(())
     }
+}
+
+/// FNV-1a (Fowler, Noll, Vo), 32 bits: one changed byte always changes it.
+struct Fnv(u32);
+
+impl Hasher for Fnv {
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u32::from(*byte)).wrapping_mul(0x0100_0193);
+        }
+    }
+
+    fn finish(&self) -> u64 {
+        self.0.into()
+    }
+}
+
+/// What a seal begins with.
+pub(super) const SEAL: u32 = 0x811C_9DC5;
+
+pub(super) fn seal(begun: u32, value: &impl Hash) -> u32 {
+    let mut fnv = Fnv(begun);
+    value.hash(&mut fnv);
+    fnv.0
 }
 
 /// The gyro as it is.

@@ -15,7 +15,7 @@ mod told;
 pub use config::PipelineConfig;
 pub use output::{DueWindow, Output, Owed, YawRate};
 
-use known::{Known, raw};
+use known::{Known, SEAL, raw, seal};
 
 use crate::align::{AlignError, Aligner};
 use crate::bias::{Proof, Second, StaticInit, ZeroPoint, ZeroRate};
@@ -32,6 +32,8 @@ use crate::window::{self, Features, WINDOW, Window};
 #[derive(Debug, Clone)]
 pub struct Pipeline {
     config: PipelineConfig,
+    /// Of the mounting as it was configured.
+    mounting_seal: u32,
     aligner: Aligner,
     static_init: StaticInit,
     known: Option<Known>,
@@ -64,6 +66,7 @@ impl Pipeline {
     pub fn new(config: PipelineConfig) -> Self {
         Self {
             config,
+            mounting_seal: seal(SEAL, &config.mounting),
             aligner: Aligner::default(),
             static_init: StaticInit::new(config.static_init),
             known: None,

@@ -14,6 +14,7 @@ impl Pipeline {
         self.estimate_faults
             .with(fault(self.gap_within > 0, Faults::GAP))
             .with(fault(sample.clipped, Faults::CLIPPED))
+            .with(fault(self.compensator.owes_much(), Faults::IMPLAUSIBLE))
             .with(fault(self.wheels_silent() || self.contradicted(), Faults::WHEELS))
     }
 

@@ -22,7 +22,7 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// Frames that may wait, as in the image.
-const QUEUE: usize = 32;
+const QUEUE: usize = 24;
 
 /// The windows of an undamaged drive, at whatever sample they end, and what the network says of
 /// each once it has been asked.
@@ -80,6 +80,16 @@ impl Board {
     /// The watch and the pipeline.
     pub fn guard(&mut self) -> &mut Guard {
         &mut self.guard
+    }
+
+    /// What makes frames of samples.
+    pub fn feeds(&mut self) -> &mut Feeds {
+        &mut self.feeds
+    }
+
+    /// What knows of the wheels.
+    pub fn wheels(&mut self) -> &mut WheelReceiver {
+        &mut self.wheels
     }
 
     /// The gyro's static bias, zero before it is known.
@@ -150,6 +160,7 @@ impl Board {
             watch.silences,
             watch.stuck,
             watch.held,
+            watch.wrong,
             pipeline.missing,
             pipeline.misplaced,
             pipeline.clock_jumps,

@@ -101,17 +101,18 @@ impl<'d> Scene<'d> {
 
     /// Runs a stretch with faults; it begins where a state is kept.
     pub fn run(&self, span: Span, faults: &[Fault], network: &mut impl WindowNetwork) -> Outcome {
-        self.run_on(span, faults, None, &mut Remembering { network, known: &self.known })
+        self.run_on(span, faults, None, &mut Remembering { network, known: &self.known }, |_, _| {})
     }
 
     /// [`Scene::run`] on a network that is asked about every window; `upset`: when something else
-    /// than the faults is done, microseconds.
+    /// than the faults is done, microseconds; `reach`: called before each row with its number.
     pub fn run_on(
         &self,
         span: Span,
         faults: &[Fault],
         upset: Option<u64>,
         network: &mut impl WindowNetwork,
+        mut reach: impl FnMut(usize, &mut Board),
     ) -> Outcome {
         let (mut board, mut receiver) = self.states[span.from / STATE_EVERY].clone();
         let mut readings = self.drive.readings[span.from..span.to].to_vec();
@@ -129,6 +130,7 @@ impl<'d> Scene<'d> {
         let start = readings.first().map_or(0, |reading| reading.at - PERIOD_US);
         let mut last = start;
         for (row, reading) in (span.from..).zip(&readings) {
+            reach(row, &mut board);
             turn(&mut board, &mut rest, row, last..reading.at, network, &mut out);
             last = reading.at;
         }

@@ -76,7 +76,7 @@ pub fn flip(
         let remembering = Remembering { network: &mut *network, known: &scene.known };
         let mut upset = Upset { network: remembering, place, bit: draw.below(32 * words), asked: 0 };
         let at = scene.drive.readings[from + RATE_HZ as usize].at;
-        let outcome = scene.run_on(span, &[], Some(at), &mut upset);
+        let outcome = scene.run_on(span, &[], Some(at), &mut upset, |_, _| {});
         effects.count(
             outcome.told_after.is_some() && !outcome.is_undetected(),
             outcome.moved,

@@ -1,0 +1,274 @@
+//! Bits that flip in the working state of a board in the middle of a drive: in the watch with its
+//! pipeline (bias, windows, compensation, yaw, configuration), in the feeds, in what knows of the wheels.
+//!
+//! A flipped bit may make of a value what its type does not know. Here that is a process of its
+//! own, which dies or hangs; on the board it is a fault handler or the watchdog, and a start anew.
+
+use gyronet::can::feeds::Feeds;
+use gyronet::can::wheel::WheelReceiver;
+use gyronet::guard::Guard;
+use gyronet::model::{Blob, GyroNet, weights};
+use gyronet_host_tests::upset::{self, first_difference};
+use gyronet_tools::bundled;
+use gyronet_tools::campaign::board::{Board, Remembering};
+use gyronet_tools::campaign::draw::Draw;
+use gyronet_tools::campaign::drive::Drive;
+use gyronet_tools::campaign::fault::Span;
+use gyronet_tools::campaign::judge::Outcome;
+use gyronet_tools::campaign::part::Part;
+use gyronet_tools::campaign::scene::{STATE_EVERY, Scene};
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::ops::Range;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Rows of a run, and the one of them before which a bit flips.
+const ROWS: usize = 800;
+const AT: usize = 110;
+/// Static initialisation is over, and a second has been good.
+const FIRST_STATE: usize = 6;
+const SEED: u64 = 1;
+/// For a run of 8 s that takes milliseconds.
+const HANGS: Duration = Duration::from_secs(60);
+/// Which flips a process is to do.
+const FLIPS: &str = "GYRONET_FLIPS";
+
+/// What became of one flip, as a process says it.
+#[derive(Debug, Clone, Copy)]
+struct Effect {
+    told: bool,
+    not_recovered: bool,
+    moved: f64,
+    sigmas: f64,
+    grown: f64,
+    grown_sigmas: f64,
+}
+
+impl Effect {
+    fn parse(line: &str) -> Option<Self> {
+        let values: Vec<f64> =
+            line.strip_prefix("effect ")?.split(' ').filter_map(|word| word.parse().ok()).collect();
+        let &[told, not_recovered, moved, sigmas, grown, grown_sigmas] = &values[..] else { return None };
+        let [told, not_recovered] = [told, not_recovered].map(|flag| flag != 0.0);
+        Some(Self { told, not_recovered, moved, sigmas, grown, grown_sigmas })
+    }
+}
+
+/// A line for each field that bits flipped in.
+#[derive(Debug, Clone, Default)]
+struct Line {
+    flips: usize,
+    nothing: usize,
+    within: usize,
+    told: usize,
+    beyond: usize,
+    died: usize,
+    not_recovered: usize,
+    most: f64,
+    grown: usize,
+    grown_most: f64,
+}
+
+impl Line {
+    fn count(&mut self, effect: Option<Effect>) {
+        self.flips += 1;
+        let Some(effect) = effect else {
+            self.died += 1;
+            return;
+        };
+        match effect {
+            Effect { sigmas, .. } if sigmas > 1.0 => self.beyond += 1,
+            Effect { told: true, .. } => self.told += 1,
+            Effect { sigmas: 0.0, .. } => self.nothing += 1,
+            _ => self.within += 1,
+        }
+        self.most = self.most.max(effect.moved);
+        self.not_recovered += usize::from(effect.not_recovered);
+        self.grown += usize::from(effect.grown_sigmas > 1.0);
+        self.grown_most = self.grown_most.max(effect.grown);
+    }
+}
+
+/// Does some flips; for each a line that it begins, one of what became of it, and one of the
+/// field that it was in.
+fn flip(flips: Range<usize>) {
+    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+    let mut network = GyroNet::new(blob);
+    let drive = Drive::new(&bundled::simulated_drive().expect("it comes with the tools"));
+    let scene = Scene::new(&drive, Part::Xsens, &mut network);
+    let states = (scene.rows() - ROWS) / STATE_EVERY;
+    for number in flips {
+        let mut draw = Draw::new(SEED, number as u64);
+        let from = (FIRST_STATE + draw.below(states - FIRST_STATE)) * STATE_EVERY;
+        let bit = draw.below(8 * STATE.iter().sum::<usize>());
+        let span = Span { from, to: from + ROWS, healthy: 0 };
+        let at = drive.readings[from + AT].at;
+        let mut run = |reach: &mut dyn FnMut(&mut Board)| {
+            let mut network = Remembering { network: &mut network, known: &scene.known };
+            scene.run_on(span, &[], Some(at), &mut network, |row, board| {
+                if row == from + AT {
+                    reach(board);
+                }
+            })
+        };
+        println!("\nflip {number}");
+        let Outcome { told_after, not_recovered, moved, moved_sigmas, grown, grown_sigmas, .. } =
+            run(&mut |board| upset(board, bit));
+        let [told, not_recovered] = [told_after.is_some(), not_recovered].map(u8::from);
+        println!("effect {told} {not_recovered} {moved:e} {moved_sigmas:e} {grown:e} {grown_sigmas:e}");
+        // Once more, to see what it was.
+        run(&mut |board| {
+            let before = text(board);
+            upset(board, bit);
+            println!("field {}", first_difference(&before, &text(board)).unwrap_or_default());
+        });
+    }
+}
+
+/// Bytes of what bits flip in.
+const STATE: [usize; 3] = [size_of::<Guard>(), size_of::<Feeds>(), size_of::<WheelReceiver>()];
+
+fn upset(board: &mut Board, bit: usize) {
+    let [guard, feeds, _] = STATE.map(|bytes| 8 * bytes);
+    if bit < guard {
+        upset::flip(board.guard(), bit);
+    } else if bit < guard + feeds {
+        upset::flip(board.feeds(), bit - guard);
+    } else {
+        upset::flip(board.wheels(), bit - guard - feeds);
+    }
+}
+
+fn text(board: &mut Board) -> String {
+    let guard = format!("guard: {:#?}", board.guard());
+    let feeds = format!("feeds: {:#?}", board.feeds());
+    [guard, feeds, format!("wheels: {:#?}", board.wheels())].join("\n")
+}
+
+/// The flips of this process, when it was started for them by [`effects`].
+#[test]
+#[ignore = "a part of the others"]
+fn process() {
+    let flips = std::env::var(FLIPS).expect("it is started by another test");
+    let (from, to) = flips.split_once(' ').expect("two numbers");
+    flip(from.parse().expect("a number")..to.parse().expect("a number"));
+}
+
+fn start(flips: Range<usize>) -> (Child, mpsc::Receiver<String>) {
+    let mut child = Command::new(std::env::current_exe().expect("this test"))
+        .args(["--exact", "process", "--ignored", "--nocapture"])
+        .env(FLIPS, format!("{} {}", flips.start, flips.end))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("this test again");
+    let lines = BufReader::new(child.stdout.take().expect("piped")).lines();
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    (child, receiver)
+}
+
+/// What becomes of so many flips, by field.
+fn effects(count: usize) -> BTreeMap<String, Line> {
+    let mut fields = BTreeMap::<String, Line>::new();
+    let mut next = 0;
+    while next < count {
+        let (mut child, lines) = start(next..count);
+        let (mut begun, mut effect) = (None, None);
+        while let Ok(line) = lines.recv_timeout(HANGS) {
+            match line.split_once(' ') {
+                Some(("flip", number)) => (begun, effect) = (number.parse::<usize>().ok(), None),
+                Some(("effect", _)) => effect = Effect::parse(&line),
+                Some(("field", name)) => {
+                    fields.entry(name.to_owned()).or_default().count(effect);
+                    next = begun.take().expect("it has begun") + 1;
+                }
+                _ => {}
+            }
+        }
+        // It has ended, or it hangs.
+        let _ = child.kill();
+        let panicked = child.wait().expect("a child").code().is_some();
+        if let Some(number) = begun {
+            let name = if panicked { "(panic)" } else { "(end of the process)" };
+            fields.entry(name.to_owned()).or_default().count(effect);
+            next = number + 1;
+        }
+    }
+    fields
+}
+
+fn table(fields: &BTreeMap<String, Line>) -> Line {
+    let mut all = Line::default();
+    println!(
+        "| field | flips | nothing | within sigma | told | beyond | most, rad | died | not recovered | grown | by at most, rad |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    let row = |name: &str, line: &Line| {
+        let Line { flips, nothing, within, told, beyond, most, died, not_recovered, grown, grown_most } =
+            line;
+        println!(
+            "| {name} | {flips} | {nothing} | {within} | {told} | {beyond} | {most:.1e} | {died} | {not_recovered} | {grown} | {grown_most:.1e} |"
+        );
+    };
+    for (name, line) in fields {
+        row(name, line);
+        all.flips += line.flips;
+        all.nothing += line.nothing;
+        all.within += line.within;
+        all.told += line.told;
+        all.beyond += line.beyond;
+        all.died += line.died;
+        all.not_recovered += line.not_recovered;
+        all.grown += line.grown;
+        all.most = all.most.max(line.most);
+        all.grown_most = all.grown_most.max(line.grown_most);
+    }
+    row("all", &all);
+    all
+}
+
+/// What is held against a second copy or a seal: a flip there is told of, always.
+const WATCHED: [&str; 5] = [
+    "guard.newest",
+    "guard.pipeline.config.mounting",
+    "guard.pipeline.known.levelling",
+    "guard.pipeline.known.zero.",
+    "guard.pipeline.navigation_yaw",
+];
+/// What moves yaw unseen by more than a correction may, and the most of it in a second, rad: a rate
+/// that waits for its turn, 16 rad/s for a sample; the bias that was learnt at standstill, until the
+/// next one.
+const NAMED: [(&str, f64); 2] =
+    [("guard.pipeline.compensator.kept.rate", 0.17), ("guard.pipeline.known.zero_rate.bias", 0.05)];
+/// All else: a correction of 30 deg/s for a sample, 0.0052 rad, and what windows make of it.
+const MOST: f64 = 8e-3;
+
+fn check(count: usize) {
+    let fields = effects(count);
+    let all = table(&fields);
+    assert_eq!(all.flips, count);
+    for (name, line) in &fields {
+        if WATCHED.iter().any(|watched| name.starts_with(watched)) {
+            assert_eq!(line.beyond, 0, "{name}: {line:?}");
+        }
+        let named = NAMED.iter().find(|(named, _)| named == name);
+        assert!(line.most <= named.map_or(MOST, |(_, most)| *most), "{name}: {line:?}");
+    }
+    assert!(all.nothing > count / 2 && all.told > 0, "{all:?}");
+    assert!(all.died <= count / 50, "{all:?}");
+}
+
+#[test]
+fn a_hundred_flips() {
+    check(100);
+}
+
+/// `cargo test -p gyronet-host-tests --test state_upsets -- --ignored --nocapture thousands`
+#[test]
+#[ignore = "takes minutes"]
+fn thousands_of_flips() {
+    check(4_000);
+}
