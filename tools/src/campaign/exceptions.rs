@@ -95,17 +95,23 @@ pub const EXCEPTIONS: &[Exception] = &[
     },
 ];
 
-/// The exception that covers what a run's faults moved. Errors of a pair add up, so its faults may
-/// move as much as each of them alone; the wider one's name is given.
+/// The exception that covers what a run's faults moved. Errors of a pair add up: where no name alone
+/// covers it, its faults may move as much as each of them, and the wider one's name is given.
 #[must_use]
 pub fn excepted(faults: &[Fault], part: Part, moved: f64) -> Option<&'static Exception> {
-    let widest = |fault| {
-        let bounds =
-            EXCEPTIONS.iter().filter_map(|exception| Some((exception, (exception.bound)(fault, part)?)));
-        bounds.max_by(|(_, one), (_, other)| one.total_cmp(other))
+    let covers = |exception: &&Exception| {
+        let bounds: Vec<f64> = faults.iter().filter_map(|fault| (exception.bound)(fault, part)).collect();
+        !bounds.is_empty() && moved <= bounds.iter().sum()
     };
-    let named: Vec<(&Exception, f64)> = faults.iter().filter_map(widest).collect();
-    let bound: f64 = named.iter().map(|(_, bound)| bound).sum();
-    let (exception, _) = named.into_iter().max_by(|(_, one), (_, other)| one.total_cmp(other))?;
-    (moved <= bound).then_some(exception)
+    EXCEPTIONS.iter().find(covers).or_else(|| {
+        let wider = |one: &(_, f64), other: &(_, f64)| one.1.total_cmp(&other.1);
+        let widest = |fault| {
+            let bounds = EXCEPTIONS.iter().filter_map(|named| Some((named, (named.bound)(fault, part)?)));
+            bounds.max_by(wider)
+        };
+        let named: Vec<(&Exception, f64)> = faults.iter().filter_map(widest).collect();
+        let bound: f64 = named.iter().map(|(_, bound)| bound).sum();
+        let (exception, _) = named.into_iter().max_by(wider)?;
+        (moved <= bound).then_some(exception)
+    })
 }
