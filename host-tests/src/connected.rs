@@ -54,7 +54,7 @@ impl Step {
         Self {
             wheels: number.is_multiple_of(WHEELS).then(|| wheels(speed)),
             imu: replay::message(number, row),
-            fog: fog(number, row),
+            fog: fog(number, reading(number, row)),
         }
     }
 
@@ -64,19 +64,24 @@ impl Step {
     }
 }
 
-/// What the gyro sends in the 10 ms that end with a row: a tenth of its turn each. It begins with the
-/// message that ends with the first row, so that a set of ours always comes with the last message.
-fn fog(number: usize, row: &Row) -> Vec<u8> {
-    let message = |part: usize| {
-        let sequence = ((number * MESSAGES + part) % 128) as u8;
-        let angle = (row.reference * 0.01 / MESSAGES as f64) as f32;
-        Message {
-            rotation: [0.0, 0.0, angle],
-            acceleration: [0.0; 3],
-            extra: Extra::Temperature(25),
-            validity: Validity::ALL,
-            sequence,
-        }
+/// Each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
+#[must_use]
+pub fn reading(number: usize, row: &Row) -> f32 {
+    // No gyro says the same for long.
+    let noise = if number.is_multiple_of(2) { 1e-8 } else { -1e-8 };
+    (row.reference * 0.01 / MESSAGES as f64 + noise) as f32
+}
+
+/// What the gyro sends in the 10 ms that end with a row. It begins with the message that ends with the
+/// first row, so that a set of ours always comes with the last message.
+#[must_use]
+pub fn fog(number: usize, reading: f32) -> Vec<u8> {
+    let message = |part: usize| Message {
+        rotation: [0.0, 0.0, reading],
+        acceleration: [0.0; 3],
+        extra: Extra::Temperature(25),
+        validity: Validity::ALL,
+        sequence: ((number * MESSAGES + part) % 128) as u8,
     };
     let first = if number == 0 { MESSAGES - 1 } else { 0 };
     (first..MESSAGES).flat_map(|part| message(part).emit().to_vec()).collect()

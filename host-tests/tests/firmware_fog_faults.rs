@@ -7,6 +7,7 @@
 use embedded_can::Frame;
 use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
 use gyronet::can::yaw::{AngleMessage, FOG_IDS, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage};
+use gyronet::fog::lane;
 use gyronet::guard::{HOLD, STUCK_AFTER};
 use gyronet::store::Configuration;
 use gyronet_host_tests::connected::{self, Step};
@@ -57,10 +58,10 @@ impl Told {
     }
 
     /// No rate that is marked good differs from what it is without the fault by more than a correction
-    /// may (of GyroNet 1 deg/s; a window that begins elsewhere has another one), and none that is
-    /// marked unusable is a number.
+    /// may (of GyroNet 1 deg/s; a window that begins elsewhere has another one), or than the vehicle's
+    /// rate changes before a gyro is known to be stuck; and none that is marked unusable is a number.
     fn against(&self, undamaged: &Self, test: &str) {
-        for (id, most) in [(OWN, 1_000_000), (FOG_IDS[0], 1_000)] {
+        for (id, most) in [(OWN, 1_000_000), (FOG_IDS[0], 2_000)] {
             let (told, right) = (self.rates(id), undamaged.rates(id));
             assert_eq!(told.len(), right.len());
             let mut worst = 0;
@@ -120,6 +121,21 @@ fn fog_garbage() {
     let raw = told.rated(FOG_IDS[0], Quality::Degraded).expect("it has no estimate");
     assert!(raw.0 == BEGIN + GARBAGE + 1 && raw.1 <= BEGIN + GARBAGE + 201, "{raw:?}");
     // The other sensor has nothing to do with it.
+    assert_eq!((told.failed(), told.rated(OWN, Quality::Unusable)), (None, None));
+}
+
+/// Criterion: [`lane::STUCK_AFTER`] turns of 10 ms equal to the one before, in the last of them.
+#[test]
+fn stuck_fog() {
+    const STUCK: usize = 40;
+    let rows = drive();
+    let held = connected::reading(BEGIN - 1, &rows[BEGIN - 1]);
+    let stuck = |number: usize, step: &mut Step| step.fog = connected::fog(number, held);
+    let Some(told) = Told::of("stuck_fog", STUCK, stuck) else { return };
+    // A set of the gyro's goes out with the first message behind its 10 ms.
+    let failed = Some((BEGIN + usize::from(lane::STUCK_AFTER) - 1, BEGIN + STUCK - 1));
+    assert_eq!(told.rated(FOG_IDS[0], Quality::Unusable), failed);
+    assert_eq!(told.flagged(FOG_IDS[1], Faults::STUCK), failed);
     assert_eq!((told.failed(), told.rated(OWN, Quality::Unusable)), (None, None));
 }
 

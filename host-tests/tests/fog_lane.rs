@@ -18,7 +18,8 @@ fn sample(step: u64) -> FogSample {
         time: Micros(step * PERIOD_US),
         span: PERIOD_US as u32,
         lost: 0,
-        increment: [None, None, Some(Angle(TURN))],
+        // It has noise.
+        increment: [None, None, Some(Angle(TURN + (step % 2) as i64))],
         temperature: None,
     }
 }
@@ -72,6 +73,29 @@ fn a_gap_is_no_rate_and_ends_the_window() {
     let behind = sent.iter().rposition(|yaw| yaw.quality == Quality::Unusable).expect("a gap") + 1;
     assert_eq!(sent[behind].source, Source::Raw);
     assert!(lane.counters().broken > 0);
+}
+
+#[test]
+fn a_gyro_that_says_the_same_is_stuck() {
+    let mut lane = FogLane::new(FogConfig::DEFAULT, true);
+    let mut sent = run(&mut lane, 1..301, |_| true);
+    // From step 301 on it repeats what it said in step 300.
+    for step in 301..351 {
+        lane.push(Micros(step * PERIOD_US), FogSample { time: Micros(step * PERIOD_US), ..sample(300) });
+        let yaw = lane.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
+        sent.push(yaw);
+    }
+    sent.extend(run(&mut lane, 351..700, |_| true));
+    let stuck = |yaw: &YawSample| yaw.faults.0 & Faults::STUCK.0 != 0;
+    // The fifth equal turn is that of step 304; step 351 differs.
+    assert_eq!(sent.iter().position(stuck), Some(303));
+    assert_eq!(sent.iter().rposition(stuck), Some(349));
+    let during = &sent[303..350];
+    assert!(during.iter().all(|yaw| stuck(yaw) && yaw.quality == Quality::Unusable && yaw.rate.0 == 0));
+    // The window has to begin anew.
+    assert_eq!((sent[350].source, sent[350].quality), (Source::Raw, Quality::Degraded));
+    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
+    assert_eq!((lane.counters().stuck, lane.counters().gaps), (1, 47));
 }
 
 #[test]

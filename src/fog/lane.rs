@@ -10,6 +10,7 @@
 //! | an estimate is in use | less the correction | FoGNet | good | |
 //! | none yet, late, not believed, no weights, no wheels | as it is | raw | degraded | LATE, IMPLAUSIBLE, STORED, WHEELS |
 //! | increments are missing in the step | not available | raw | unusable | GAP |
+//! | five turns in a row are equal ([`STUCK_AFTER`]), until one differs | not available | raw | unusable | STUCK |
 
 use super::{FogConfig, FogCorrector, FogOutput, IncrementRate};
 use crate::align::streams::{Fitted, Streams};
@@ -17,10 +18,15 @@ use crate::health::{Faults, Quality, Source, count};
 use crate::model::fognet::FogEstimate;
 use crate::sample::{FogSample, PERIOD_US, WheelSample};
 use crate::seconds::{FogFrame, SecondsWindow};
-use crate::units::{Micros, WheelSpeed, Yaw};
+use crate::units::{Angle, Micros, WheelSpeed, Yaw};
 use crate::vehicle::YawSample;
 use crate::window::Features;
 use serde::{Deserialize, Serialize};
+
+/// Turns of 10 ms equal to the one before, after which the gyro is stuck: 50 ms. A DSP-1760's noise in
+/// 10 ms is millions of its units; a DSP-3000's a hundred, and repeats a turn once in four hundred, four
+/// times in a row once in years.
+pub const STUCK_AFTER: u8 = 4;
 
 /// How often each kind of event happened. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -30,8 +36,10 @@ pub struct FogCounters {
     pub samples: u32,
     /// Samples refused: duplicate or out of order.
     pub misplaced: u32,
-    /// Grid steps in which increments are missing.
+    /// Grid steps without a turn: increments are missing, or the gyro is stuck.
     pub gaps: u32,
+    /// Times that the gyro was stuck.
+    pub stuck: u32,
     /// Windows whose estimate came in time.
     pub windows: u32,
     /// Windows whose estimate did not.
@@ -51,6 +59,9 @@ pub struct FogLane {
     rate: IncrementRate,
     correction: IncrementRate,
     yaw: Yaw,
+    /// The newest turn, and how many before it were the same.
+    newest: Angle,
+    equal: u8,
     due: Option<u32>,
     /// An estimate is to come with the end of the second.
     awaited: bool,
@@ -70,6 +81,8 @@ impl FogLane {
             rate: IncrementRate::default(),
             correction: IncrementRate::default(),
             yaw: Yaw::default(),
+            newest: Angle::ZERO,
+            equal: 0,
             due: None,
             awaited: false,
             estimate_faults: Faults::NONE,
@@ -97,12 +110,17 @@ impl FogLane {
         let step = self.streams.next_step(now)?;
         let [.., turn] = step.fog.angle;
         let turn = turn.filter(|_| u64::from(step.fog.covered) == PERIOD_US);
+        let stuck = self.stands_still(turn);
+        let turn = turn.filter(|_| !stuck);
         let wheels = wheels.and_then(rear);
         let output = self.corrector.process(&FogFrame { turn, inertial, wheels });
         self.note(&output);
         let latency_us = u32::try_from(now.0.saturating_sub(step.time.0)).ok();
         let faults = self.estimate_faults;
-        let faults = if turn.is_none() { faults.with(Faults::GAP) } else { faults };
+        let faults = match turn {
+            Some(_) => faults,
+            None => faults.with(if stuck { Faults::STUCK } else { Faults::GAP }),
+        };
         let faults = if wheels.is_none() { faults.with(Faults::WHEELS) } else { faults };
         let faults = if self.has_network { faults } else { faults.with(Faults::STORED) };
         let Some(turn) = output.turn else {
@@ -116,6 +134,18 @@ impl FogLane {
             false => (Source::Raw, Quality::Degraded),
         };
         Some(YawSample { rate, correction, yaw: self.yaw, sigma: None, source, quality, faults, latency_us })
+    }
+
+    /// Whether the gyro says the same again and again.
+    fn stands_still(&mut self, turn: Option<Angle>) -> bool {
+        let Some(turn) = turn else {
+            self.equal = 0;
+            return false;
+        };
+        let repeated = core::mem::replace(&mut self.newest, turn) == turn;
+        self.equal = if repeated { self.equal.saturating_add(1) } else { 0 };
+        count(&mut self.counters.stuck, u32::from(self.equal == STUCK_AFTER));
+        self.equal >= STUCK_AFTER
     }
 
     /// The window that is due and its number, once.
