@@ -45,7 +45,7 @@ pub struct Drives {
 
 /// What the board keeps beside the pipeline.
 ///
-/// Owns the flash: records in `R`, weight slots in `W`, `None` where none can be read.
+/// Owns the flash: records in `R`, weight slots in `W`, `None` where nothing can be stored.
 pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
@@ -112,8 +112,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// `writable`: a controller answers; without one what is stored can be read all the same.
     pub fn begin(&mut self, records: Option<R>, slots: Option<W>, writable: bool, identity: Identity) {
         self.identity = identity;
-        self.slots = slots;
         self.writable = writable;
+        // What can only be read is read here; later neither is there to be changed.
+        self.slots = slots.filter(|_| writable);
         self.note(EventKind::Started(identity.reset));
         if let Some(crash) = identity.crash {
             self.note(EventKind::Crashed(crash));
@@ -178,7 +179,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Err(error) => self.refuse(EventKind::AcceptedRefused(error)),
         }
         self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
-        self.store = Some(store);
+        self.store = self.writable.then_some(store);
     }
 
     fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
@@ -371,11 +372,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn store(&mut self) -> Result<&mut Store<R>, StoreError> {
-        self.store.as_mut().filter(|_| self.writable).ok_or(StoreError::NoFlash)
-    }
-
-    fn slots(&mut self) -> Result<&mut W, SlotError> {
-        self.slots.as_mut().filter(|_| self.writable).ok_or(SlotError::NoFlash)
+        self.store.as_mut().ok_or(StoreError::NoFlash)
     }
 
     fn set_configuration(&mut self, found: u8, configuration: &Configuration) -> Result<(), Refusal> {
@@ -402,7 +399,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 if !matches!(self.calibration_state, State::Found(_)) {
                     return Err(Refusal::NothingFound);
                 }
-                let store = self.store.as_mut().filter(|_| self.writable).ok_or(StoreError::NoFlash)?;
+                let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
                 store.set(&self.calibration)?;
                 self.calibration_origin = Origin::Stored;
                 self.calibration_state = State::Idle;
@@ -430,13 +427,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
         let slot = self.unused_slot();
         self.uploading = None;
-        let upload = Upload::begin(self.slots()?, slot, length)?;
+        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
+        let upload = Upload::begin(flash, slot, length)?;
         self.uploading = Some(Uploading { upload, checked: None });
         Ok(())
     }
 
     fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
-        let flash = self.slots.as_mut().filter(|_| self.writable).ok_or(SlotError::NoFlash)?;
+        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
         // Every block but the last one is full, so a block that is there already ends where the
         // next one begins.
@@ -455,7 +453,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     #[inline(never)]
     fn weights_verify(&mut self) -> Result<(), Refusal> {
-        let flash = self.slots.as_ref().filter(|_| self.writable).ok_or(SlotError::NoFlash)?;
+        let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
         uploading.checked = Some(uploading.upload.verify(flash.slots())?);
         Ok(())
