@@ -97,6 +97,7 @@ pub mod nn;
 pub mod odometry;
 pub mod pipeline;
 pub mod sample;
+mod seal;
 pub mod seconds;
 pub mod sensor;
 pub mod service;

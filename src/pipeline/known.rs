@@ -5,8 +5,8 @@ use crate::bias::{QuietDetector, Rest, StaticError, ZeroPoint, ZeroRate};
 use crate::health::{Faults, Status, count};
 use crate::mounting::Rotation;
 use crate::sample::{Frame, ImuSample, Standstill};
+use crate::seal::seal;
 use crate::units::{AngularRate, Yaw};
-use core::hash::{Hash, Hasher};
 
 /// What is known once static initialisation has succeeded.
 #[derive(Debug, Clone)]
@@ -25,8 +25,8 @@ impl Pipeline {
     /// its memory has changed.
     pub(super) fn turned(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
         let known = self.known.as_ref()?;
-        let mounting = seal(SEAL, &self.config.mounting);
-        if known.seal != seal(mounting, &(known.levelling, known.zero)) {
+        let mounting = seal(&self.config.mounting);
+        if known.seal != seal(&(mounting, known.levelling, known.zero)) {
             self.forget();
             return None;
         }
@@ -69,36 +69,12 @@ impl Pipeline {
             levelling,
             zero,
             // Not of the mounting as it is by now.
-            seal: seal(self.mounting_seal, &(levelling, zero)),
+            seal: seal(&(self.mounting_seal, levelling, zero)),
             quiet: QuietDetector::new(quiet, &static_init, rest),
             zero_rate: zero_rate.map(ZeroRate::new),
         });
         Ok(())
     }
-}
-
-/// FNV-1a (Fowler, Noll, Vo), 32 bits: one changed byte always changes it.
-struct Fnv(u32);
-
-impl Hasher for Fnv {
-    fn write(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u32::from(*byte)).wrapping_mul(0x0100_0193);
-        }
-    }
-
-    fn finish(&self) -> u64 {
-        self.0.into()
-    }
-}
-
-/// What a seal begins with.
-pub(super) const SEAL: u32 = 0x811C_9DC5;
-
-pub(super) fn seal(begun: u32, value: &impl Hash) -> u32 {
-    let mut fnv = Fnv(begun);
-    value.hash(&mut fnv);
-    fnv.0
 }
 
 /// The gyro as it is.

@@ -15,7 +15,7 @@ mod told;
 pub use config::PipelineConfig;
 pub use output::{DueWindow, Output, Owed, YawRate};
 
-use known::{Known, SEAL, raw, seal};
+use known::{Known, raw};
 
 use crate::align::{AlignError, Aligner};
 use crate::bias::{Proof, Second, StaticInit, ZeroPoint, ZeroRate};
@@ -24,6 +24,7 @@ use crate::health::{Counters, Faults, Status, count};
 use crate::model::Estimate;
 use crate::mounting::Rotation;
 use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
+use crate::seal::seal;
 use crate::uncertainty::Uncertainty;
 use crate::units::{AngularRate, Yaw};
 use crate::window::{self, Features, WINDOW, Window};
@@ -66,7 +67,7 @@ impl Pipeline {
     pub fn new(config: PipelineConfig) -> Self {
         Self {
             config,
-            mounting_seal: seal(SEAL, &config.mounting),
+            mounting_seal: seal(&config.mounting),
             aligner: Aligner::default(),
             static_init: StaticInit::new(config.static_init),
             known: None,
