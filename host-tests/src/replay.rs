@@ -69,7 +69,6 @@ pub struct Board {
     guard: Guard,
     feeds: Feeds,
     wheels: WheelReceiver,
-    wheels_heard: bool,
     wheels_known: Option<WheelSample>,
     dsp1760: Dsp1760,
     lane: FogLane,
@@ -119,7 +118,6 @@ impl Board {
             guard: Guard::new(configuration.pipeline(&Calibration::NONE)),
             feeds: Feeds::new(config),
             wheels: WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"),
-            wheels_heard: false,
             wheels_known: None,
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
             lane: FogLane::new(FogConfig::DEFAULT, true),
@@ -182,9 +180,8 @@ impl Board {
                 let Ok(sample) = sample else { continue };
                 self.follow();
                 self.sample_time = sample.time;
-                if self.wheels_heard {
-                    let known = self.wheels.poll(sample.time);
-                    self.wheels_known = Some(known);
+                self.wheels_known = self.wheels.poll(sample.time);
+                if let Some(known) = self.wheels_known {
                     self.guard.wheels(known);
                 }
                 let Ok(output) = self.guard.process(sample, Micros(0)) else { continue };
@@ -200,7 +197,8 @@ impl Board {
 
     /// A wheel frame comes.
     pub fn wheel(&mut self, frame: &DataFrame) {
-        self.wheels_heard |= matches!(self.wheels.process(frame, self.sample_time), Some(Ok(_)));
+        // What is wrong with one, the wheels' silence tells.
+        let _ = self.wheels.process(frame, self.sample_time);
     }
 
     /// The fibre-optic gyro sends.

@@ -98,12 +98,12 @@ fn standing_still_is_asserted_late_and_dropped_at_once() {
 #[test]
 fn silence_is_neither_standing_nor_moving() {
     let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
-    assert_eq!(receiver.poll(Micros(0)).standstill, Standstill::Unknown);
+    assert_eq!(receiver.poll(Micros(0)), None, "nothing has come");
     for k in 0..=20 {
         let _ = receiver.process(&at_kmh(0.0), Micros(k * 20 * MS));
     }
-    assert_eq!(receiver.poll(Micros(450 * MS)).standstill, Standstill::Still);
-    let silent = receiver.poll(Micros(451 * MS));
+    assert_eq!(receiver.poll(Micros(450 * MS)).expect("frames have come").standstill, Standstill::Still);
+    let silent = receiver.poll(Micros(451 * MS)).expect("frames have come");
     assert_eq!((silent.standstill, silent.speeds), (Standstill::Unknown, [None; 4]));
     // After the gap the time of standing starts anew.
     let sample = receiver.process(&at_kmh(0.0), Micros(800 * MS)).expect("a wheel frame").expect("valid");
@@ -112,7 +112,7 @@ fn silence_is_neither_standing_nor_moving() {
     let sample = receiver.process(&at_kmh(0.0), Micros(9_000 * MS)).expect("a wheel frame").expect("valid");
     assert_eq!(sample.standstill, Standstill::Unknown);
     // A clock that goes backwards does no harm.
-    assert_eq!(receiver.poll(Micros(0)).standstill, Standstill::Unknown);
+    assert_eq!(receiver.poll(Micros(0)).expect("frames have come").standstill, Standstill::Unknown);
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn one_wheel_that_is_not_valid_ends_standing() {
     let marked = frame(ID, &[0xFF, 0xFF, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
     let refused = receiver.process(&marked, Micros(420 * MS)).expect("a wheel frame");
     assert_eq!(refused, Err(WheelError::Invalid { wheel: 1 }));
-    let sample = receiver.poll(Micros(420 * MS));
+    let sample = receiver.poll(Micros(420 * MS)).expect("frames have come");
     assert_eq!(sample.standstill, Standstill::Unknown);
     assert_eq!(sample.speeds.map(|speed| speed.is_some()), [true, false, true, true]);
 }
@@ -141,9 +141,16 @@ fn wheels_may_be_spread_over_frames() {
     for k in 0..20 {
         let _ = receiver.process(&frame(id(0x100), still.data()), Micros(k * 20 * MS));
     }
-    assert_eq!(receiver.poll(Micros(400 * MS)).standstill, Standstill::Unknown, "the rear is silent");
+    assert_eq!(
+        receiver.poll(Micros(400 * MS)).expect("frames have come").standstill,
+        Standstill::Unknown,
+        "the rear is silent"
+    );
     let _ = receiver.process(&frame(id(0x101), still.data()), Micros(400 * MS));
-    assert_eq!(receiver.poll(Micros(401 * MS)).speeds.map(|speed| speed.is_some()), [true; 4]);
+    assert_eq!(
+        receiver.poll(Micros(401 * MS)).expect("frames have come").speeds.map(|speed| speed.is_some()),
+        [true; 4]
+    );
 }
 
 #[test]

@@ -19,6 +19,8 @@ pub struct WheelReceiver {
     settings: WheelSettings,
     sequences: [Sequence; MAX_FRAMES],
     wheels: Wheels,
+    /// A good frame has come.
+    heard: bool,
     lost: u32,
 }
 
@@ -36,7 +38,7 @@ impl WheelReceiver {
             // Loss is counted, not refused: the speed itself is good.
             Sequence::new(counters, u8::MAX)
         });
-        Ok(Self { settings, sequences, wheels, lost: 0 })
+        Ok(Self { settings, sequences, wheels, heard: false, lost: 0 })
     }
 
     /// Takes a frame that was received now; `None` when it is not a wheel frame.
@@ -52,13 +54,15 @@ impl WheelReceiver {
         self.wheels.expire(now);
         let result = self.take(index, &layout, frame.data(), now);
         self.wheels.judge(now);
+        self.heard |= result.is_ok();
         Some(result.map(|()| self.wheels.sample(now)))
     }
 
-    /// What is known now, without a new frame.
-    pub fn poll(&mut self, now: Micros) -> WheelSample {
+    /// What is known now, without a new frame. `None` before the first good one: a vehicle that sends
+    /// none is not at fault.
+    pub fn poll(&mut self, now: Micros) -> Option<WheelSample> {
         self.wheels.expire(now);
-        self.wheels.sample(now)
+        self.heard.then(|| self.wheels.sample(now))
     }
 
     /// Frames that counters showed to be missing.

@@ -54,7 +54,6 @@ pub struct Board {
     feeds: Feeds,
     port: Port<QUEUE>,
     wheels: WheelReceiver,
-    wheels_heard: bool,
     /// What parsers refused.
     refused: u32,
     /// Row that the board is told of.
@@ -71,7 +70,6 @@ impl Board {
             feeds: Feeds::new(Config::DEFAULT),
             port: Port::new(Config::DEFAULT.settings().bits_per_second),
             wheels: WheelReceiver::new(WheelSettings::TOYOTA).expect("settings that come with the library"),
-            wheels_heard: false,
             refused: 0,
             row: 0,
         }
@@ -115,11 +113,8 @@ impl Board {
             Line::Wheels => {
                 for byte in &message.bytes {
                     let Some(frame) = self.port.receive(*byte) else { continue };
-                    match self.wheels.process(&frame, now) {
-                        Some(Ok(_)) => self.wheels_heard = true,
-                        Some(Err(_)) => self.refused += 1,
-                        None => {}
-                    }
+                    let taken = self.wheels.process(&frame, now);
+                    self.refused += u32::from(matches!(taken, Some(Err(_))));
                 }
             }
             Line::Out => {}
@@ -193,8 +188,8 @@ impl Board {
         network: &mut impl WindowNetwork,
         out: &mut Vec<Message>,
     ) {
-        if self.wheels_heard {
-            self.guard.wheels(self.wheels.poll(now));
+        if let Some(known) = self.wheels.poll(now) {
+            self.guard.wheels(known);
         }
         // What has no place in time is counted and gives no frame.
         let Ok(output) = self.guard.process(sample, now) else { return };
