@@ -7,7 +7,7 @@ use super::yaw::Quality;
 use super::yaw_feed::YawFeed;
 use crate::health::count;
 use crate::vehicle::VehicleSample;
-use embedded_can::{Frame, StandardId};
+use embedded_can::Frame;
 use heapless::Vec;
 
 /// Every configured message of a sample, each with what rounding owes its receiver.
@@ -64,11 +64,9 @@ impl Feeds {
                 send(message.frame(layout));
             }
         }
-        if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw)
-            && let Some(messages) = feed.process(&sample.yaw)
-        {
-            for (message, id) in messages.iter().zip(yaw.ids) {
-                send(StandardId::new(id).and_then(|id| F::new(id, message)));
+        if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw) {
+            for frame in feed.frames(&sample.yaw, yaw.ids) {
+                send(Some(frame));
             }
         }
         if let Some(vdc2) = settings.vdc2 {

@@ -3,7 +3,7 @@
 use super::e2e::{DataIdMode, P01, Profile};
 use super::yaw_feed::YawFeed;
 use crate::vehicle::YawSample;
-use embedded_can::{Frame, StandardId};
+use embedded_can::Frame;
 use heapless::Vec;
 
 /// Rate, angle and detail for each sample, under E2E profile 1: each message's identifier is its
@@ -25,11 +25,10 @@ impl FogFeed {
     /// The frames of one sample, in a driver's own type.
     #[inline(never)]
     pub fn process<F: Frame>(&mut self, sample: &YawSample) -> Vec<F, 3> {
-        let messages = self.feed.process(sample);
         let mut frames = Vec::new();
-        for (message, id) in messages.iter().flatten().zip(self.ids) {
+        for frame in self.feed.frames(sample, self.ids) {
             // There is room for three.
-            let _ = StandardId::new(id).and_then(|id| F::new(id, message)).map(|frame| frames.push(frame));
+            let _ = frames.push(frame);
         }
         frames
     }

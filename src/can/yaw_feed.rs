@@ -8,6 +8,7 @@ use super::yaw::{
 };
 use crate::units::AngularRate;
 use crate::vehicle::YawSample;
+use embedded_can::{Frame, StandardId};
 
 /// Turns samples into messages, one set for every `every` samples.
 ///
@@ -37,6 +38,13 @@ impl YawFeed {
             correction: Mean::new(Scale::FIFTH_MILLI_DEG_PER_SEC),
             faults: Faults::NONE,
         }
+    }
+
+    /// [`YawFeed::process`] as frames of a driver's own type, under identifiers (11 bits) of rate, angle
+    /// and detail.
+    pub fn frames<F: Frame>(&mut self, sample: &YawSample, ids: [u16; 3]) -> impl Iterator<Item = F> {
+        let messages = self.process(sample).into_iter().flatten();
+        messages.zip(ids).filter_map(|(message, id)| F::new(StandardId::new(id)?, &message))
     }
 
     /// Takes a sample; gives rate, angle and detail message when they are due.
