@@ -61,7 +61,7 @@ impl Memory {
 
     /// The weights in use, whatever has become of them: what was read from the header at the start
     /// is not read again.
-    fn in_use<'m>(&'m self, loaded: &Blob<'_>) -> Option<Blob<'m>> {
+    fn in_use<'m>(&'m self, loaded: &Blob<'m>) -> Option<Blob<'m>> {
         let mut at = first_weight(self.file()) / 4;
         let mut take = |words: usize| {
             at += words;
@@ -81,19 +81,7 @@ impl Memory {
         let (gyro_error, log_scale) = (dense()?, dense()?);
         let &[scale_unit] = take(1)? else { return None };
         let content = self.file().get(..self.bytes - 4)?;
-        let Blob { normalisation, input_clamp, crc, .. } = *loaded;
-        let provenance = "";
-        Some(Blob {
-            provenance,
-            normalisation,
-            input_clamp,
-            layers,
-            gyro_error,
-            log_scale,
-            scale_unit,
-            crc,
-            content,
-        })
+        Some(Blob { layers, gyro_error, log_scale, scale_unit, content, ..*loaded })
     }
 }
 
