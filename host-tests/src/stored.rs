@@ -2,6 +2,7 @@
 //! the F405's flash, and laid into the emulator's memory, which is mapped though it has no controller.
 
 use crate::flash::{F405, Region};
+use crate::qemu;
 use gyronet::model::blob::CRC;
 use gyronet::model::weights;
 use gyronet::store::layout::{self, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE};
@@ -89,19 +90,20 @@ impl Stored {
         self
     }
 
-    /// QEMU's arguments that lay it into the board's memory; its files go to `folder`.
+    /// Starts an emulated board with it in its memory; the files for that go to `folder`.
     ///
     /// # Panics
-    /// When they cannot be written.
+    /// When they cannot be written, and as [`qemu::Board`].
     #[must_use]
-    pub fn arguments(&self, folder: &Path, test: &str) -> Vec<String> {
+    pub fn boot(&self, image: &Path, usarts: usize, folder: &str, test: &str) -> qemu::Board {
         let flash = self.0.borrow();
         let lay = |Range { start, end }: Range<u32>| {
-            let file = folder.join(format!("{test}_{start:x}.bin"));
+            let file = Path::new(folder).join(format!("{test}_{start:x}.bin"));
             std::fs::write(&file, &flash.bytes()[start as usize..end as usize]).expect("a file for QEMU");
             let address = FLASH_BASE + start;
-            ["-device".into(), format!("loader,file={},addr={address:#x},force-raw=on", file.display())]
+            format!("loader,file={},addr={address:#x},force-raw=on", file.display())
         };
-        [layout::STORE, layout::SLOTS].into_iter().flat_map(lay).collect()
+        let [records, slots] = [layout::STORE, layout::SLOTS].map(lay);
+        qemu::Board::boot(image, usarts, &["-device", &records, "-device", &slots])
     }
 }

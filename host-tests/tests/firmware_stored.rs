@@ -20,7 +20,6 @@ use gyronet_host_tests::stored::{Stored, other_weights};
 use gyronet_host_tests::{image, qemu, replay};
 use gyronet_tools::device::line::Line;
 use gyronet_tools::device::{Device, DeviceError};
-use std::path::Path;
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(120);
@@ -60,9 +59,7 @@ impl Told {
     fn by(test: &str, stored: &Stored, host: impl Fn() -> replay::Board) -> Option<Self> {
         let scratch = env!("CARGO_TARGET_TMPDIR");
         let elf = image::coprocessor(test, scratch)?;
-        let arguments = stored.arguments(Path::new(scratch), test);
-        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        let mut board = qemu::Board::boot(&elf, SERVICE, &arguments);
+        let mut board = stored.boot(&elf, SERVICE, scratch, test);
         let bytes = drive();
         let mut alone = host();
         alone.push(&bytes);
@@ -160,9 +157,7 @@ fn fibre_optic_gyro_under_other_identifiers() {
     let scratch = env!("CARGO_TARGET_TMPDIR");
     let Some(elf) = image::coprocessor(NAME, scratch) else { return };
     let configuration = Configuration { fog_ids: [OTHER, OTHER + 1, OTHER + 2], ..Configuration::DEFAULT };
-    let arguments = Stored::default().record(&configuration).arguments(Path::new(scratch), NAME);
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let mut board = qemu::Board::boot(&elf, connected::USARTS, &arguments);
+    let mut board = Stored::default().record(&configuration).boot(&elf, connected::USARTS, scratch, NAME);
     let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
     let steps: Vec<Step> = rows.iter().take(50).enumerate().map(|(k, row)| Step::of(k, row)).collect();
     let outcome = connected::run(&mut board, &configuration, &steps);
@@ -211,9 +206,7 @@ fn part_on_spi_does_not_answer() {
     let scratch = env!("CARGO_TARGET_TMPDIR");
     let Some(elf) = image::coprocessor(NAME, scratch) else { return };
     let configuration = Configuration { imu: ImuPart::Icm42688, ..Configuration::DEFAULT };
-    let arguments = Stored::default().record(&configuration).arguments(Path::new(scratch), NAME);
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let mut board = qemu::Board::boot(&elf, SERVICE, &arguments);
+    let mut board = Stored::default().record(&configuration).boot(&elf, SERVICE, scratch, NAME);
     // Nothing of an MTi is listened to.
     board.send(IMU, &drive()[..4_000], LIMIT);
     let _ = board.lines(SLCAN, b'\r', SETS * 6, LIMIT);
