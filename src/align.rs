@@ -18,6 +18,7 @@ pub mod resample;
 pub mod streams;
 
 use crate::sample::{Frame, ImuSample, PERIOD_US};
+use crate::seal::seal;
 use crate::units::Micros;
 
 /// How far from its grid step a sample may be, microseconds.
@@ -30,7 +31,7 @@ pub const MAX_GAP: u32 = 100;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum AlignError {
-    /// Time stamp equal to the last one.
+    /// The last sample once more.
     Duplicate {
         /// The time stamp, microseconds.
         at: Micros,
@@ -61,7 +62,7 @@ pub enum AlignError {
 impl core::fmt::Display for AlignError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Duplicate { at } => write!(f, "two samples carry the time stamp {} us", at.0),
+            Self::Duplicate { at } => write!(f, "the sample of {} us has come twice", at.0),
             Self::Backwards { last, at } => {
                 write!(f, "time goes backwards, from {} to {} us", last.0, at.0)
             }
@@ -80,10 +81,19 @@ impl core::fmt::Display for AlignError {
 
 impl core::error::Error for AlignError {}
 
+/// The last sample that has a place on the grid, or that the grid was laid anew from.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    time: Micros,
+    tick: u32,
+    /// Of the whole sample: that of a clock which was set back may carry the same time.
+    seal: u32,
+}
+
 /// Puts samples on the 100 Hz grid by their own time stamps; holds where the grid stands.
 #[derive(Debug, Clone, Default)]
 pub struct Aligner {
-    last: Option<(Micros, u32)>,
+    last: Option<Placed>,
 }
 
 impl Aligner {
@@ -93,32 +103,34 @@ impl Aligner {
     /// [`AlignError`]; the sample is not used. After [`AlignError::Jump`] the grid continues
     /// from that sample's time stamp, at the following tick.
     pub fn process(&mut self, sample: ImuSample) -> Result<Frame, AlignError> {
-        let Some((last, tick)) = self.last else {
-            self.last = Some((sample.time, 0));
+        let (at, seal) = (sample.time, seal(&sample));
+        let Some(placed) = &mut self.last else {
+            self.last = Some(Placed { time: at, tick: 0, seal });
             return Ok(Frame { tick: 0, missing: 0, sample });
         };
-        let at = sample.time;
-        if at == last {
-            return Err(AlignError::Duplicate { at });
-        }
+        let last = placed.time;
+        let elapsed = at.0.abs_diff(last.0);
         if at < last {
-            if last.0 - at.0 > u64::from(MAX_GAP) * PERIOD_US {
-                self.last = Some((at, tick));
+            if elapsed > u64::from(MAX_GAP) * PERIOD_US {
+                (placed.time, placed.seal) = (at, seal);
                 return Err(AlignError::Jump { last, at });
             }
             return Err(AlignError::Backwards { last, at });
         }
-        let elapsed = at.0 - last.0;
         if elapsed >= (u64::from(MAX_GAP) + 1) * PERIOD_US + PERIOD_US / 2 {
-            self.last = Some((at, tick));
+            (placed.time, placed.seal) = (at, seal);
             return Err(AlignError::Jump { last, at });
         }
         let steps = (elapsed + PERIOD_US / 2) / PERIOD_US;
         if steps == 0 || elapsed.abs_diff(steps * PERIOD_US) > TOLERANCE_US {
-            return Err(AlignError::OffGrid { last, at });
+            return Err(if elapsed == 0 && seal == placed.seal {
+                AlignError::Duplicate { at }
+            } else {
+                AlignError::OffGrid { last, at }
+            });
         }
-        let tick = tick.wrapping_add(steps as u32);
-        self.last = Some((at, tick));
+        let tick = placed.tick.wrapping_add(steps as u32);
+        *placed = Placed { time: at, tick, seal };
         Ok(Frame { tick, missing: steps as u32 - 1, sample })
     }
 }

@@ -8,7 +8,7 @@ pub const RATE_HZ: u32 = 100;
 pub const PERIOD_US: u64 = 1_000_000 / RATE_HZ as u64;
 
 /// One reading of an inertial measurement unit: x forward, y left, z up (FLU).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImuSample {
     /// When the part took it, by the part's own clock, unwrapped.

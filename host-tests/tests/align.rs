@@ -86,14 +86,19 @@ fn gaps_are_counted_up_to_a_second() {
 #[test]
 fn duplicates_and_steps_back_leave_the_grid() {
     let mut aligner = begun(2_000_000);
+    let mut other = turning(0, AngularRate(8));
+    other.time = Micros(2_000_000);
     let (last, at) = (Micros(2_000_000), Micros(1_990_000));
+    assert_eq!(place(&mut aligner, 2_000_000), Err(AlignError::Duplicate { at: last }));
+    // A clock that was set back by 10 ms.
+    assert_eq!(aligner.process(other), Err(AlignError::OffGrid { last, at: last }));
     assert_eq!(place(&mut aligner, 2_000_000), Err(AlignError::Duplicate { at: last }));
     assert_eq!(place(&mut aligner, 1_990_000), Err(AlignError::Backwards { last, at }));
     assert_eq!(place(&mut aligner, 1_000_000), Err(AlignError::Backwards { last, at: Micros(1_000_000) }));
     assert_eq!(place(&mut aligner, 2_004_000), Err(AlignError::OffGrid { last, at: Micros(2_004_000) }));
     assert_eq!(place(&mut aligner, 2_010_000), Ok((1, 0)));
     let text = |error: AlignError| error.to_string();
-    assert_eq!(text(AlignError::Duplicate { at }), "two samples carry the time stamp 1990000 us");
+    assert_eq!(text(AlignError::Duplicate { at }), "the sample of 1990000 us has come twice");
     assert_eq!(text(AlignError::Backwards { last, at }), "time goes backwards, from 2000000 to 1990000 us");
 }
 

@@ -4,6 +4,7 @@
 use gyronet::compensate::{CompensateConfig, DELAY};
 use gyronet::health::Status::{Clipped, Degraded, Init, Ready};
 use gyronet::health::{Faults, Quality, judge};
+use gyronet::pipeline::Output;
 use gyronet::sample::ImuSample;
 use gyronet::units::AngularRate;
 use gyronet::vehicle::VehicleSample;
@@ -121,13 +122,16 @@ fn a_vehicle_that_moves_is_refused_and_tried_again() {
 }
 
 #[test]
-fn misplaced_samples_change_nothing() {
-    let clean = run(&mut new(), drive(0..600), constant(0.004));
+fn misplaced_samples_are_a_gap_and_change_no_rate() {
+    let clean = run(&mut new(), drive(0..600), constant(0.0));
     let (mut pipeline, mut noise) = (new(), Noise::new(6));
-    let mut outputs = Vec::new();
-    for sample in drive(0..600) {
-        outputs.extend(run(&mut pipeline, [sample], constant(0.004)));
-        for _ in 0..noise.int(0, 2) {
+    for (sample, clean) in drive(0..600).zip(&clean) {
+        let outputs = run(&mut pipeline, [sample], constant(0.0));
+        let told = outputs[0].vehicle.yaw.faults == Faults::GAP;
+        assert_eq!(told, clean.prompt.tick > KNOWN as u32);
+        let prompt = |output: &Output| (output.prompt.tick, output.prompt.rate, output.prompt.yaw);
+        assert_eq!(prompt(&outputs[0]), prompt(clean));
+        for _ in 0..if u64::from(clean.prompt.tick) < KNOWN { 0 } else { noise.int(1, 2) } {
             let mut misplaced = turning(0, rate(3.0));
             misplaced.time.0 =
                 sample.time.0.saturating_sub(noise.int(0, 900_000) as u64) + noise.int(0, 1) as u64 * 5_000;
@@ -135,8 +139,53 @@ fn misplaced_samples_change_nothing() {
             assert!(pipeline.process(misplaced).is_err());
         }
     }
-    assert_eq!(outputs, clean);
     assert!(pipeline.counters().misplaced > 400);
+}
+
+#[test]
+fn the_same_sample_once_more_changes_nothing() {
+    let clean = run(&mut new(), drive(0..600), constant(0.004));
+    let mut pipeline = new();
+    let mut twice = |sample| {
+        let outputs = run(&mut pipeline, [sample], constant(0.004));
+        assert!(pipeline.process(sample).is_err());
+        outputs
+    };
+    let outputs: Vec<Output> = drive(0..600).flat_map(&mut twice).collect();
+    assert_eq!(outputs, clean);
+    assert_eq!(pipeline.counters().misplaced, 600);
+}
+
+#[test]
+fn a_misplaced_sample_starts_static_initialisation_anew() {
+    let standing = |ticks: core::ops::Range<u64>| ticks.map(|tick| turning(tick, rate(0.001)));
+    let mut pipeline = new();
+    run(&mut pipeline, standing(0..200), constant(0.0));
+    assert!(pipeline.process(turning(198, rate(3.0))).is_err());
+    let outputs = run(&mut pipeline, standing(200..600), constant(0.0));
+    assert_eq!(statuses(&outputs)[0], (Init, KNOWN as usize));
+}
+
+/// Time that no sample stands for is told, wherever between two grid steps the clock lands. What is
+/// within the jitter of a stamp is not time that is missing.
+#[test]
+fn a_clock_that_jumps_by_a_few_milliseconds_is_a_gap() {
+    for jump_us in (-45_000_i64..=45_000).step_by(100) {
+        let mut pipeline = new();
+        run(&mut pipeline, drive(0..400), constant(0.0));
+        let stamped = drive(400..700).enumerate().map(|(k, mut sample)| {
+            // No two readings of a part are the same.
+            sample.specific_force[0].0 += 1 + k as i32;
+            sample.time.0 = sample.time.0.strict_add_signed(jump_us);
+            sample
+        });
+        let told: Vec<Output> = stamped.filter_map(|sample| pipeline.process(sample).ok()).collect();
+        let counters = pipeline.counters();
+        let counted = counters.missing + counters.misplaced + counters.clock_jumps;
+        let within = jump_us.abs() <= 2_000;
+        assert_eq!(counted > 0, !within, "{jump_us} us");
+        assert_eq!(told[0].vehicle.yaw.faults == Faults::GAP, !within, "{jump_us} us");
+    }
 }
 
 #[test]
@@ -162,7 +211,7 @@ fn the_navigation_rate_is_late_and_leaves_none_out() {
     // A gap delays what came before it, it swallows none.
     let expected: Vec<u32> = (KNOWN as u32..400).chain(403..500 - lag as u32).collect();
     assert_eq!(sent.iter().map(|output| output.navigation.tick).collect::<Vec<_>>(), expected);
-    let late = |output: &gyronet::pipeline::Output| output.vehicle.yaw.latency_us;
+    let late = |output: &Output| output.vehicle.yaw.latency_us;
     let across_the_gap = sent.iter().filter(|output| late(output) != Some(10_000 * lag as u32));
     assert_eq!(across_the_gap.map(late).collect::<Vec<_>>(), vec![Some(10_000 * (lag as u32 + 3)); lag]);
     // The first four after start and gap go out before a window has covered them, and the gap

@@ -92,7 +92,8 @@ impl Pipeline {
     /// Takes one sample of the inertial sensor.
     ///
     /// # Errors
-    /// [`AlignError`] when its time stamp has no place; it is counted and not used.
+    /// [`AlignError`] when its time stamp has no place; it is counted and not used. Unless
+    /// it was a duplicate, the samples after it say [`Faults::GAP`] for as long as after a missing one.
     pub fn process(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
         let mut frame = self.aligner.process(sample).inspect_err(|error| self.refuse(*error))?;
         frame.sample = self.config.mounting.sample(&sample);
@@ -190,10 +191,13 @@ impl Pipeline {
     fn refuse(&mut self, error: AlignError) {
         if let AlignError::Jump { .. } = error {
             count(&mut self.counters.clock_jumps, 1);
-            self.gap();
             self.static_init.restart();
         } else {
             count(&mut self.counters.misplaced, 1);
+        }
+        // Whatever was wrong with its stamp, it may be of time that no other sample is of.
+        if !matches!(error, AlignError::Duplicate { .. }) {
+            self.gap();
         }
     }
 
