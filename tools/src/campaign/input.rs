@@ -6,6 +6,7 @@ use super::wire::Message;
 use crate::via::dsp1760::BOTH;
 use crate::via::icm42688::{Bus, NoDelay, WRAP_US};
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use gyronet::align::resample::Quality::{Exact, Interpolated};
 use gyronet::align::streams::Streams;
 use gyronet::sample::ImuSample;
 use gyronet::sensor::adis16465::{Adis16465, BURST};
@@ -99,13 +100,13 @@ impl Input {
         let (_, _, streams) = &mut **parts;
         let steps = std::iter::from_fn(|| streams.next_step(now));
         let samples = steps.map(|step| {
-            // A rate is that of the fibre-optic gyro or none; and what came too late for its step,
-            // or on the other side of a clock's jump, is missing in it.
+            // A rate is that of the fibre-optic gyro or none, and an acceleration was taken about then;
+            // what came too late for its step, or on the other side of a clock's jump, is missing in it.
             let events = step.events;
             let whole = events.increments.late + events.fog.jumps + events.imu.jumps == 0;
             let [x, y, z] = [0, 1, 2].map(|axis| step.fog.rate(axis));
             match (step.imu, x, y, z) {
-                (Some((sample, _)), Some(x), Some(y), Some(z)) if whole => {
+                (Some((sample, Exact | Interpolated)), Some(x), Some(y), Some(z)) if whole => {
                     Delivered::Sample(ImuSample { time: step.time, angular_rate: [x, y, z], ..sample })
                 }
                 _ => Delivered::Error,
