@@ -3,34 +3,24 @@
 //! Some functions are kept out of their callers: what they have on the stack, requests, replies and
 //! records, is then there only while they run.
 
+mod stored;
+mod weights;
+
+pub use weights::MappedSlots;
+
 use super::calibrate::{Calibrator, State, Task};
 use super::event::{EventKind, EventLog, SensorFault};
 use super::frame::{Deframer, Frame, FrameError, emit};
 use super::message::{
-    AllCounters, BLOCK, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal,
-    Reply, Request,
+    AllCounters, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal, Reply,
+    Request,
 };
 use crate::health::{Status, count};
-use crate::model::Blob;
 use crate::sample::ImuSample;
-use crate::store::slots::{Selection, SlotError, Upload, WeightSource, select};
-use crate::store::{
-    Accepted, Calibration, Configuration, FieldError, FogPart, ImuPart, Record, Slot, Store, StoreError,
-};
+use crate::store::slots::{SlotError, WeightSource};
+use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Store};
 use embedded_storage::nor_flash::NorFlash;
-
-/// The flash of the weight slots, which the processor can also read in place.
-pub trait MappedSlots: NorFlash {
-    /// Both slots, each on a word boundary.
-    fn slots(&self) -> [&[u8]; 2];
-}
-
-/// An upload, and its file's checksum once checked.
-#[derive(Debug, Clone, Copy)]
-struct Uploading {
-    upload: Upload,
-    checked: Option<u32>,
-}
+use weights::Uploading;
 
 /// What an image drives; a configuration of anything else is refused.
 #[derive(Debug)]
@@ -106,119 +96,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             service_errors: 0,
             restart: false,
         }
-    }
-
-    /// Reads what is stored; what is not whole or not in its range is not used and noted.
-    /// `writable`: a controller answers; without one what is stored can be read all the same.
-    pub fn begin(&mut self, records: Option<R>, slots: Option<W>, writable: bool, identity: Identity) {
-        self.identity = identity;
-        self.writable = writable;
-        // What can only be read is read here; later neither is there to be changed.
-        self.slots = slots.filter(|_| writable);
-        self.note(EventKind::Started(identity.reset));
-        if let Some(crash) = identity.crash {
-            self.note(EventKind::Crashed(crash));
-        }
-        if let Some(records) = records {
-            match Store::open(records, 0) {
-                Ok(store) => self.load(store),
-                Err(error) => self.flash = FlashState::Failed(error),
-            }
-        }
-        if self.records_damaged() {
-            self.note(EventKind::RecordsDamaged);
-        }
-    }
-
-    fn records_damaged(&self) -> bool {
-        matches!(self.flash, FlashState::Damaged | FlashState::Failed(_))
-    }
-
-    /// Whether anything that is stored is damaged or refused: [`crate::health::Faults::STORED`].
-    #[must_use]
-    pub fn stored_damaged(&self) -> bool {
-        self.refused || self.records_damaged()
-    }
-
-    /// Whether a configuration was stored and none is used: what the sensor's axes are is not known.
-    #[must_use]
-    pub fn configuration_lost(&self) -> bool {
-        match self.configuration_origin {
-            Origin::BuiltIn => self.records_damaged(),
-            Origin::Stored => false,
-            Origin::Refused(_) => true,
-        }
-    }
-
-    fn load(&mut self, mut store: Store<R>) {
-        let found = store.get::<Configuration>();
-        match found.and_then(|found| found.map(|found| self.drivable(&found).map(|()| found)).transpose()) {
-            Ok(Some(configuration)) => {
-                self.configuration = configuration;
-                self.configuration_origin = Origin::Stored;
-            }
-            Ok(None) => {}
-            Err(error) => {
-                self.configuration_origin = Origin::Refused(error);
-                self.refuse(EventKind::ConfigurationRefused(error));
-            }
-        }
-        match store.get() {
-            Ok(Some(calibration)) => {
-                self.calibration = calibration;
-                self.calibration_origin = Origin::Stored;
-            }
-            Ok(None) => {}
-            Err(error) => {
-                self.calibration_origin = Origin::Refused(error);
-                self.refuse(EventKind::CalibrationRefused(error));
-            }
-        }
-        match store.get() {
-            Ok(accepted) => self.accepted = accepted.unwrap_or(Accepted::NONE),
-            Err(error) => self.refuse(EventKind::AcceptedRefused(error)),
-        }
-        self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
-        self.store = self.writable.then_some(store);
-    }
-
-    fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let Drives { imus, fogs, bits_per_second } = self.drives;
-        if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
-            return Err(StoreError::Field(FieldError::PartNotInImage));
-        }
-        let rate = configuration.can.bits_per_second;
-        if bits_per_second.contains(&rate) {
-            Ok(())
-        } else {
-            Err(StoreError::Field(FieldError::BitRateNotInImage(rate)))
-        }
-    }
-
-    /// The weights to run on: `slots` as the processor reads them, the image's own last.
-    pub fn weights<'w>(&mut self, slots: Option<[&'w [u8]; 2]>, built_in: &'w [u8]) -> Option<Blob<'w>> {
-        let Selection { weights, source, refused } =
-            select(&self.accepted, slots.unwrap_or_default(), built_in);
-        self.weights = source;
-        self.weights_crc = weights.map(|blob| blob.crc);
-        self.refused_slots = refused;
-        for (slot, error) in Slot::ALL.into_iter().zip(refused) {
-            if let Some(error) = error {
-                self.refuse(EventKind::SlotRefused(slot, error));
-            }
-        }
-        if source == WeightSource::None {
-            self.refuse(EventKind::NoWeights);
-        }
-        weights
-    }
-
-    /// The weights in use no longer fit their checksum; they are used no more until the next
-    /// start, which checks all files anew.
-    pub fn weights_damaged(&mut self) {
-        self.weights = WeightSource::None;
-        self.weights_crc = None;
-        self.note(EventKind::WeightsDamaged);
     }
 
     /// What the image is to run with.
@@ -371,23 +248,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    fn store(&mut self) -> Result<&mut Store<R>, StoreError> {
-        self.store.as_mut().ok_or(StoreError::NoFlash)
-    }
-
-    fn set_configuration(&mut self, found: u8, configuration: &Configuration) -> Result<(), Refusal> {
-        let expected = Configuration::VERSION;
-        if found != expected {
-            return Err(Refusal::Version { found, expected });
-        }
-        // Where nothing can be stored, a bad value is named all the same.
-        configuration.check().map_err(StoreError::from)?;
-        self.drivable(configuration)?;
-        self.store()?.set(configuration)?;
-        self.note(EventKind::ConfigurationStored);
-        Ok(())
-    }
-
     fn calibrate(&mut self, what: Calibrate) -> Result<(), Refusal> {
         match what {
             Calibrate::Start(task) => self.start_calibration(task),
@@ -399,11 +259,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 if !matches!(self.calibration_state, State::Found(_)) {
                     return Err(Refusal::NothingFound);
                 }
-                let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
-                store.set(&self.calibration)?;
-                self.calibration_origin = Origin::Stored;
+                self.store_calibration()?;
                 self.calibration_state = State::Idle;
-                self.note(EventKind::CalibrationStored);
             }
         }
         Ok(())
@@ -413,60 +270,5 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     fn start_calibration(&mut self, task: Task) {
         self.calibrator = Some(Calibrator::new(task, self.configuration.static_init));
         self.calibration_state = State::Running(task);
-    }
-
-    /// The slot that the network does not run on.
-    fn unused_slot(&self) -> Slot {
-        match self.weights {
-            WeightSource::Slot(slot) => slot.other(),
-            // The network runs on neither; the file accepted last is spared all the same.
-            WeightSource::BuiltIn | WeightSource::None => self.accepted.active.map_or(Slot::A, Slot::other),
-        }
-    }
-
-    fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
-        let slot = self.unused_slot();
-        self.uploading = None;
-        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        let upload = Upload::begin(flash, slot, length)?;
-        self.uploading = Some(Uploading { upload, checked: None });
-        Ok(())
-    }
-
-    fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
-        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-        // Every block but the last one is full, so a block that is there already ends where the
-        // next one begins.
-        let written = uploading.upload.written();
-        let repeated = bytes.len() <= BLOCK && offset.checked_add(bytes.len() as u32) == Some(written);
-        if repeated {
-            return Ok(());
-        }
-        uploading.upload.block(flash, offset, bytes).map_err(|error| {
-            if let SlotError::Flash(_) = error {
-                self.uploading = None;
-            }
-            error.into()
-        })
-    }
-
-    #[inline(never)]
-    fn weights_verify(&mut self) -> Result<(), Refusal> {
-        let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
-        let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-        uploading.checked = Some(uploading.upload.verify(flash.slots())?);
-        Ok(())
-    }
-
-    fn weights_activate(&mut self) -> Result<(), Refusal> {
-        let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
-        let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
-        let accepted = self.accepted.with(upload.slot(), file);
-        self.store()?.set(&accepted)?;
-        self.accepted = accepted;
-        self.uploading = None;
-        self.note(EventKind::WeightsAccepted(upload.slot()));
-        Ok(())
     }
 }

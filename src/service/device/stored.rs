@@ -1,0 +1,125 @@
+//! Configuration, calibration and the choice of weights: read at the start, stored when asked.
+
+use super::{Device, Drives, MappedSlots};
+use crate::service::event::EventKind;
+use crate::service::message::{FlashState, Identity, Origin, Refusal};
+use crate::store::{Accepted, Configuration, FieldError, Record, Store, StoreError};
+use embedded_storage::nor_flash::NorFlash;
+
+impl<R: NorFlash, W: MappedSlots> Device<R, W> {
+    /// Reads what is stored; what is not whole or not in its range is not used and noted.
+    /// `writable`: a controller answers; without one what is stored can be read all the same.
+    pub fn begin(&mut self, records: Option<R>, slots: Option<W>, writable: bool, identity: Identity) {
+        self.identity = identity;
+        self.writable = writable;
+        // What can only be read is read here; later neither is there to be changed.
+        self.slots = slots.filter(|_| writable);
+        self.note(EventKind::Started(identity.reset));
+        if let Some(crash) = identity.crash {
+            self.note(EventKind::Crashed(crash));
+        }
+        if let Some(records) = records {
+            match Store::open(records, 0) {
+                Ok(store) => self.load(store),
+                Err(error) => self.flash = FlashState::Failed(error),
+            }
+        }
+        if self.records_damaged() {
+            self.note(EventKind::RecordsDamaged);
+        }
+    }
+
+    fn records_damaged(&self) -> bool {
+        matches!(self.flash, FlashState::Damaged | FlashState::Failed(_))
+    }
+
+    /// Whether anything that is stored is damaged or refused: [`crate::health::Faults::STORED`].
+    #[must_use]
+    pub fn stored_damaged(&self) -> bool {
+        self.refused || self.records_damaged()
+    }
+
+    /// Whether a configuration was stored and none is used: what the sensor's axes are is not known.
+    #[must_use]
+    pub fn configuration_lost(&self) -> bool {
+        match self.configuration_origin {
+            Origin::BuiltIn => self.records_damaged(),
+            Origin::Stored => false,
+            Origin::Refused(_) => true,
+        }
+    }
+
+    fn load(&mut self, mut store: Store<R>) {
+        let found = store.get::<Configuration>();
+        match found.and_then(|found| found.map(|found| self.drivable(&found).map(|()| found)).transpose()) {
+            Ok(Some(configuration)) => {
+                self.configuration = configuration;
+                self.configuration_origin = Origin::Stored;
+            }
+            Ok(None) => {}
+            Err(error) => {
+                self.configuration_origin = Origin::Refused(error);
+                self.refuse(EventKind::ConfigurationRefused(error));
+            }
+        }
+        match store.get() {
+            Ok(Some(calibration)) => {
+                self.calibration = calibration;
+                self.calibration_origin = Origin::Stored;
+            }
+            Ok(None) => {}
+            Err(error) => {
+                self.calibration_origin = Origin::Refused(error);
+                self.refuse(EventKind::CalibrationRefused(error));
+            }
+        }
+        match store.get() {
+            Ok(accepted) => self.accepted = accepted.unwrap_or(Accepted::NONE),
+            Err(error) => self.refuse(EventKind::AcceptedRefused(error)),
+        }
+        self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
+        self.store = self.writable.then_some(store);
+    }
+
+    fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
+        let Drives { imus, fogs, bits_per_second } = self.drives;
+        if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
+            return Err(StoreError::Field(FieldError::PartNotInImage));
+        }
+        let rate = configuration.can.bits_per_second;
+        if bits_per_second.contains(&rate) {
+            Ok(())
+        } else {
+            Err(StoreError::Field(FieldError::BitRateNotInImage(rate)))
+        }
+    }
+
+    pub(super) fn store(&mut self) -> Result<&mut Store<R>, StoreError> {
+        self.store.as_mut().ok_or(StoreError::NoFlash)
+    }
+
+    pub(super) fn set_configuration(
+        &mut self,
+        found: u8,
+        configuration: &Configuration,
+    ) -> Result<(), Refusal> {
+        let expected = Configuration::VERSION;
+        if found != expected {
+            return Err(Refusal::Version { found, expected });
+        }
+        // Where nothing can be stored, a bad value is named all the same.
+        configuration.check().map_err(StoreError::from)?;
+        self.drivable(configuration)?;
+        self.store()?.set(configuration)?;
+        self.note(EventKind::ConfigurationStored);
+        Ok(())
+    }
+
+    pub(super) fn store_calibration(&mut self) -> Result<(), Refusal> {
+        let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
+        store.set(&self.calibration)?;
+        self.calibration_origin = Origin::Stored;
+        self.note(EventKind::CalibrationStored);
+        Ok(())
+    }
+}
