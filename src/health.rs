@@ -141,7 +141,7 @@ pub struct Counters {
     pub windows: u32,
     /// Network inputs clamped to its range.
     pub clamped_inputs: u32,
-    /// Windows not believed, and bias and levelling whose memory has changed.
+    /// Windows not believed, and bias, levelling and rates that wait whose memory has changed.
     pub implausible: u32,
     /// Windows whose estimate came too late or not at all.
     pub late: u32,

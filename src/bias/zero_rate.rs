@@ -104,6 +104,8 @@ struct Covariance {
 pub struct ZeroRate {
     config: ZeroRateConfig,
     bias: f32,
+    /// It stays until the next standstill: a bit that flips in it shows.
+    copy: f32,
     offset: f32,
     covariance: Covariance,
     proof: Proof,
@@ -128,6 +130,7 @@ impl ZeroRate {
         Self {
             config,
             bias: 0.0,
+            copy: 0.0,
             offset: 0.0,
             covariance,
             proof: Proof::None,
@@ -139,6 +142,12 @@ impl ZeroRate {
             since_walk: 0,
             temperature: None,
         }
+    }
+
+    /// Whether the bias is what it was when it was last updated.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.bias.to_bits() == self.copy.to_bits()
     }
 
     /// Takes a settled sample, and why the vehicle is taken to stand; says what became of a
@@ -300,6 +309,7 @@ impl ZeroRate {
         let (bias_gain, offset_gain) = (with_bias * per_variance, with_offset * per_variance);
         let largest = self.config.max_bias;
         self.bias = within(self.bias + bias_gain * innovation, largest);
+        self.copy = self.bias;
         self.offset = within(self.offset + offset_gain * innovation, largest);
         self.covariance = Covariance {
             bias: (bias - bias_gain * with_bias).max(0.0),

@@ -73,8 +73,9 @@ const KEPT: usize = Lag::MAX.samples() + 1;
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     tick: u32,
-    /// Gyro less static bias.
+    /// Gyro less static bias, and once more: nothing else bounds what a bit that flips in it would do.
     rate: i32,
+    copy: i32,
     clipped: bool,
     /// The navigation rate went out as zero, whatever the estimate.
     held: bool,
@@ -82,6 +83,18 @@ struct Entry {
     count: i32,
     /// The estimate; the prior where `count` is 0.
     estimate: i32,
+}
+
+impl Entry {
+    /// Whether the rate is not what it was; it is then the smaller one of the two that are there.
+    fn mend(&mut self) -> bool {
+        let damaged = self.rate != self.copy;
+        if self.copy.unsigned_abs() < self.rate.unsigned_abs() {
+            self.rate = self.copy;
+        }
+        self.copy = self.rate;
+        damaged
+    }
 }
 
 /// A rate that goes out, and what was taken off for it.
@@ -96,6 +109,8 @@ pub struct Emitted {
     pub correction: AngularRate,
     /// A window has covered this very sample.
     pub covered: bool,
+    /// A bit of it had flipped while it waited.
+    pub damaged: bool,
     /// The part was saturated.
     pub clipped: bool,
     /// The rate is zero because the vehicle stands.
@@ -189,8 +204,16 @@ impl Compensator {
     pub fn push(&mut self, tick: u32, rate: AngularRate, clipped: bool) {
         self.kept.rotate_left(1);
         let estimate = self.prior;
-        self.kept[KEPT - 1] =
-            Some(Entry { tick, rate: rate.0, clipped, held: false, sum: 0, count: 0, estimate });
+        self.kept[KEPT - 1] = Some(Entry {
+            tick,
+            rate: rate.0,
+            copy: rate.0,
+            clipped,
+            held: false,
+            sum: 0,
+            count: 0,
+            estimate,
+        });
     }
 
     /// The rate of the newest sample, less a bias that is taken off beside the estimate.
@@ -210,12 +233,14 @@ impl Compensator {
         let max_single = self.config.max_single;
         let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && !entry.clipped;
+        let damaged = entry.mend();
         let mut taken = believable(entry.estimate.into(), max_single) + i64::from(bias.0);
         if entry.held {
             self.held[1] += i64::from(entry.rate) - taken;
             taken = i64::from(entry.rate);
         }
-        Some(emit(entry, taken, &mut self.navigation_carry, self.config.max_carry))
+        let emitted = emit(entry, taken, &mut self.navigation_carry, self.config.max_carry);
+        Some(Emitted { damaged, ..emitted })
     }
 
     /// The newest sample that no window will change any more; each sample is it once.
@@ -287,6 +312,7 @@ fn emit(entry: &Entry, taken: i64, carry: &mut i64, max_carry: AngularRate) -> E
         rate: AngularRate(rate as i32),
         correction: AngularRate(correction as i32),
         covered: entry.count > 0,
+        damaged: false,
         clipped: entry.clipped,
         held: entry.held,
     }

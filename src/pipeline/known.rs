@@ -40,6 +40,12 @@ impl Pipeline {
         self.known = None;
         self.prompt_yaw = self.navigation_yaw;
         self.break_window();
+        self.damaged();
+    }
+
+    /// Tells that memory has changed.
+    #[cold]
+    pub(super) fn damaged(&mut self) {
         self.estimate_faults = Faults::IMPLAUSIBLE;
         count(&mut self.counters.implausible, 1);
     }

@@ -265,17 +265,26 @@ impl Pipeline {
             self.since_window += 1;
         }
         let settled = self.compensator.settled();
+        if self.zero_rate().is_some_and(|zero_rate| !zero_rate.is_whole()) {
+            self.damaged();
+            if let Some(known) = &mut self.known {
+                known.zero_rate = self.config.zero_rate.map(ZeroRate::new);
+            }
+        }
         self.update_bias(settled.as_ref(), AngularRate(rate), quiet, sample);
         let bias = self.bias();
         let stands = self.stood as usize > self.config.compensate.lag.samples();
         let prompt = self.compensator.prompt(bias);
         let navigation = self.compensator.navigation(bias, stands);
+        if navigation.is_some_and(|emitted| emitted.damaged) {
+            self.damaged();
+        }
         let believed = self.believed;
         let prompt = self.yaw_rate(prompt, frame, |_| believed, |pipeline| &mut pipeline.prompt_yaw);
         let navigation = self.yaw_rate(
             navigation,
             frame,
-            |emitted| emitted.covered || believed,
+            |emitted| !emitted.damaged && (emitted.covered || believed),
             |pipeline| &mut pipeline.navigation_yaw,
         );
         (prompt, navigation, settled)
