@@ -23,7 +23,9 @@ fn main() {
     if has_dsp() {
         println!("cargo:rustc-cfg=gyronet_dsp");
     }
-    if env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
+    // Not for the firmware of others that use the library: it has a memory map of its own.
+    let image = env::var_os("CARGO_FEATURE_IMAGE").is_some();
+    if image && env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
         // cortex-m-rt's link.x includes memory.x, and that regions.x, from the search path.
         let [stm32f405, stm32h743] = REGIONS;
         let regions = if env::var_os("CARGO_FEATURE_STM32H743").is_some() { stm32h743 } else { stm32f405 };
