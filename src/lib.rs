@@ -62,7 +62,7 @@
 //! # let frames = can.0.clone();
 //! let mut coprocessor = Coprocessor::new(uart, can)?;
 //! coprocessor.poll(Micros(0));
-//! # assert_eq!((frames.borrow().len(), coprocessor.lost), (6 * 400, [0, 0]));
+//! # assert_eq!((frames.borrow().len(), coprocessor.refused), (6 * 400, 0));
 //! # let last = gyronet::can::bosch::Tx1::parse(frames.borrow()[6 * 399].data())?;
 //! # assert_eq!(last.yaw_rate_status, gyronet::can::bosch::SignalStatus::OK);
 //! # assert!(last.yaw_rate_deg_per_sec().abs() < 0.05, "the bias is off: {}", last.yaw_rate_deg_per_sec());

@@ -46,7 +46,7 @@ mod firmware {
                 let milli_deg = (1e3 * tx1.yaw_rate_deg_per_sec()) as i32;
                 hprintln!("{} frames; corrected yaw rate {}e-3 deg/s", frames, milli_deg);
             }
-            frames == 6 * SAMPLES && good.is_some() && board.lost == [0, 0]
+            frames == 6 * SAMPLES && good.is_some() && board.refused + board.dropped() == 0
         });
         debug::exit(if passed { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
         loop {

@@ -1,6 +1,6 @@
 use embedded_can::nb::Can;
 use embedded_io::{Read, ReadReady};
-use gyronet::can::{config::Config, feeds::Feeds};
+use gyronet::can::{config::Config, feeds::Feeds, queue::TransmitQueue};
 use gyronet::guard::Guard;
 use gyronet::model::{Blob, BlobError, GyroNet, WindowNetwork, weights};
 use gyronet::pipeline::PipelineConfig;
@@ -9,14 +9,16 @@ use gyronet::units::Micros;
 use gyronet::vehicle::VehicleSample;
 
 /// An Xsens MTi on any serial port in, frames on any CAN controller out.
-pub struct Coprocessor<UART, CAN> {
+pub struct Coprocessor<UART, CAN: Can> {
     imu: Serial<UART, Mti>,
     can: CAN,
     guard: Guard,
     network: GyroNet<'static>,
     feeds: Feeds,
-    /// Samples that were refused, and frames that the controller did not take.
-    pub lost: [u32; 2],
+    /// A controller has fewer places than a sample has frames.
+    waiting: TransmitQueue<CAN::Frame, 24>,
+    /// Samples that were refused.
+    pub refused: u32,
 }
 
 impl<UART: Read + ReadReady, CAN: Can> Coprocessor<UART, CAN> {
@@ -28,7 +30,8 @@ impl<UART: Read + ReadReady, CAN: Can> Coprocessor<UART, CAN> {
             guard: Guard::new(PipelineConfig::DEFAULT),
             network: GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?),
             feeds: Feeds::new(Config::DEFAULT),
-            lost: [0; 2],
+            waiting: TransmitQueue::new(),
+            refused: 0,
         })
     }
 
@@ -36,19 +39,20 @@ impl<UART: Read + ReadReady, CAN: Can> Coprocessor<UART, CAN> {
     pub fn poll(&mut self, now: Micros) {
         while let Some(sample) = self.imu.next_sample() {
             let Ok(Ok(output)) = sample.map(|sample| self.guard.process(sample, now)) else {
-                self.lost[0] += 1;
+                self.refused += 1;
                 continue;
             };
+            self.send(&output.vehicle);
             if let Some(window) = output.window {
                 // Or in a task of lower priority: it is used two samples on, not before.
                 self.guard.pipeline().deliver(window.end, self.network.estimate(&window.features));
             }
-            self.send(&output.vehicle);
         }
         // A sensor that has fallen silent is told on the bus, too.
         if let Some(vehicle) = self.guard.poll(now) {
             self.send(&vehicle);
         }
+        self.waiting.service(&mut self.can);
     }
 
     /// The controller, to receive from it.
@@ -56,11 +60,14 @@ impl<UART: Read + ReadReady, CAN: Can> Coprocessor<UART, CAN> {
         &mut self.can
     }
 
+    /// Frames that waited so long that newer ones took their place.
+    pub fn dropped(&self) -> u32 {
+        self.waiting.dropped()
+    }
+
     fn send(&mut self, vehicle: &VehicleSample) {
-        for frame in self.feeds.process::<CAN::Frame>(vehicle) {
-            // A controller that is full says so, or gives back the frame that had to make way.
-            let taken = matches!(self.can.transmit(&frame), Ok(None));
-            self.lost[1] += u32::from(!taken);
-        }
+        self.feeds.process(vehicle).into_iter().for_each(|frame| self.waiting.push(frame));
+        // What the controller takes at once goes out before the network runs.
+        self.waiting.service(&mut self.can);
     }
 }
