@@ -51,8 +51,6 @@ pub enum Source {
     GyroNet = 2,
     /// The fibre-optic gyro, corrected by FoGNet.
     FogNet = 3,
-    /// The sensor is silent: the last correction goes on for a bounded time.
-    Held = 4,
 }
 
 /// What a rate is worth.
