@@ -74,8 +74,8 @@
 //!
 //! # Features, unsafe code, panics
 //!
-//! No feature is on by default. `defmt`: `defmt::Format` on the public types. `firmware`: what the
-//! images of the repository need, nothing for a user of the library.
+//! No feature is on by default. `defmt`: `defmt::Format` on the public types. `image`, `firmware`,
+//! `stm32h743`, `rtt`: what the images of the repository need, nothing for a user of the library.
 //!
 //! Unsafe code is denied but for one kernel file for Cortex-M with the DSP extension
 //! (`src/nn/simd`), whose results equal those of portable code to the last bit.

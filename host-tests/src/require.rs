@@ -62,12 +62,21 @@ impl Required {
             Ok(found) => Some(found),
             Err(why) if self.0.contains(&need) => panic!("{test}: {VARIABLE} asks for {need:?}, but {why}"),
             Err(why) => {
-                // Nothing is left to report to when standard error is closed.
-                let _ = out.write_all(format!("SKIPPED {test}: {why}\n").as_bytes());
+                say(test, &why, out);
                 None
             }
         }
     }
+}
+
+/// Says that a test is skipped on this machine, whatever is required.
+pub fn skipped(test: &str, why: &str) {
+    say(test, why, &mut std::io::stderr());
+}
+
+fn say(test: &str, why: &str, out: &mut impl Write) {
+    // Nothing is left to report to when standard error is closed.
+    let _ = out.write_all(format!("SKIPPED {test}: {why}\n").as_bytes());
 }
 
 /// [`Required::wants`] with the environment's list and standard error.

@@ -3,6 +3,7 @@
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
+use gyronet_host_tests::require::skipped;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set};
@@ -30,7 +31,7 @@ fn import_and_replay_of_twenty_minutes() {
     let spec = &Set::Test.specs(Layout::Kaist)[0];
     layout::write(spec, &folder, || {}).expect("a scratch folder");
     let Some(begin) = processor_seconds() else {
-        println!("SKIPPED import_and_replay_of_twenty_minutes: no /proc/self/stat");
+        skipped("import_and_replay_of_twenty_minutes", "no /proc/self/stat");
         return;
     };
     let sequence = Sequence::read(&folder, |_| {}).expect("it was just written");

@@ -1,7 +1,7 @@
 //! One LSTM direction in integers: the input projection of two steps, and one recurrent step.
 //!
 //! The portable code here is the definition of the result (formats and packing: [`crate::nn`]).
-//! Where the processor has a faster way (`nn/simd.rs`), [`project`] and [`step`] take it; the
+//! Where the processor has a faster way (`nn/simd/`), [`project`] and [`step`] take it; the
 //! bits are the same.
 //!
 //! Weights lie in the order in which they are read. With K inputs and U units:

@@ -8,8 +8,8 @@
 //! | 10, 11 | 2 x 128 KiB | weight slots ([`SLOTS`]) |
 //!
 //! Records want sectors that are small and of one size, and the processor wants its vectors in
-//! sector 0; so the code begins behind the records. `memory.x` says the same to the linker, and
-//! a test holds the two together.
+//! sector 0; so the code begins behind the records. The image's `regions.x` and `slots.x` say the
+//! same to the linker, and a test holds them together.
 
 use core::ops::Range;
 
