@@ -9,13 +9,12 @@
 //! the street.
 
 use crate::sample::ImuSample;
-use crate::units::{AngularRate, SpecificForce};
+use crate::units::{AngularRate, STANDARD_GRAVITY, SpecificForce};
 
 /// Fraction bits of a matrix element.
 const Q: u32 = 30;
 const ONE: f32 = (1u32 << Q) as f32;
-/// Standard gravity, m/s^2, and how far from it a mean specific force may be to be gravity.
-const GRAVITY: f32 = 9.806_65;
+/// How far from standard gravity a mean specific force may be to be gravity, m/s^2.
 const GRAVITY_TOLERANCE: f32 = 1.0;
 /// Cosine of 150 degrees: beyond, which way to turn the board up is anyone's guess.
 const UPSIDE_DOWN: f32 = -0.866;
@@ -111,7 +110,7 @@ impl Rotation {
     pub fn levelling(rest: [SpecificForce; 3]) -> Result<(Self, f32), LevelError> {
         let [x, y, z] = rest.map(|force| force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
         let norm = libm::sqrtf(x * x + y * y + z * z);
-        if libm::fabsf(norm - GRAVITY) > GRAVITY_TOLERANCE {
+        if libm::fabsf(norm - STANDARD_GRAVITY) > GRAVITY_TOLERANCE {
             return Err(LevelError::NotGravity(norm));
         }
         let [x, y, cos] = [x / norm, y / norm, z / norm];

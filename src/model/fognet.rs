@@ -16,7 +16,7 @@
 //! the linear part is computed from the increments themselves, in [`Angle`]: it is exact.
 
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
-use super::gyronet::normalise;
+use super::gyronet::load_step;
 use crate::nn::bilstm::{self, Layer, Pass, Run, Way};
 use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};
@@ -122,18 +122,7 @@ impl<'w, 's> FogNet<'w, 's> {
             linear += i128::from(second.turn.0) * i128::from(*gain);
             let turn = (second.turn.0 >> ANGLE_TO_RATE).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
             let codes = second.features.into_iter().chain([turn]);
-            let mut values = [0; COLUMNS];
-            for ((to, code), n) in values.iter_mut().zip(codes).zip(&blob.normalisation) {
-                let value = normalise(code, *n);
-                let inside = value.min(clamp).max(-clamp);
-                state.clamped_inputs += u16::from(inside != value);
-                *to = inside as i16;
-            }
-            for (k, [first, second]) in values.as_chunks::<2>().0.iter().enumerate() {
-                if let Some(word) = state.input.get_mut(bilstm::word_index(step, 2 * k, COLUMNS)) {
-                    *word = pack(*first, *second);
-                }
-            }
+            state.clamped_inputs += load_step(&mut state.input, step, codes, &blob.normalisation, clamp);
         }
         let linear = (linear + (1 << (GAIN_FRACTION_BITS - 1))) >> GAIN_FRACTION_BITS;
         state.linear = Angle(linear.clamp(i64::MIN.into(), i64::MAX.into()) as i64);

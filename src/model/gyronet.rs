@@ -124,16 +124,8 @@ impl<'w> GyroNet<'w> {
         let clamp = i32::from(self.blob.input_clamp);
         let mut clamped = 0;
         for (step, features) in window.iter().enumerate() {
-            let mut values = [0; FEATURES];
-            for ((to, code), n) in values.iter_mut().zip(features).zip(&self.blob.normalisation) {
-                let value = normalise(*code, *n);
-                let inside = value.min(clamp).max(-clamp);
-                clamped += u16::from(inside != value);
-                *to = inside as i16;
-            }
-            for (k, [first, second]) in values.as_chunks::<2>().0.iter().enumerate() {
-                self.state.input[bilstm::word_index(step, 2 * k, FEATURES)] = pack(*first, *second);
-            }
+            let codes = features.iter().copied();
+            clamped += load_step(&mut self.state.input, step, codes, &self.blob.normalisation, clamp);
         }
         clamped
     }
@@ -151,8 +143,32 @@ impl WindowNetwork for GyroNet<'_> {
     }
 }
 
+/// Normalises the codes of a step into its place in a first layer's input; counts what had to be clamped.
+pub(super) fn load_step<const COLUMNS: usize>(
+    input: &mut [u32],
+    step: usize,
+    codes: impl Iterator<Item = i32>,
+    normalisation: &[Normalisation; COLUMNS],
+    clamp: i32,
+) -> u16 {
+    let mut clamped = 0;
+    let mut values = [0; COLUMNS];
+    for ((to, code), n) in values.iter_mut().zip(codes).zip(normalisation) {
+        let value = normalise(code, *n);
+        let inside = value.min(clamp).max(-clamp);
+        clamped += u16::from(inside != value);
+        *to = inside as i16;
+    }
+    for (k, [first, second]) in values.as_chunks::<2>().0.iter().enumerate() {
+        if let Some(word) = input.get_mut(bilstm::word_index(step, 2 * k, COLUMNS)) {
+            *word = pack(*first, *second);
+        }
+    }
+    clamped
+}
+
 /// (code - offset) * multiplier / 2^31 to nearest, saturated to 32 bits.
-pub(super) fn normalise(code: i32, n: Normalisation) -> i32 {
+fn normalise(code: i32, n: Normalisation) -> i32 {
     let product = i64::from(code.saturating_sub(n.offset)) * i64::from(n.multiplier);
     ((product + (1 << 30)) >> 31).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }

@@ -1,4 +1,4 @@
-//! The time of a message: by its number, or by its stamp.
+//! The time of a message by its number.
 
 use super::config::OutputRate;
 
@@ -22,26 +22,5 @@ impl MessageClock {
         self.time += u64::from(elapsed / hertz);
         self.remainder = elapsed % hertz;
         self.time
-    }
-}
-
-/// Microseconds of 32 bits (71 minutes) to ones that never wrap. A stamp that goes back by
-/// less than half the range is a step back, not a wrap.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct StampClock {
-    /// Last stamp and the time it stands for.
-    last: Option<(u32, u64)>,
-}
-
-impl StampClock {
-    pub(super) const START: Self = Self { last: None };
-
-    pub(super) fn unwrap(&mut self, stamp: u32) -> u64 {
-        let time = match self.last {
-            None => u64::from(stamp),
-            Some((last, base)) => base.saturating_add_signed(i64::from(stamp.wrapping_sub(last) as i32)),
-        };
-        self.last = Some((stamp, time));
-        time
     }
 }

@@ -19,10 +19,11 @@ pub use config::{AngleUnit, Dsp1760Config, OutputRate, Rotation, TemperatureUnit
 pub use framing::Kvh;
 
 use super::framer::Framer;
+use super::unwrap::StampClock;
 use crate::health::count;
 use crate::sample::FogSample;
 use crate::units::{Angle, CentiCelsius, Micros};
-use clock::{MessageClock, StampClock};
+use clock::MessageClock;
 use framing::is_self_test;
 use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity};
 

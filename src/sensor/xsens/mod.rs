@@ -13,6 +13,7 @@ pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
 pub use xbus::{MAX_FRAME, Xbus};
 
 use super::framer::Framer;
+use super::unwrap::StampClock;
 use crate::sample::ImuSample;
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
@@ -24,15 +25,15 @@ const STATUS_CLIPPED: u32 = 0x3F << 8;
 #[derive(Debug, Clone, Default)]
 pub struct Mti {
     framer: Framer<Xbus, MAX_FRAME>,
-    /// Last SampleTimeFine and the time it stands for.
-    time: Option<(u32, u64)>,
+    /// Of SampleTimeFine: 10 kHz ticks.
+    stamps: StampClock,
 }
 
 impl Mti {
     /// Nothing received yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { framer: Framer::new(), time: None }
+        Self { framer: Framer::new(), stamps: StampClock::START }
     }
 
     /// Takes one byte. Call [`Mti::next_sample`] until `None` before the next one.
@@ -79,19 +80,8 @@ impl Mti {
             angular_rate: [wx.map_err(r)?, wy.map_err(r)?, wz.map_err(r)?],
             temperature: message.temperature.and_then(centi_celsius),
             clipped: message.status.is_some_and(|status| status & STATUS_CLIPPED != 0),
-            time: self.unwrap_time(ticks),
+            time: Micros(self.stamps.unwrap(ticks) * 100),
         })
-    }
-
-    /// 10 kHz ticks of 32 bits (119 hours) to microseconds that never wrap. Ticks that go
-    /// back by less than half the range are a step back, not a wrap.
-    fn unwrap_time(&mut self, ticks: u32) -> Micros {
-        let base = match self.time {
-            None => u64::from(ticks),
-            Some((last, base)) => base.saturating_add_signed(i64::from(ticks.wrapping_sub(last) as i32)),
-        };
-        self.time = Some((ticks, base));
-        Micros(base * 100)
     }
 }
 
