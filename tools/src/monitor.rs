@@ -75,6 +75,7 @@ pub struct Monitor {
     /// Start of the second that is being counted, and frames in it.
     pace: Option<(f64, u32)>,
     frames_per_second: Option<f64>,
+    stamp: Option<f64>,
     /// Accounts.
     pub counts: Counts,
     /// Newest values.
@@ -97,6 +98,7 @@ impl Monitor {
             turned: 0,
             pace: None,
             frames_per_second: None,
+            stamp: None,
             counts: Counts::default(),
             state: State::default(),
         }
@@ -109,6 +111,7 @@ impl Monitor {
     pub fn take_line(&mut self, line: &str, time: f64) -> Option<f64> {
         match line::parse_line(line) {
             Ok((stamp, frame)) => {
+                self.stamp = stamp.or(self.stamp);
                 let time = stamp.unwrap_or(time);
                 self.take(&frame, time).then_some(time)
             }
@@ -143,6 +146,12 @@ impl Monitor {
             self.counts.foreign += 1;
         }
         false
+    }
+
+    /// The newest line's own time, in seconds, where lines have one.
+    #[must_use]
+    pub fn stamp(&self) -> Option<f64> {
+        self.stamp
     }
 
     /// Frames in a second, ours and others', once a second is over.

@@ -77,7 +77,7 @@ fn json_is_json_and_quiet_is_quiet() {
         (&["evaluate", &drive], "drives"),
         (&["evaluate", "--lags", &drive], "drives"),
         (&["replay", &drive, "--out", &log], "frames"),
-        (&["monitor", &log], "rate"),
+        (&["monitor", &log], "rate_deg_per_s"),
     ] {
         let output = gyronet(&[arguments, &["--json"]].concat());
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

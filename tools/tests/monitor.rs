@@ -77,6 +77,18 @@ fn a_log_is_summed_up_and_tabled() {
     let last = rows[500];
     assert!(last.starts_with("4.990000,1.000000,4.98999"), "{last}");
     assert!(last.ends_with(",Raw,good,none,0.0000,,,1.000,1,0,0,0,0"), "{last}");
+    // The same values, and the log's own time, not the time to read it.
+    let (_, out, err) = monitor(&[log.to_str().unwrap(), "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).expect(&err);
+    let value = |name: &str| match &json[name] {
+        serde_json::Value::Null => String::new(),
+        serde_json::Value::String(text) => text.clone(),
+        number => number.to_string(),
+    };
+    for (name, text) in rows[0].split(',').zip(last.split(',')) {
+        let same = value(name) == text || value(name).parse::<f64>().ok() == text.parse().ok();
+        assert!(same, "{name}: {} {text}", value(name));
+    }
 }
 
 #[test]

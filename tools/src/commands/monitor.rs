@@ -23,6 +23,7 @@ const ONCE: Duration = Duration::from_secs(10);
 /// The messages are checked as an ECU would: yaw rate, yaw, source, quality, faults, and what was
 /// lost, repeated or damaged on the way. On a terminal a live picture; elsewhere, and with --json, a
 /// line a second. A log is read to its end, then summed up. Ctrl-C ends with the sum, exit status 0.
+/// Times are the input's own where it has some, else since the start.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -91,7 +92,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         if args.once && sets > 0 {
             break;
         }
-        view.show(&monitor, elapsed)?;
+        view.show(&monitor, monitor.stamp().unwrap_or(elapsed))?;
     }
     let counts = monitor.counts;
     if source.is_log() && counts.frames + counts.foreign == 0 {
@@ -101,7 +102,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         return Err(MonitorError::Nothing(args.source.clone()).into());
     }
     table.map_or(Ok(()), Table::finish)?;
-    view.finish(&monitor, start.elapsed().as_secs_f64())?;
+    // A log is read in a moment: its own time says how long it is.
+    let time = monitor.stamp().unwrap_or_else(|| start.elapsed().as_secs_f64());
+    view.finish(&monitor, time)?;
     Ok(())
 }
 
@@ -145,7 +148,7 @@ impl View {
         Self { term: live.then_some(term), silent, json, drawn: 0, last: Instant::now() }
     }
 
-    fn show(&mut self, monitor: &Monitor, elapsed: f64) -> io::Result<()> {
+    fn show(&mut self, monitor: &Monitor, time: f64) -> io::Result<()> {
         let period = if self.term.is_some() { REDRAW } else { LINE };
         if self.silent || self.last.elapsed() < period {
             return Ok(());
@@ -162,14 +165,14 @@ impl View {
                 self.drawn = lines.len();
                 term.write_line(&lines.join("\n"))
             }
-            None if self.json => writeln!(io::stdout().lock(), "{}", monitor.json(elapsed)),
-            None => writeln!(io::stdout().lock(), "{}", monitor.line(elapsed)),
+            None if self.json => writeln!(io::stdout().lock(), "{}", monitor.json(time)),
+            None => writeln!(io::stdout().lock(), "{}", monitor.line(time)),
         }
     }
 
-    fn finish(self, monitor: &Monitor, elapsed: f64) -> io::Result<()> {
+    fn finish(self, monitor: &Monitor, time: f64) -> io::Result<()> {
         if self.json {
-            return writeln!(io::stdout().lock(), "{}", monitor.json(elapsed));
+            return writeln!(io::stdout().lock(), "{}", monitor.json(time));
         }
         if let Some(term) = &self.term {
             term.clear_last_lines(self.drawn)?;

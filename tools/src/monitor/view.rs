@@ -29,13 +29,18 @@ fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".into(), |value| format!("{value:.decimals$}"))
 }
 
+/// By way of text: a product of a code and its scale prints all its binary digits else.
+fn rounded(value: Option<f64>, decimals: usize) -> Option<f64> {
+    value.and_then(|value| format!("{value:.decimals$}").parse().ok())
+}
+
 impl Monitor {
     /// Heading of the table that [`Monitor::row`] gives a line of.
-    pub const HEADING: &str = "time,rate,yaw,source,quality,faults,correction,sigma,latency,drop_in,lost,repeated,\
-                               out_of_sequence,damaged,unreadable";
+    pub const HEADING: &str = "time_s,rate_deg_per_s,yaw_deg,source,quality,faults,correction_deg_per_s,\
+                               sigma_deg_per_s,latency_ms,drop_in_deg_per_s,lost,repeated,out_of_sequence,damaged,\
+                               unreadable";
 
-    /// The newest values as one line of a CSV file; empty where not known. Rates in deg/s, yaw in
-    /// deg, latency in ms, time in s.
+    /// The newest values as one line of a CSV file; empty where not known.
     #[must_use]
     pub fn row(&self, time: f64) -> String {
         let known = |value: Option<f64>, decimals: usize| {
@@ -56,17 +61,19 @@ impl Monitor {
         )
     }
 
-    /// The newest values and all counts as one line of JSON; names and units as in
-    /// [`Monitor::HEADING`], null where not known.
+    /// The newest values and all counts as one line of JSON; names, units and decimals as in
+    /// [`Monitor::row`], null where not known.
     #[must_use]
     pub fn json(&self, time: f64) -> serde_json::Value {
         let (source, quality) = self.judgement();
         let State { rate, yaw, faults, correction, sigma, latency, drop_in, vdc2, .. } = self.state;
         let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
         serde_json::json!({
-            "time": time, "rate": rate, "yaw": yaw, "source": source, "quality": quality,
-            "faults": fault_names(faults), "correction": correction, "sigma": sigma, "latency": latency,
-            "drop_in": drop_in, "vdc2": vdc2, "frames": frames, "foreign": foreign, "lost": lost,
+            "time_s": rounded(Some(time), 6), "rate_deg_per_s": rounded(rate, 6), "yaw_deg": rounded(yaw, 8),
+            "source": source, "quality": quality, "faults": fault_names(faults),
+            "correction_deg_per_s": rounded(correction, 4), "sigma_deg_per_s": rounded(sigma, 5),
+            "latency_ms": rounded(latency, 1), "drop_in_deg_per_s": rounded(drop_in, 3),
+            "vdc2_deg_per_s": rounded(vdc2, 4), "frames": frames, "foreign": foreign, "lost": lost,
             "repeated": repeated, "out_of_sequence": out_of_sequence, "damaged": damaged, "unreadable": unreadable,
         })
     }
