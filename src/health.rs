@@ -37,6 +37,19 @@ pub enum Status {
     Silent,
 }
 
+impl core::fmt::Display for Status {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Init => "initialising, no bias yet",
+            Self::Ready => "ready, corrected by the network",
+            Self::Degraded => "degraded, corrected by the static bias alone",
+            Self::Clipped => "clipped, the sensor is saturated",
+            Self::Stuck => "stuck, the sensor's readings stand still",
+            Self::Silent => "silent, the sensor says nothing",
+        })
+    }
+}
+
 /// Where a rate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

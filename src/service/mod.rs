@@ -37,6 +37,7 @@ pub mod device;
 pub mod event;
 pub mod frame;
 pub mod message;
+mod text;
 
 pub use device::{Device, Drives, MappedSlots};
 pub use frame::{Deframer, FrameError};

@@ -114,6 +114,16 @@ pub enum FlashFault {
     Refused,
 }
 
+impl core::fmt::Display for FlashFault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NotAligned => "not the start of a word or sector",
+            Self::OutOfBounds => "beyond its end",
+            Self::Refused => "did not take or finish the operation",
+        })
+    }
+}
+
 /// Why the store has not done what it was asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -144,9 +154,7 @@ impl core::fmt::Display for StoreError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NoFlash => f.write_str("no flash controller answers: nothing can be stored"),
-            Self::Flash(FlashFault::NotAligned) => f.write_str("flash: not the start of a word or sector"),
-            Self::Flash(FlashFault::OutOfBounds) => f.write_str("flash: beyond its end"),
-            Self::Flash(FlashFault::Refused) => f.write_str("flash: did not take or finish the operation"),
+            Self::Flash(fault) => write!(f, "flash: {fault}"),
             Self::Full => f.write_str("no room is left for the record"),
             Self::Corrupt => f.write_str("the record sectors are damaged"),
             Self::Version { found, expected } => {

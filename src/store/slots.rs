@@ -53,6 +53,12 @@ impl Slot {
     }
 }
 
+impl core::fmt::Display for Slot {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(Self::of(*self, ["A", "B"]))
+    }
+}
+
 /// Which files were accepted, and which of them is to be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Accepted {
@@ -123,7 +129,7 @@ impl core::fmt::Display for SlotError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NoFlash => f.write_str("no flash controller answers: nothing can be stored"),
-            Self::Flash(_) => f.write_str("the flash did not take the operation"),
+            Self::Flash(fault) => write!(f, "flash: {fault}"),
             Self::Empty => f.write_str("the slot is empty"),
             Self::Length(length) => {
                 write!(f, "{length} bytes are no whole number of words up to {SLOT_SIZE}")
@@ -164,6 +170,16 @@ pub enum WeightSource {
     BuiltIn,
     /// Nowhere: all are damaged, and the rate is the gyro's less its bias.
     None,
+}
+
+impl core::fmt::Display for WeightSource {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Slot(slot) => write!(f, "slot {slot}"),
+            Self::BuiltIn => f.write_str("built in"),
+            Self::None => f.write_str("none, the network is off"),
+        }
+    }
 }
 
 /// What [`select`] has found.

@@ -153,23 +153,20 @@ fn print_info(info: &Info) {
     }
     println!("clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6);
     println!("bus           {}", if identity.can { "CAN, SLCAN" } else { "SLCAN alone" });
-    println!("started by    {:?}", identity.reset);
+    println!("started by    {}", identity.reset);
     if let Some(crash) = identity.crash {
-        println!(
-            "crashed       {:?} at {:#010x}, {} since power came on",
-            crash.kind, crash.place, crash.count
-        );
+        println!("crashed       {crash}");
     }
-    println!("status        {:?}", info.status);
+    println!("status        {}", info.status);
     if let Some(fault) = info.sensor {
-        println!("sensor        {fault:?}");
+        println!("sensor        {fault}");
     }
     let writable = if info.writable { "" } else { ", no controller: nothing can be stored" };
-    println!("flash         {:?}{writable}", info.flash);
-    println!("configuration {:?}, layout {}", info.configuration, info.record_versions[0]);
-    println!("calibration   {:?}, layout {}", info.calibration, info.record_versions[1]);
+    println!("flash         {}{writable}", info.flash);
+    println!("configuration {}, layout {}", info.configuration, info.record_versions[0]);
+    println!("calibration   {}, layout {}", info.calibration, info.record_versions[1]);
     let crc = info.weights_crc.map(|crc| format!(", checksum {crc:08x}")).unwrap_or_default();
-    println!("weights       {:?}{crc}", info.weights);
+    println!("weights       {}{crc}", info.weights);
     for (slot, refused) in ["A", "B"].into_iter().zip(info.refused_slots) {
         if let Some(error) = refused {
             println!("slot {slot}        not used: {error}");
@@ -204,7 +201,7 @@ fn calibrate(device: &mut Board, task: CalibrateTask, store: bool, json: bool) -
                 std::thread::sleep(POLL);
             }
             State::Failed(_, fault) if task.is_some() => {
-                return Err(format!("nothing was found: {fault:?}").into());
+                return Err(format!("nothing was found: {fault}").into());
             }
             _ => {
                 if store {
@@ -233,7 +230,7 @@ fn log(device: &mut Board, json: bool) -> super::Result {
         println!("{lost} older events are lost");
     }
     for event in events {
-        println!("{:6} {:9.2} s  {:?}", event.number, f64::from(event.tick) / 100.0, event.kind);
+        println!("{:6} {:9.2} s  {}", event.number, f64::from(event.tick) / 100.0, event.kind);
     }
     Ok(())
 }
@@ -250,10 +247,7 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
     if json {
         print_json(&serde_json::json!({ "slot": uploaded.slot, "crc": uploaded.crc }))
     } else {
-        println!(
-            "slot {:?} holds file {:08x}; it is used from the next start on",
-            uploaded.slot, uploaded.crc
-        );
+        println!("slot {} holds file {:08x}; it is used from the next start on", uploaded.slot, uploaded.crc);
         Ok(())
     }
 }

@@ -1,0 +1,117 @@
+//! What the board says of itself, in words: for the asking side, the image prints none of it.
+
+use super::calibrate::CalibrationFault;
+use super::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
+use super::message::{FlashState, Origin};
+use core::fmt::{Display, Formatter, Result};
+
+impl Display for CalibrationFault {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let axis = |axis: u8| ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("unknown");
+        match *self {
+            Self::Moving(gyro @ 0..=2) => {
+                write!(f, "the vehicle moved (gyro, {} axis: not still, or its mean too large)", axis(gyro))
+            }
+            Self::Moving(6) => f.write_str("the vehicle moved (its wheels turned)"),
+            Self::Moving(other) => {
+                write!(f, "the vehicle moved (accelerometer, {} axis: not still)", axis(other - 3))
+            }
+            Self::Clipped => f.write_str("a sample was saturated"),
+            Self::Tilted(deg) => {
+                write!(f, "{deg:.1} deg from level; is the configured mounting right?")
+            }
+            Self::NotGravity(force) => {
+                write!(f, "the mean specific force, {force:.2} m/s^2, is not gravity")
+            }
+        }
+    }
+}
+
+impl Display for ResetCause {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        f.write_str(match self {
+            Self::Unknown => "unknown cause (no reset flag is set)",
+            Self::PowerOn => "power on",
+            Self::BrownOut => "brown-out",
+            Self::Pin => "reset pin",
+            Self::Software => "software reset",
+            Self::Watchdog => "watchdog",
+            Self::LowPower => "forbidden low-power mode",
+        })
+    }
+}
+
+impl Display for Crash {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let Self { kind, place, count } = self;
+        match kind {
+            CrashKind::Panic => write!(f, "panic in line {place}")?,
+            CrashKind::HardFault => write!(f, "hard fault at {place:#010x}")?,
+            CrashKind::Unhandled(number) => write!(f, "unhandled exception {number} at {place:#010x}")?,
+        }
+        write!(f, ", {count} since power came on")
+    }
+}
+
+impl Display for SensorFault {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::Bus => f.write_str("the SPI controller did not answer"),
+            Self::Reset => f.write_str("the part did not come back from its reset"),
+            Self::Identity(identity @ (0 | 0xFF)) => {
+                write!(f, "no part answers (identity {identity:#04x})")
+            }
+            Self::Identity(identity) => write!(f, "another part answers (identity {identity:#04x})"),
+            Self::Setting { bank, address, got } => {
+                write!(f, "register {address:#04x} of bank {bank} holds {got:#04x}, not what was written")
+            }
+        }
+    }
+}
+
+impl Display for Origin {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::BuiltIn => f.write_str("built in"),
+            Self::Stored => f.write_str("stored"),
+            Self::Refused(error) => write!(f, "built in; what is stored is refused: {error}"),
+        }
+    }
+}
+
+impl Display for FlashState {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::Absent => f.write_str("none that this image can read"),
+            Self::Ready => f.write_str("ready"),
+            Self::Damaged => f.write_str("a record is damaged, the one before it is used"),
+            Self::Failed(error) => write!(f, "cannot be read: {error}"),
+        }
+    }
+}
+
+impl Display for EventKind {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::Started(cause) => write!(f, "started by {cause}"),
+            Self::Crashed(crash) => write!(f, "crashed before: {crash}"),
+            Self::ConfigurationRefused(error) => {
+                write!(f, "stored configuration refused, defaults used: {error}")
+            }
+            Self::CalibrationRefused(error) => write!(f, "stored calibration refused: {error}"),
+            Self::AcceptedRefused(error) => write!(f, "record of accepted weights refused: {error}"),
+            Self::SlotRefused(slot, error) => write!(f, "slot {slot} not used: {error}"),
+            Self::NoWeights => f.write_str("no good weights: the network is off"),
+            Self::Status(status) => write!(f, "status: {status}"),
+            Self::ConfigurationStored => f.write_str("configuration stored"),
+            Self::CalibrationStored => f.write_str("calibration stored"),
+            Self::Calibrated(None) => f.write_str("calibration done"),
+            Self::Calibrated(Some(fault)) => write!(f, "calibration found nothing: {fault}"),
+            Self::WeightsAccepted(slot) => write!(f, "weights in slot {slot} accepted"),
+            Self::WeightsDamaged => f.write_str("weights in use damaged: the network is off"),
+            Self::RecordsDamaged => f.write_str("stored records damaged: older or built-in ones are used"),
+            Self::Sensor(None) => f.write_str("sensor set up"),
+            Self::Sensor(Some(fault)) => write!(f, "sensor not set up: {fault}"),
+        }
+    }
+}

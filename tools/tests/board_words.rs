@@ -1,0 +1,62 @@
+//! What a board says is printed as sentences, with the cause in them.
+
+use gyronet::health::Status;
+use gyronet::service::calibrate::CalibrationFault;
+use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
+use gyronet::service::message::{FlashState, Origin};
+use gyronet::store::slots::{Slot, SlotError, WeightSource};
+use gyronet::store::{FieldError, FlashFault, StoreError};
+
+#[test]
+fn states_are_sentences() {
+    let rate = StoreError::Field(FieldError::BitRateNotInImage(250_000));
+    assert_eq!(
+        Origin::Refused(rate).to_string(),
+        "built in; what is stored is refused: can.bits_per_second: this firmware image does not drive the bus \
+         at 250000 bit/s"
+    );
+    assert_eq!(
+        FlashState::Failed(StoreError::Corrupt).to_string(),
+        "cannot be read: the record sectors are damaged"
+    );
+    assert_eq!(WeightSource::Slot(Slot::B).to_string(), "slot B");
+    for (fault, part) in [
+        (FlashFault::NotAligned, "start of a word"),
+        (FlashFault::OutOfBounds, "beyond its end"),
+        (FlashFault::Refused, "did not take"),
+    ] {
+        assert!(SlotError::Flash(fault).to_string().contains(part), "{fault}");
+    }
+}
+
+#[test]
+fn calibrations_name_the_axis() {
+    let moving = |axis| CalibrationFault::Moving(axis).to_string();
+    for (axis, part) in [(0, "gyro, x"), (2, "gyro, z"), (3, "accelerometer, x"), (5, "accelerometer, z")] {
+        assert!(moving(axis).contains(part), "{}", moving(axis));
+    }
+    assert!(moving(6).contains("wheels"));
+    // Of a later firmware.
+    assert!(moving(u8::MAX).contains("unknown"));
+}
+
+#[test]
+fn events_are_sentences() {
+    let crash = Crash { kind: CrashKind::HardFault, place: 0x0800_1234, count: 2 };
+    for (kind, due) in [
+        (EventKind::Started(ResetCause::PowerOn), "started by power on"),
+        (EventKind::Crashed(crash), "crashed before: hard fault at 0x08001234, 2 since power came on"),
+        (EventKind::SlotRefused(Slot::A, SlotError::Empty), "slot A not used: the slot is empty"),
+        (EventKind::Status(Status::Init), "status: initialising, no bias yet"),
+        (
+            EventKind::Calibrated(Some(CalibrationFault::Clipped)),
+            "calibration found nothing: a sample was saturated",
+        ),
+        (
+            EventKind::Sensor(Some(SensorFault::Setting { bank: 1, address: 0x0A, got: 0xFF })),
+            "sensor not set up: register 0x0a of bank 1 holds 0xff, not what was written",
+        ),
+    ] {
+        assert_eq!(kind.to_string(), due);
+    }
+}
