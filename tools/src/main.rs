@@ -8,8 +8,8 @@ use std::process::ExitCode;
 
 /// Learned yaw-rate correction on a host: the very code that is flashed, on recorded drives.
 ///
-/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header; columns in any order, others
-/// are passed over:
+/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header; columns in any order, other
+/// columns are ignored:
 ///
 ///   t_s                    time, s
 ///   acc_x, acc_y, acc_z    specific force, m/s^2 (x forward, y left, z up)

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 /// Ask and configure a board over its service line.
 ///
-/// A new configuration and new weights hold from the next start on (`device restart`).
+/// A new configuration or new weights take effect after a restart (`device restart`).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -25,7 +25,7 @@ Examples:
   gyronet device --port /dev/ttyUSB1 calibrate static --store
   gyronet device --port localhost:4000 weights gyronet.blob      # then: restart")]
 pub struct Args {
-    /// Serial port, or host:port (the emulator, a serial server); always wanted.
+    /// Serial port or host:port of the board (emulator, serial server); required.
     #[arg(long, global = true, value_name = "PORT|HOST:PORT")]
     port: Option<String>,
     #[command(subcommand)]
@@ -51,7 +51,7 @@ enum Action {
         /// What to find, or `show` what is known.
         #[arg(value_enum)]
         task: CalibrateTask,
-        /// Keep what was found over the next start.
+        /// Store the result, so that it survives a restart.
         #[arg(long)]
         store: bool,
     },
@@ -59,7 +59,7 @@ enum Action {
     Log,
     /// Print everything that is counted.
     Counters,
-    /// Upload a weight file; the board checks it, and uses it from the next start on.
+    /// Upload a weight file; the board checks it, and uses it after a restart.
     Weights {
         /// As `gyronet quantize` writes it.
         file: PathBuf,
@@ -247,7 +247,7 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
     if json {
         print_json(&serde_json::json!({ "slot": uploaded.slot, "crc": uploaded.crc }))
     } else {
-        println!("slot {} holds file {:08x}; it is used from the next start on", uploaded.slot, uploaded.crc);
+        println!("slot {} holds file {:08x}; it is used after a restart", uploaded.slot, uploaded.crc);
         Ok(())
     }
 }

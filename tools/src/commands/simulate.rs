@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// Write a drive that nobody drove, with known errors.
+/// Write a simulated drive whose sensor errors are known.
 ///
 /// A car that stands, pulls away, bends, turns and stops, seen by a MEMS part whose errors are known.
 ///
