@@ -1,6 +1,7 @@
 //! The asking side of the service line: requests out, replies in, over whatever carries bytes.
 
 pub mod line;
+pub mod settings;
 pub mod upload;
 
 use gyronet::service::frame::{Deframer, FrameError, emit};

@@ -8,6 +8,7 @@ use gyronet::service::calibrate::{State, Task};
 use gyronet::service::message::{Calibrate, Info};
 use gyronet::service::{Reply, Request};
 use gyronet_tools::device::line::Line;
+use gyronet_tools::device::settings::{flat, value as value_of};
 use gyronet_tools::device::upload::upload;
 use gyronet_tools::device::{Device, DeviceError};
 use serde::Serialize;
@@ -137,7 +138,7 @@ fn print_value(value: &impl Serialize, json: bool) -> super::Result {
     if json {
         return print_json(value);
     }
-    for (name, value) in settings::flat(&settings::value(value)?) {
+    for (name, value) in flat(&value_of(value)?) {
         println!("{name} = {value}");
     }
     Ok(())

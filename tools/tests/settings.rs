@@ -1,0 +1,57 @@
+//! The settings of `gyronet device set`: as documented, and nothing lost on the way through text.
+
+use gyronet::store::{Configuration, Record};
+use gyronet::units::AngularRate;
+use gyronet_tools::device::settings::{assign, flat, from_value, to_value};
+use std::collections::BTreeMap;
+
+/// Name and default of each row of the table in the README.
+fn documented() -> BTreeMap<String, String> {
+    let readme = include_str!("../README.md");
+    let (_, table) = readme.split_once("| setting | unit | range | default |").unwrap();
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let code = |cell: &str| cell.trim().trim_matches('`').to_owned();
+    rows.map(|row| {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').collect();
+        (code(cells[0]), code(cells[3]))
+    })
+    .collect()
+}
+
+#[test]
+fn every_setting_is_documented_with_its_default() {
+    let settings = flat(&to_value(&Configuration::DEFAULT).unwrap());
+    assert_eq!(documented(), settings.into_iter().collect::<BTreeMap<_, _>>());
+}
+
+#[test]
+fn rates_are_in_rad_per_second_and_exact() {
+    let mut configuration = Configuration::DEFAULT;
+    assert_eq!(from_value(to_value(&configuration).unwrap()).unwrap(), configuration);
+    for code in [0, 1, -1, 70_276_239, 70_276_241, 0x7FFF_FFFF, -0x8000_0000] {
+        configuration.compensate.max_single = AngularRate(code);
+        assert_eq!(from_value(to_value(&configuration).unwrap()).unwrap(), configuration, "{code}");
+    }
+}
+
+#[test]
+fn values_are_set_by_name() {
+    let mut value = to_value(&Configuration::DEFAULT).unwrap();
+    for setting in ["imu=Icm42688", "latitude_deg=48.1", "compensate.max_mean=0.1", "can.yaw.ids.2=419"] {
+        assign(&mut value, setting).unwrap();
+    }
+    let configuration = from_value(value.clone()).unwrap();
+    configuration.check().unwrap();
+    assert_eq!(configuration.compensate.max_mean, AngularRate::from_rad_per_sec(0.1).unwrap());
+    assert_eq!(configuration.can.yaw.unwrap().ids, [416, 417, 419]);
+    let refused = |setting: &str| {
+        let mut value = value.clone();
+        let assigned = assign(&mut value, setting);
+        assigned.and_then(|()| from_value(value)).unwrap_err().to_string()
+    };
+    assert_eq!(refused("imu"), "imu: not NAME=VALUE");
+    assert!(refused("latitude=1").contains("no such setting"));
+    // The board's own code for 3 deg/s.
+    assert_eq!(refused("compensate.max_mean=7027624"), "compensate.max_mean: 7027624 is not a rate in rad/s");
+    assert!(refused("imu=None").starts_with("no configuration: unknown variant"));
+}
