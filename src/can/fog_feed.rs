@@ -1,9 +1,11 @@
 //! The yaw messages of a fibre-optic gyro, which are sent while it is heard.
 
+use super::config::SAMPLE_MS;
 use super::e2e::{DataIdMode, P01, Profile};
+use super::load::Periodic;
 use super::yaw_feed::YawFeed;
 use crate::vehicle::YawSample;
-use embedded_can::Frame;
+use embedded_can::{Frame, Id, StandardId};
 use heapless::Vec;
 
 /// Rate, angle and detail for each sample, under E2E profile 1: each message's identifier is its
@@ -18,8 +20,20 @@ impl FogFeed {
     /// `ids`: 11 bits, of rate, angle and detail; [`super::yaw::FOG_IDS`] as we use them.
     #[must_use]
     pub fn new(ids: [u16; 3]) -> Self {
-        let profiles = ids.map(|data_id| Profile::P01(P01 { data_id, mode: DataIdMode::Both }));
-        Self { feed: YawFeed::new(profiles, 1), ids }
+        Self { feed: YawFeed::new(Self::profiles(ids), 1), ids }
+    }
+
+    /// The protection of each message.
+    #[must_use]
+    pub fn profiles(ids: [u16; 3]) -> [Profile; 3] {
+        ids.map(|data_id| Profile::P01(P01 { data_id, mode: DataIdMode::Both }))
+    }
+
+    /// Every message that is sent while the gyro is heard; none for identifiers of over 11 bits.
+    #[must_use]
+    pub fn messages(ids: [u16; 3]) -> Vec<Periodic, 3> {
+        let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS };
+        ids.into_iter().filter_map(StandardId::new).map(message).collect()
     }
 
     /// The frames of one sample, in a driver's own type.

@@ -87,6 +87,9 @@ fn json_is_json_and_quiet_is_quiet() {
     }
     let json: serde_json::Value = serde_json::from_slice(&gyronet(&["bus", "--json"]).stdout).unwrap();
     assert_eq!(json[0]["messages"][0]["id"], "174");
+    // Three more of the six frames' kind, while a fibre-optic gyro is heard.
+    assert_eq!((&json[0]["load_per_mille"], &json[1]["load_per_mille"]), (&162.into(), &243.into()));
+    assert_eq!(json[1]["messages"][8]["id"], "1A6");
 }
 
 #[test]

@@ -17,7 +17,7 @@ use embedded_can::{Id, StandardId};
 use heapless::Vec;
 
 /// Period of the samples, and of the messages whose layout fixes it.
-const SAMPLE_MS: u16 = (PERIOD_US / 1000) as u16;
+pub(super) const SAMPLE_MS: u16 = (PERIOD_US / 1000) as u16;
 /// Longest period of a message: a receiver's time-out is a few of them.
 const MAX_PERIOD_MS: u16 = 1000;
 /// Identifiers of diagnosis (ISO 15765-4), kept free for it.

@@ -3,67 +3,89 @@
 use super::{Common, print_json};
 use embedded_can::Id;
 use gyronet::can::config::{Config, Settings, Vdc2Settings};
+use gyronet::can::fog_feed::FogFeed;
+use gyronet::can::load::{Periodic, per_mille};
+use gyronet::can::yaw::FOG_IDS;
 use std::io::{self, Write};
 
 /// Print what is sent on CAN, and what it costs.
 ///
 /// For each configuration that comes with the library: identifiers, periods (ms), the load of the bus
-/// with as many stuff bits as there can be, and of SLCAN lines.
+/// with as many stuff bits as there can be, and of SLCAN lines. The messages of a fibre-optic gyro are
+/// sent while it is heard.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {}
 
 /// Rates of serial lines, bit/s.
 const LINES: [u32; 3] = [115_200, 460_800, 921_600];
 
+/// Messages that are sent together.
+struct Traffic {
+    name: &'static str,
+    messages: Vec<Periodic>,
+    bits_per_second: u32,
+}
+
+impl Traffic {
+    fn new(name: &'static str, config: &Config, further: &[Periodic]) -> Self {
+        let messages = config.messages().iter().chain(further).copied().collect();
+        Self { name, messages, bits_per_second: config.settings().bits_per_second }
+    }
+
+    fn bus_load(&self) -> u32 {
+        per_mille(&self.messages, Periodic::worst_case_bits, self.bits_per_second)
+    }
+
+    fn line_load(&self, line: u32, stamped: bool) -> u32 {
+        per_mille(&self.messages, |message| message.slcan_bits(stamped), line)
+    }
+}
+
 /// Runs the subcommand.
 pub fn run(_: &Args, common: Common) -> super::Result {
     let vdc2 = Some(Vdc2Settings { source: 0x80 });
     let all = Config::new(Settings { vdc2, ..Settings::DEFAULT })?;
-    let configs = [
-        ("default", Config::DEFAULT),
-        ("for SLCAN at 115200 bit/s", Config::SLCAN_115200),
-        ("default and J1939 VDC2", all),
+    let traffics = [
+        Traffic::new("default", &Config::DEFAULT, &[]),
+        Traffic::new("default, a fibre-optic gyro heard", &Config::DEFAULT, &FogFeed::messages(FOG_IDS)),
+        Traffic::new("for SLCAN at 115200 bit/s", &Config::SLCAN_115200, &[]),
+        Traffic::new("default and J1939 VDC2", &all, &[]),
     ];
     let mut out = io::stdout().lock();
     if common.json {
-        return print_json(&mut out, &configs.map(|(name, config)| json(name, &config)));
+        return print_json(&mut out, &traffics.each_ref().map(json));
     }
-    for (name, config) in configs {
-        writeln!(out, "{name}")?;
-        for message in config.messages() {
+    for traffic in &traffics {
+        writeln!(out, "{}", traffic.name)?;
+        for message in &traffic.messages {
             let id = hexadecimal(message.id);
             let (period, bits) = (message.period_ms, message.worst_case_bits());
             writeln!(out, "  {id:>8}  every {period:>2} ms  {bits} bits at worst")?;
         }
-        let rate = config.settings().bits_per_second;
-        writeln!(out, "  bus, {} kbit/s: {}", rate / 1_000, percent(config.bus_load_per_mille()))?;
+        let rate = traffic.bits_per_second;
+        writeln!(out, "  bus, {} kbit/s: {}", rate / 1_000, percent(traffic.bus_load()))?;
         for line in LINES {
-            let [plain, stamped] =
-                [false, true].map(|stamped| percent(config.line_load_per_mille(line, stamped)));
+            let [plain, stamped] = [false, true].map(|stamped| percent(traffic.line_load(line, stamped)));
             writeln!(out, "  SLCAN, {line} bit/s: {plain}, with time stamps {stamped}")?;
         }
     }
     Ok(())
 }
 
-fn json(name: &str, config: &Config) -> serde_json::Value {
-    let messages: Vec<_> = config
-        .messages()
-        .iter()
-        .map(|message| {
-            let (id, bits) = (hexadecimal(message.id), message.worst_case_bits());
-            serde_json::json!({ "id": id, "period_ms": message.period_ms, "worst_case_bits": bits })
-        })
-        .collect();
+fn json(traffic: &Traffic) -> serde_json::Value {
+    let messages = traffic.messages.iter().map(|message| {
+        let (id, bits) = (hexadecimal(message.id), message.worst_case_bits());
+        serde_json::json!({ "id": id, "period_ms": message.period_ms, "worst_case_bits": bits })
+    });
     let lines = LINES.map(|line| {
-        let [plain, stamped] = [false, true].map(|stamped| config.line_load_per_mille(line, stamped));
+        let [plain, stamped] = [false, true].map(|stamped| traffic.line_load(line, stamped));
         serde_json::json!({ "bits_per_second": line, "load_per_mille": plain, "load_with_stamps_per_mille": stamped })
     });
     serde_json::json!({
-        "name": name,
-        "messages": messages,
-        "bits_per_second": config.settings().bits_per_second,
-        "load_per_mille": config.bus_load_per_mille(),
+        "name": traffic.name,
+        "messages": messages.collect::<Vec<_>>(),
+        "bits_per_second": traffic.bits_per_second,
+        "load_per_mille": traffic.bus_load(),
         "slcan_lines": lines,
     })
 }
