@@ -41,7 +41,7 @@ fn a_good_line() {
     assert!((yaw - turned).abs() < 1e-6, "{yaw} {turned}");
     assert!((monitor.frames_per_second().expect("ten seconds") - 600.0).abs() < 1.0);
     assert!((monitor.state.rate.expect("known") - 50.0).abs() < 1e-5);
-    assert!((monitor.state.drop_in.expect("known") - 50.0).abs() < 0.006);
+    assert!((monitor.drop_in.expect("known") - 50.0).abs() < 0.006);
     let row = monitor.row(9.99);
     assert_eq!(row.split(',').count(), Monitor::HEADING.split(',').count());
     assert!(row.contains(",GyroNet,good,none,0.0000,,,"), "{row}");

@@ -6,16 +6,19 @@
 pub mod line;
 pub mod source;
 mod view;
+mod yaw_set;
 
 pub use view::fault_names;
+pub use yaw_set::State;
 
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
-use gyronet::can::e2e::{Checker, Fault, Sequence, Verdict};
+use gyronet::can::e2e::{Fault, Sequence, Verdict};
+use gyronet::can::fog_feed::FogFeed;
 use gyronet::can::j1939::{VDC2_PGN, Vdc2};
-use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, Quality, RateMessage};
-use gyronet::can::yaw::{SIGMA_UNKNOWN, Source};
+use gyronet::can::yaw::FOG_IDS;
+use yaw_set::{Part, YawSet};
 
 /// Loss of up to this many messages in a row is counted message by message.
 const MAX_DELTA: u8 = 10;
@@ -25,7 +28,7 @@ const PACE_SECONDS: f64 = 1.0;
 /// What happened to the messages so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Counts {
-    /// Frames that are ours.
+    /// Frames that are ours, those of a fibre-optic gyro included.
     pub frames: u64,
     /// Frames of others.
     pub foreign: u64,
@@ -41,66 +44,44 @@ pub struct Counts {
     pub unreadable: u64,
 }
 
-/// The newest values.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct State {
-    /// Corrected rate, deg/s, where available.
-    pub rate: Option<f64>,
-    /// Where it comes from, and what it is worth.
-    pub judgement: Option<(Source, Quality)>,
-    /// Yaw turned since the first angle message, deg, not wrapped.
-    pub yaw: Option<f64>,
-    /// What is wrong at present.
-    pub faults: Faults,
-    /// What was taken off, deg/s.
-    pub correction: Option<f64>,
-    /// Expected error, 1 sigma, deg/s.
-    pub sigma: Option<f64>,
-    /// From the sample to the message, ms.
-    pub latency: Option<f64>,
-    /// Yaw rate of the drop-in message, deg/s, where its status is good.
-    pub drop_in: Option<f64>,
-    /// Yaw rate of VDC2, deg/s, where it is one.
-    pub vdc2: Option<f64>,
-}
-
 /// Checks and reads our messages.
 #[derive(Debug, Clone)]
 pub struct Monitor {
-    /// Identifiers of rate, angle, detail, and their checks.
-    yaw: Vec<(Id, Checker)>,
+    own_set: Option<YawSet>,
+    fog_set: YawSet,
     bosch: [Sequence; LAYOUTS.len()],
-    last_yaw: Option<i32>,
-    turned: i64,
     /// Start of the second that is being counted, and frames in it.
     pace: Option<(f64, u32)>,
     frames_per_second: Option<f64>,
     stamp: Option<f64>,
     /// Accounts.
     pub counts: Counts,
-    /// Newest values.
+    /// Newest values of the board's own set.
     pub state: State,
+    /// Newest values of a fibre-optic gyro's set, once there was one.
+    pub fog: Option<State>,
+    /// Yaw rate of the drop-in message, deg/s, where its status is good.
+    pub drop_in: Option<f64>,
+    /// Yaw rate of VDC2, deg/s, where it is one.
+    pub vdc2: Option<f64>,
 }
 
 impl Monitor {
-    /// For messages sent with a configuration.
+    /// For messages sent with a configuration; those of a fibre-optic gyro are under [`FOG_IDS`].
     #[must_use]
     pub fn new(config: &Config) -> Self {
-        let yaw = config.settings().yaw.into_iter().flat_map(|yaw| {
-            let ids = yaw.ids.map(|id| StandardId::new(id).map(Id::Standard));
-            let checkers = yaw.e2e.profiles().map(|profile| Checker::new(profile, MAX_DELTA));
-            ids.into_iter().flatten().zip(checkers)
-        });
         Self {
-            yaw: yaw.collect(),
+            own_set: config.settings().yaw.map(|yaw| YawSet::new(yaw.ids, yaw.e2e.profiles())),
+            fog_set: YawSet::new(FOG_IDS, FogFeed::profiles(FOG_IDS)),
             bosch: [Sequence::new(16, MAX_DELTA); LAYOUTS.len()],
-            last_yaw: None,
-            turned: 0,
             pace: None,
             frames_per_second: None,
             stamp: None,
             counts: Counts::default(),
             state: State::default(),
+            fog: None,
+            drop_in: None,
+            vdc2: None,
         }
     }
 
@@ -128,20 +109,18 @@ impl Monitor {
         let (id, data) = (frame.id(), frame.data());
         if let Some(index) = LAYOUTS.iter().position(|layout| Id::Standard(layout.id) == id) {
             self.take_bosch(index, data);
-        } else if let Some(index) = self.yaw.iter().position(|(own, _)| *own == id) {
-            let verdict = self.yaw[index].1.check(data);
-            if self.account(verdict) {
-                match index {
-                    0 => self.take_rate(data),
-                    1 => self.take_angle(data),
-                    _ => self.take_detail(data),
-                }
-                return index == 2;
-            }
+        } else if let Some(set) = self.own_set.as_mut()
+            && let Some((part, verdict)) = set.take(id, data)
+        {
+            self.state = set.state();
+            return self.account(verdict) && part == Part::Detail;
+        } else if let Some((_, verdict)) = self.fog_set.take(id, data) {
+            self.fog = Some(self.fog_set.state());
+            self.account(verdict);
         } else if is_vdc2(id) {
             self.counts.frames += 1;
-            self.state.vdc2 = Vdc2::parse(data).ok().and_then(|message| message.yaw_rate_rad_per_sec());
-            self.state.vdc2 = self.state.vdc2.map(f64::to_degrees);
+            let rate = Vdc2::parse(data).ok().and_then(|message| message.yaw_rate_rad_per_sec());
+            self.vdc2 = rate.map(f64::to_degrees);
         } else {
             self.counts.foreign += 1;
         }
@@ -196,34 +175,7 @@ impl Monitor {
         let verdict = self.bosch[index].process(message.counter);
         if self.account(Ok(verdict)) && index == 0 {
             let good = message.rate_status == bosch::SignalStatus::OK;
-            self.state.drop_in = good.then(|| message.rate_deg_per_sec());
-        }
-    }
-
-    fn take_rate(&mut self, data: &[u8]) {
-        if let Ok(message) = RateMessage::parse(data) {
-            self.state.rate = message.deg_per_sec();
-            self.state.judgement = Some((message.source, message.quality));
-        }
-    }
-
-    fn take_angle(&mut self, data: &[u8]) {
-        if let Ok(message) = AngleMessage::parse(data) {
-            // The difference in 32 bits is the angle turned, lost messages included.
-            if let Some(last) = self.last_yaw.replace(message.yaw) {
-                self.turned += i64::from(message.yaw.wrapping_sub(last));
-            }
-            self.state.yaw = Some(self.turned as f64 * (360.0 / 4_294_967_296.0));
-            self.state.faults = message.faults;
-        }
-    }
-
-    fn take_detail(&mut self, data: &[u8]) {
-        if let Ok(message) = DetailMessage::parse(data) {
-            let DetailMessage { correction, sigma, .. } = message;
-            self.state.correction = Some(f64::from(correction) * 2e-4);
-            self.state.sigma = (sigma != SIGMA_UNKNOWN).then(|| f64::from(sigma) * 1e-5);
-            self.state.latency = message.latency_ms();
+            self.drop_in = good.then(|| message.rate_deg_per_sec());
         }
     }
 }

@@ -3,7 +3,9 @@
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
+use gyronet::can::fog_feed::FogFeed;
 use gyronet::can::slcan;
+use gyronet::can::yaw::FOG_IDS;
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
 use gyronet::vehicle::{PromptSample, VehicleSample, YawSample};
 use gyronet_tools::candump::Log;
@@ -89,6 +91,34 @@ fn a_log_is_summed_up_and_tabled() {
         let same = value(name) == text || value(name).parse::<f64>().ok() == text.parse().ok();
         assert!(same, "{name}: {} {text}", value(name));
     }
+}
+
+#[test]
+fn a_fibre_optic_gyro_is_a_second_block() {
+    let mut feed = FogFeed::new(FOG_IDS);
+    let rate = AngularRate::from_rad_per_sec(2_f32.to_radians()).unwrap();
+    let sample = |tick: i64| YawSample {
+        rate,
+        yaw: Yaw(i64::from(rate.0) * tick),
+        quality: gyronet::health::Quality::Good,
+        ..YawSample::default()
+    };
+    let mut all = frames(100);
+    all.extend((0..100).flat_map(|tick| feed.process::<DataFrame>(&sample(tick))));
+    // An angle of it.
+    all.remove(600 + 3 * 50 + 1);
+    let log = log("fog.log", &all);
+    let (_, out, err) = monitor(&[log.to_str().unwrap()]);
+    print!("{out}");
+    for part in
+        ["fibre-optic gyro:\n  yaw rate            2.000000 deg/s", "899, 0 of others", " 1, repeated 0"]
+    {
+        assert!(out.contains(part), "{part:?} in {out}{err}");
+    }
+    let (_, out, err) = monitor(&[log.to_str().unwrap(), "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).expect(&err);
+    assert_eq!((&json["rate_deg_per_s"], &json["fog"]["rate_deg_per_s"]), (&1.0.into(), &2.0.into()));
+    assert!((json["fog"]["yaw_deg"].as_f64().unwrap() - 1.98).abs() < 1e-6, "{json}");
 }
 
 #[test]

@@ -23,6 +23,8 @@ const ONCE: Duration = Duration::from_secs(10);
 /// The messages are checked as an ECU would: yaw rate, yaw, source, quality, faults, and what was
 /// lost, repeated or damaged on the way. On a terminal a live picture; elsewhere, and with --json, a
 /// line a second. A log is read to its end, then summed up. Ctrl-C ends with the sum, exit status 0.
+/// A fibre-optic gyro's messages make a second block, and `fog` in JSON; the table has the first alone.
+/// Identifiers and protection are those of the default configuration.
 /// Times are the input's own where it has some, else since the start.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\

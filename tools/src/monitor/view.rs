@@ -34,6 +34,22 @@ fn rounded(value: Option<f64>, decimals: usize) -> Option<f64> {
     value.and_then(|value| format!("{value:.decimals$}").parse().ok())
 }
 
+/// A set of messages as JSON.
+fn values(state: &State) -> serde_json::Value {
+    let (source, quality) = judgement(state);
+    serde_json::json!({
+        "rate_deg_per_s": rounded(state.rate, 6), "yaw_deg": rounded(state.yaw, 8),
+        "source": source, "quality": quality, "faults": fault_names(state.faults),
+        "correction_deg_per_s": rounded(state.correction, 4), "sigma_deg_per_s": rounded(state.sigma, 5),
+        "latency_ms": rounded(state.latency, 1),
+    })
+}
+
+fn judgement(state: &State) -> (String, String) {
+    let Some((source, quality)) = state.judgement else { return ("-".into(), "-".into()) };
+    (format!("{source:?}"), format!("{quality:?}").to_lowercase())
+}
+
 impl Monitor {
     /// Heading of the table that [`Monitor::row`] gives a line of.
     pub const HEADING: &str = "time_s,rate_deg_per_s,yaw_deg,source,quality,faults,correction_deg_per_s,\
@@ -46,8 +62,8 @@ impl Monitor {
         let known = |value: Option<f64>, decimals: usize| {
             value.map(|value| format!("{value:.decimals$}")).unwrap_or_default()
         };
-        let (source, quality) = self.judgement();
-        let State { rate, yaw, faults, correction, sigma, latency, drop_in, .. } = self.state;
+        let (source, quality) = judgement(&self.state);
+        let State { rate, yaw, faults, correction, sigma, latency, .. } = self.state;
         let Counts { lost, repeated, out_of_sequence, damaged, unreadable, .. } = self.counts;
         format!(
             "{time:.6},{},{},{source},{quality},{},{},{},{},{},{lost},{repeated},{out_of_sequence},{damaged},{unreadable}",
@@ -57,31 +73,38 @@ impl Monitor {
             known(correction, 4),
             known(sigma, 5),
             known(latency, 1),
-            known(drop_in, 3),
+            known(self.drop_in, 3),
         )
     }
 
-    /// The newest values and all counts as one line of JSON; names, units and decimals as in
+    /// The newest values, a fibre-optic gyro's too, and all counts as one line of JSON; names, units and decimals as in
     /// [`Monitor::row`], null where not known.
     #[must_use]
     pub fn json(&self, time: f64) -> serde_json::Value {
-        let (source, quality) = self.judgement();
-        let State { rate, yaw, faults, correction, sigma, latency, drop_in, vdc2, .. } = self.state;
         let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
-        serde_json::json!({
-            "time_s": rounded(Some(time), 6), "rate_deg_per_s": rounded(rate, 6), "yaw_deg": rounded(yaw, 8),
-            "source": source, "quality": quality, "faults": fault_names(faults),
-            "correction_deg_per_s": rounded(correction, 4), "sigma_deg_per_s": rounded(sigma, 5),
-            "latency_ms": rounded(latency, 1), "drop_in_deg_per_s": rounded(drop_in, 3),
-            "vdc2_deg_per_s": rounded(vdc2, 4), "frames": frames, "foreign": foreign, "lost": lost,
-            "repeated": repeated, "out_of_sequence": out_of_sequence, "damaged": damaged, "unreadable": unreadable,
-        })
+        let mut all = values(&self.state);
+        for (name, value) in [
+            ("time_s", rounded(Some(time), 6).into()),
+            ("drop_in_deg_per_s", rounded(self.drop_in, 3).into()),
+            ("vdc2_deg_per_s", rounded(self.vdc2, 4).into()),
+            ("fog", self.fog.as_ref().map(values).into()),
+            ("frames", frames.into()),
+            ("foreign", foreign.into()),
+            ("lost", lost.into()),
+            ("repeated", repeated.into()),
+            ("out_of_sequence", out_of_sequence.into()),
+            ("damaged", damaged.into()),
+            ("unreadable", unreadable.into()),
+        ] {
+            all[name] = value;
+        }
+        all
     }
 
     /// The newest values as one line for people.
     #[must_use]
     pub fn line(&self, time: f64) -> String {
-        let (source, quality) = self.judgement();
+        let (source, quality) = judgement(&self.state);
         let Counts { lost, repeated, out_of_sequence, damaged, unreadable, .. } = self.counts;
         format!(
             "{time:.1} s: rate {} deg/s, yaw {} deg, {source}, {quality}, faults {}, {} frames/s, lost {lost}, \
@@ -92,18 +115,13 @@ impl Monitor {
             number(self.frames_per_second, 1),
         )
     }
-
-    fn judgement(&self) -> (String, String) {
-        let Some((source, quality)) = self.state.judgement else { return ("-".into(), "-".into()) };
-        (format!("{source:?}"), format!("{quality:?}").to_lowercase())
-    }
 }
 
 /// A few lines for a terminal.
 impl fmt::Display for Monitor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (source, quality) = self.judgement();
-        let State { rate, yaw, faults, correction, sigma, latency, drop_in, vdc2, .. } = self.state;
+        let (source, quality) = judgement(&self.state);
+        let State { rate, yaw, faults, correction, sigma, latency, .. } = self.state;
         let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
         let mut value = |name: &str, value: Option<f64>, decimals, unit: &str| {
             writeln!(f, "{name:<16}{:>14} {unit}", number(value, decimals))
@@ -112,13 +130,21 @@ impl fmt::Display for Monitor {
         value("expected error", sigma, 5, "deg/s")?;
         value("yaw", yaw, 6, "deg")?;
         value("correction", correction, 4, "deg/s")?;
-        value("drop-in rate", drop_in, 3, "deg/s")?;
-        if vdc2.is_some() {
-            value("VDC2 rate", vdc2, 4, "deg/s")?;
+        value("drop-in rate", self.drop_in, 3, "deg/s")?;
+        if self.vdc2.is_some() {
+            value("VDC2 rate", self.vdc2, 4, "deg/s")?;
         }
         value("latency", latency, 1, "ms")?;
         writeln!(f, "{:<16}{source:>14}, {quality}", "source")?;
         writeln!(f, "{:<16}{:>14}", "faults", fault_names(faults))?;
+        if let Some(fog) = &self.fog {
+            let (source, quality) = judgement(fog);
+            writeln!(f, "fibre-optic gyro:")?;
+            writeln!(f, "{:<16}{:>14} deg/s", "  yaw rate", number(fog.rate, 6))?;
+            writeln!(f, "{:<16}{:>14} deg", "  yaw", number(fog.yaw, 6))?;
+            writeln!(f, "{:<16}{source:>14}, {quality}", "  source")?;
+            writeln!(f, "{:<16}{:>14}", "  faults", fault_names(fog.faults))?;
+        }
         let pace = number(self.frames_per_second, 1);
         writeln!(f, "{:<16}{frames:>14}, {foreign} of others, {pace} a second", "messages")?;
         writeln!(f, "{:<16}{lost:>14}, repeated {repeated}, out of sequence {out_of_sequence}", "lost")?;

@@ -1,0 +1,101 @@
+//! A set of yaw messages, rate, angle and detail: checked, and read.
+
+use super::MAX_DELTA;
+use embedded_can::{Id, StandardId};
+use gyronet::can::e2e::{Checker, Fault, Profile, Verdict};
+use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, Quality, RateMessage};
+use gyronet::can::yaw::{SIGMA_UNKNOWN, Source};
+
+/// The newest values of a set.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct State {
+    /// Corrected rate, deg/s, where available.
+    pub rate: Option<f64>,
+    /// Where it comes from, and what it is worth.
+    pub judgement: Option<(Source, Quality)>,
+    /// Yaw turned since the first angle message, deg, not wrapped.
+    pub yaw: Option<f64>,
+    /// What is wrong at present.
+    pub faults: Faults,
+    /// What was taken off, deg/s.
+    pub correction: Option<f64>,
+    /// Expected error, 1 sigma, deg/s.
+    pub sigma: Option<f64>,
+    /// From the sample to the message, ms.
+    pub latency: Option<f64>,
+}
+
+/// Which message of a set it was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    Rate,
+    Angle,
+    /// The last one of a sample.
+    Detail,
+}
+
+/// Three messages, and what they have said.
+#[derive(Debug, Clone)]
+pub(super) struct YawSet {
+    messages: Vec<(Id, Part, Checker)>,
+    last_yaw: Option<i32>,
+    turned: i64,
+    state: State,
+}
+
+impl YawSet {
+    /// Identifiers and protection of rate, angle, detail.
+    pub(super) fn new(ids: [u16; 3], profiles: [Profile; 3]) -> Self {
+        let checkers = profiles.map(|profile| Checker::new(profile, MAX_DELTA));
+        let parts = [Part::Rate, Part::Angle, Part::Detail].into_iter().zip(checkers);
+        let messages = ids.into_iter().zip(parts).filter_map(|(id, (part, checker))| {
+            StandardId::new(id).map(|id| (Id::Standard(id), part, checker))
+        });
+        Self { messages: messages.collect(), last_yaw: None, turned: 0, state: State::default() }
+    }
+
+    pub(super) fn state(&self) -> State {
+        self.state
+    }
+
+    /// Checks a message, and reads it where it may be used; `None` where it is none of the set.
+    pub(super) fn take(&mut self, id: Id, data: &[u8]) -> Option<(Part, Result<Verdict, Fault>)> {
+        let (_, part, checker) = self.messages.iter_mut().find(|(own, ..)| *own == id)?;
+        let (part, verdict) = (*part, checker.check(data));
+        if verdict.is_ok_and(Verdict::usable) {
+            match part {
+                Part::Rate => self.take_rate(data),
+                Part::Angle => self.take_angle(data),
+                Part::Detail => self.take_detail(data),
+            }
+        }
+        Some((part, verdict))
+    }
+
+    fn take_rate(&mut self, data: &[u8]) {
+        if let Ok(message) = RateMessage::parse(data) {
+            self.state.rate = message.deg_per_sec();
+            self.state.judgement = Some((message.source, message.quality));
+        }
+    }
+
+    fn take_angle(&mut self, data: &[u8]) {
+        if let Ok(message) = AngleMessage::parse(data) {
+            // The difference in 32 bits is the angle turned, lost messages included.
+            if let Some(last) = self.last_yaw.replace(message.yaw) {
+                self.turned += i64::from(message.yaw.wrapping_sub(last));
+            }
+            self.state.yaw = Some(self.turned as f64 * (360.0 / 4_294_967_296.0));
+            self.state.faults = message.faults;
+        }
+    }
+
+    fn take_detail(&mut self, data: &[u8]) {
+        if let Ok(message) = DetailMessage::parse(data) {
+            let DetailMessage { correction, sigma, .. } = message;
+            self.state.correction = Some(f64::from(correction) * 2e-4);
+            self.state.sigma = (sigma != SIGMA_UNKNOWN).then(|| f64::from(sigma) * 1e-5);
+            self.state.latency = message.latency_ms();
+        }
+    }
+}
