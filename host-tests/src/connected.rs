@@ -190,7 +190,14 @@ pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step
     Outcome { host, followed, sent: sent.len(), counters }
 }
 
-fn counters(device: &mut Device<Line>) -> AllCounters {
+/// What the board has counted by now.
+///
+/// # Panics
+/// Where it does not answer.
+pub fn counters(device: &mut Device<Line>) -> AllCounters {
+    // Idle copies the counters before it looks for a question: where the output task came in
+    // between, the answer is older than that. The next one is not.
+    let _ = device.ask(&Request::Counters);
     match device.ask(&Request::Counters) {
         Ok(Reply::Counters(counters)) => counters,
         other => panic!("no counters: {other:?}"),

@@ -5,8 +5,7 @@
 use gyronet::sample::RATE_HZ;
 use gyronet::sensor::xsens::MtData2;
 use gyronet::service::message::AllCounters;
-use gyronet::service::{Reply, Request};
-use gyronet_host_tests::{image, qemu, replay};
+use gyronet_host_tests::{connected, image, qemu, replay};
 use gyronet_tools::device::{Device, line::Line};
 use gyronet_tools::simulate::{Config, Simulation};
 use std::time::{Duration, Instant};
@@ -49,9 +48,7 @@ fn soak(test: &str, minutes: u32) {
     }
     let address = board.serve(SERVICE).to_string();
     let mut device = Device::new(Line::open(&address).expect("a port of QEMU"), &address);
-    let Ok(Reply::Counters(AllCounters { pipeline, lines, .. })) = device.ask(&Request::Counters) else {
-        panic!("no counters")
-    };
+    let AllCounters { pipeline, lines, .. } = connected::counters(&mut device);
     println!("{test}: {pipeline:?} {lines:?}");
     assert_eq!(pipeline.samples, samples);
     let windows = (samples - 300) / 5;
