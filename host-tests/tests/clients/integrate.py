@@ -12,19 +12,21 @@ import cantools
 PERIOD_S = 0.01
 DROP_IN_LSB = 0.005
 WRAP = 360.0
+# The answer to a question comes behind all frames that wait to be read: a megabyte, a byte a call.
+LIMIT_S = 300
 
 channel, dbc, samples = sys.argv[1], sys.argv[2], int(sys.argv[3])
 database = cantools.database.load_file(dbc)
 bus = can.Bus(interface="slcan", channel=channel, bitrate=500000, sleep_after_open=0.1)
-print("version", *bus.get_version(timeout=30))
-print("serial", bus.get_serial_number(timeout=30))
+print("version", *bus.get_version(timeout=LIMIT_S))
+print("serial", bus.get_serial_number(timeout=LIMIT_S))
 drop_in = full = plain = turned = last = 0.0
 counters = set()
 details = frames = good = 0
 quality = None
 names = {}
 while details < samples:
-    message = bus.recv(timeout=30)
+    message = bus.recv(timeout=LIMIT_S)
     if message is None:
         sys.exit(f"silence after {frames} frames")
     frames += 1
