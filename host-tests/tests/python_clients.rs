@@ -16,7 +16,7 @@ use gyronet::vehicle::VehicleSample;
 use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::{image, qemu, replay, synthetic};
 use std::collections::BTreeMap;
-use std::io::{self, Read, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::Command;
@@ -49,22 +49,35 @@ fn parked(tick: u32, yaw: &mut Yaw) -> VehicleSample {
     synthetic::vehicle(tick, rate, *yaw)
 }
 
-/// The board: answers between frames, sends whatever it is told.
+/// The board until the client is gone, and what it has turned.
 fn serve(mut stream: TcpStream, config: Config, samples: u32) -> io::Result<Yaw> {
+    let mut yaw = Yaw::default();
+    match converse(&mut stream, config, samples, &mut yaw) {
+        // Gone with the answer to its last words unread.
+        Err(error) if !matches!(error.kind(), ErrorKind::ConnectionReset | ErrorKind::BrokenPipe) => {
+            Err(error)
+        }
+        _ => Ok(yaw),
+    }
+}
+
+/// Answers between frames, and behind the last one: a slow client asks then.
+fn converse(stream: &mut TcpStream, config: Config, samples: u32, yaw: &mut Yaw) -> io::Result<()> {
     let mut feeds = Feeds::new(config);
     let mut session = Session::new(config.settings().bits_per_second);
     let mut assembler = LineAssembler::new();
-    let mut yaw = Yaw::default();
     // A board sends from the start; here the client must not miss the first frame, since the
     // sums are compared.
     let mut opened = false;
     let mut tick = 0;
-    while tick < samples {
+    loop {
+        let sending = opened && tick < samples;
         let mut bytes = [0; 64];
-        stream.set_nonblocking(opened)?;
+        stream.set_nonblocking(sending)?;
         let count = match stream.read(&mut bytes) {
+            Ok(0) => return Ok(()),
             Ok(count) => count,
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => 0,
+            Err(error) if error.kind() == ErrorKind::WouldBlock => 0,
             Err(error) => return Err(error),
         };
         stream.set_nonblocking(false)?;
@@ -74,16 +87,13 @@ fn serve(mut stream: TcpStream, config: Config, samples: u32) -> io::Result<Yaw>
                 stream.write_all(&session.process(line, StatusFlags::default()).answer)?;
             }
         }
-        if opened {
-            for frame in feeds.process::<DataFrame>(&parked(tick, &mut yaw)) {
+        if sending {
+            for frame in feeds.process::<DataFrame>(&parked(tick, yaw)) {
                 stream.write_all(&slcan::emit(&frame).expect("a data frame"))?;
             }
             tick += 1;
         }
     }
-    // Until the client is gone; it may say something more.
-    while stream.read(&mut [0; 64]).is_ok_and(|count| count > 0) {}
-    Ok(yaw)
 }
 
 #[test]
