@@ -4,6 +4,7 @@ use embedded_can::{Frame, StandardId};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
+use gyronet::can::slcan::host::StatusFlags;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::sample::PERIOD_US;
@@ -160,6 +161,23 @@ fn commands_are_answered_between_frames() {
     );
     assert_eq!(taken.len(), 1);
     assert_eq!(taken[0].data(), [0x1A, 0x6F]);
+}
+
+#[test]
+fn the_bus_state_is_told_beside_drops() {
+    let mut port = Port::<1>::new(500_000);
+    let mut line = Line { room: 1_000, ..Line::default() };
+    port.set_bus(StatusFlags::BUS_ERROR);
+    (0..2).for_each(|number| port.push(frame(number), Micros(0)));
+    line.received.extend(b"F\rF\r");
+    port.service(&mut line, |_| ()).expect("the line holds");
+    // The drop once, the bus as long as it is off.
+    assert!(line.sent.starts_with(b"F82\rF80\r"), "{}", line.sent.escape_ascii());
+    port.set_bus(StatusFlags::default());
+    line.sent.clear();
+    line.received.extend(b"F\r");
+    port.service(&mut line, |_| ()).expect("the line holds");
+    assert_eq!(line.sent, b"F00\r");
 }
 
 #[test]

@@ -4,6 +4,7 @@ use crate::chip::bus::Bus;
 use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::queue::TransmitQueue;
+use gyronet::can::slcan::host::StatusFlags;
 use gyronet::can::slcan::port::Port;
 use gyronet::units::Micros;
 
@@ -35,6 +36,7 @@ impl Outgoing {
 
     /// Sends what the lines take; gives what a host has sent over SLCAN.
     pub fn service(&mut self, take: impl FnMut(DataFrame)) {
+        self.port.set_bus(if self.off() { StatusFlags::BUS_ERROR } else { StatusFlags::default() });
         // A byte that the line lost is answered as a bad line, or missing in it.
         let _ = self.port.service(&mut self.slcan, take);
         if let Some(can) = self.can.as_mut() {

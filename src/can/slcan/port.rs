@@ -35,6 +35,7 @@ pub struct Port<const N: usize> {
     taken: usize,
     /// Drops that the host has been told of.
     told: u32,
+    bus: StatusFlags,
 }
 
 impl<const N: usize> Port<N> {
@@ -50,7 +51,13 @@ impl<const N: usize> Port<N> {
             line: Vec::new(),
             taken: 0,
             told: 0,
+            bus: StatusFlags(0),
         }
+    }
+
+    /// What the command `F` says of the bus beyond this line, beside frames that gave way here.
+    pub fn set_bus(&mut self, flags: StatusFlags) {
+        self.bus = flags;
     }
 
     /// Puts a frame at the end; the oldest one gives way. `time` is its stamp, should the host
@@ -65,8 +72,8 @@ impl<const N: usize> Port<N> {
         let reaction = match self.assembler.push(byte)? {
             Ok(line) => {
                 let told = if line == b"F" { core::mem::replace(&mut self.told, dropped) } else { dropped };
-                let flags = if told < dropped { StatusFlags::TRANSMIT_FULL } else { StatusFlags::default() };
-                self.session.process(line, flags)
+                let full = if told < dropped { StatusFlags::TRANSMIT_FULL.0 } else { 0 };
+                self.session.process(line, StatusFlags(self.bus.0 | full))
             }
             Err(TooLong) => self.session.refuse(),
         };
