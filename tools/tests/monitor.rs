@@ -111,7 +111,7 @@ fn a_fibre_optic_gyro_is_a_second_block() {
     let (_, out, err) = monitor(&[log.to_str().unwrap()]);
     print!("{out}");
     for part in
-        ["fibre-optic gyro:\n  yaw rate            2.000000 deg/s", "899, 0 of others", " 1, repeated 0"]
+        ["fibre-optic gyro\nyaw rate              2.000000 deg/s", "899, 0 of others", " 1, repeated 0"]
     {
         assert!(out.contains(part), "{part:?} in {out}{err}");
     }

@@ -117,37 +117,45 @@ impl Monitor {
     }
 }
 
+/// A line for a terminal: what it is, its value, and what is to be said of that.
+fn row(
+    f: &mut fmt::Formatter<'_>,
+    name: &str,
+    value: impl fmt::Display,
+    more: impl fmt::Display,
+) -> fmt::Result {
+    writeln!(f, "{name:<16}{value:>14}{more}")
+}
+
+/// What a set of messages says of the rate.
+fn rows(f: &mut fmt::Formatter<'_>, state: &State) -> fmt::Result {
+    let (source, quality) = judgement(state);
+    row(f, "yaw rate", number(state.rate, 6), " deg/s")?;
+    row(f, "yaw", number(state.yaw, 6), " deg")?;
+    row(f, "source", source, format_args!(", {quality}"))?;
+    row(f, "faults", fault_names(state.faults), "")
+}
+
 /// A few lines for a terminal.
 impl fmt::Display for Monitor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (source, quality) = judgement(&self.state);
-        let State { rate, yaw, faults, correction, sigma, latency, .. } = self.state;
+        let State { correction, sigma, latency, .. } = self.state;
         let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
-        let mut value = |name: &str, value: Option<f64>, decimals, unit: &str| {
-            writeln!(f, "{name:<16}{:>14} {unit}", number(value, decimals))
-        };
-        value("yaw rate", rate, 6, "deg/s")?;
-        value("expected error", sigma, 5, "deg/s")?;
-        value("yaw", yaw, 6, "deg")?;
-        value("correction", correction, 4, "deg/s")?;
-        value("drop-in rate", self.drop_in, 3, "deg/s")?;
+        rows(f, &self.state)?;
+        row(f, "expected error", number(sigma, 5), " deg/s")?;
+        row(f, "correction", number(correction, 4), " deg/s")?;
+        row(f, "latency", number(latency, 1), " ms")?;
+        row(f, "drop-in rate", number(self.drop_in, 3), " deg/s")?;
         if self.vdc2.is_some() {
-            value("VDC2 rate", self.vdc2, 4, "deg/s")?;
-        }
-        value("latency", latency, 1, "ms")?;
-        writeln!(f, "{:<16}{source:>14}, {quality}", "source")?;
-        writeln!(f, "{:<16}{:>14}", "faults", fault_names(faults))?;
-        if let Some(fog) = &self.fog {
-            let (source, quality) = judgement(fog);
-            writeln!(f, "fibre-optic gyro:")?;
-            writeln!(f, "{:<16}{:>14} deg/s", "  yaw rate", number(fog.rate, 6))?;
-            writeln!(f, "{:<16}{:>14} deg", "  yaw", number(fog.yaw, 6))?;
-            writeln!(f, "{:<16}{source:>14}, {quality}", "  source")?;
-            writeln!(f, "{:<16}{:>14}", "  faults", fault_names(fog.faults))?;
+            row(f, "VDC2 rate", number(self.vdc2, 4), " deg/s")?;
         }
         let pace = number(self.frames_per_second, 1);
-        writeln!(f, "{:<16}{frames:>14}, {foreign} of others, {pace} a second", "messages")?;
-        writeln!(f, "{:<16}{lost:>14}, repeated {repeated}, out of sequence {out_of_sequence}", "lost")?;
-        writeln!(f, "{:<16}{damaged:>14}, unreadable lines {unreadable}", "damaged")
+        row(f, "messages", frames, format_args!(", {foreign} of others, {pace} a second"))?;
+        row(f, "lost", lost, format_args!(", repeated {repeated}, out of sequence {out_of_sequence}"))?;
+        row(f, "damaged", damaged, format_args!(", unreadable lines {unreadable}"))?;
+        self.fog.as_ref().map_or(Ok(()), |fog| {
+            writeln!(f, "fibre-optic gyro")?;
+            rows(f, fog)
+        })
     }
 }
