@@ -3,7 +3,7 @@
 use super::{Device, Drives, MappedSlots};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
-use crate::store::{Accepted, Configuration, FieldError, Record, Store, StoreError};
+use crate::store::{Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
@@ -51,34 +51,33 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     fn load(&mut self, mut store: Store<R>) {
         let found = store.get::<Configuration>();
-        match found.and_then(|found| found.map(|found| self.drivable(&found).map(|()| found)).transpose()) {
-            Ok(Some(configuration)) => {
-                self.configuration = configuration;
-                self.configuration_origin = Origin::Stored;
-            }
-            Ok(None) => {}
-            Err(error) => {
-                self.configuration_origin = Origin::Refused(error);
-                self.refuse(EventKind::ConfigurationRefused(error));
-            }
-        }
-        match store.get() {
-            Ok(Some(calibration)) => {
-                self.calibration = calibration;
-                self.calibration_origin = Origin::Stored;
-            }
-            Ok(None) => {}
-            Err(error) => {
-                self.calibration_origin = Origin::Refused(error);
-                self.refuse(EventKind::CalibrationRefused(error));
-            }
-        }
-        match store.get() {
-            Ok(accepted) => self.accepted = accepted.unwrap_or(Accepted::NONE),
-            Err(error) => self.refuse(EventKind::AcceptedRefused(error)),
-        }
+        let drivable = |found: Configuration| self.drivable(&found).map(|()| found);
+        let found = found.and_then(|found| found.map(drivable).transpose());
+        let (configuration, origin) = self.take(found, EventKind::ConfigurationRefused);
+        (self.configuration, self.configuration_origin) =
+            (configuration.unwrap_or(Configuration::DEFAULT), origin);
+        let (calibration, origin) = self.take(store.get(), EventKind::CalibrationRefused);
+        (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
+        let (accepted, _) = self.take(store.get(), EventKind::AcceptedRefused);
+        self.accepted = accepted.unwrap_or(Accepted::NONE);
         self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
         self.store = self.writable.then_some(store);
+    }
+
+    /// A record that was read, and what is to be said of where it comes from.
+    fn take<T>(
+        &mut self,
+        found: Result<Option<T>, StoreError>,
+        refused: fn(StoreError) -> EventKind,
+    ) -> (Option<T>, Origin) {
+        match found {
+            Ok(Some(record)) => (Some(record), Origin::Stored),
+            Ok(None) => (None, Origin::BuiltIn),
+            Err(error) => {
+                self.refuse(refused(error));
+                (None, Origin::Refused(error))
+            }
+        }
     }
 
     fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
