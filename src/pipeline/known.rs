@@ -43,6 +43,16 @@ impl Pipeline {
         self.damaged();
     }
 
+    /// Begins to learn the bias anew where it is not what it was.
+    pub(super) fn check_bias(&mut self) {
+        if self.zero_rate().is_some_and(|zero_rate| !zero_rate.is_whole()) {
+            self.damaged();
+            if let Some(known) = &mut self.known {
+                known.zero_rate = self.config.zero_rate.map(ZeroRate::new);
+            }
+        }
+    }
+
     /// Tells that memory has changed.
     #[cold]
     pub(super) fn damaged(&mut self) {

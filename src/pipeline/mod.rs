@@ -265,12 +265,7 @@ impl Pipeline {
             self.since_window += 1;
         }
         let settled = self.compensator.settled();
-        if self.zero_rate().is_some_and(|zero_rate| !zero_rate.is_whole()) {
-            self.damaged();
-            if let Some(known) = &mut self.known {
-                known.zero_rate = self.config.zero_rate.map(ZeroRate::new);
-            }
-        }
+        self.check_bias();
         self.update_bias(settled.as_ref(), AngularRate(rate), quiet, sample);
         let bias = self.bias();
         let stands = self.stood as usize > self.config.compensate.lag.samples();

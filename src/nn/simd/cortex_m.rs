@@ -2,8 +2,9 @@
 //!
 //! # Where the work is
 //! A GyroNet window is 1.12 million multiply-accumulates (1.18 by its shape, but the first step has
-//! no recurrent product), 54 % of them in input projections and 46 % in recurrent products. SMLAD does two in a cycle; the rest is getting int8 weights into
-//! its halfwords. Two rows share a halfword ([`crate::nn`]), which makes it
+//! no recurrent product), 54 % of them in input projections and 46 % in recurrent products. SMLAD
+//! does two in a cycle; the rest is getting int8 weights into its halfwords. Two rows share a
+//! halfword ([`crate::nn`]), which makes it
 //!
 //! | per column pair | instructions | cycles |
 //! |---|---|---|

@@ -1,9 +1,9 @@
 //! Reading and changing the board's configuration.
 
-use super::{Board, done, mismatch, print_json};
+use super::{Board, done, mismatch};
 use gyronet::service::{Reply, Request};
 use gyronet::store::{Configuration, Record};
-use gyronet_tools::device::settings::{assign, flat, from_value, to_value};
+use gyronet_tools::device::settings::{assign, from_value, to_value};
 use std::path::Path;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -21,14 +21,7 @@ pub fn get(device: &mut Board) -> Result<Configuration> {
 }
 
 pub fn print(configuration: &Configuration, json: bool) -> Result<()> {
-    let value = to_value(configuration)?;
-    if json {
-        return print_json(&value);
-    }
-    for (name, value) in flat(&value) {
-        println!("{name} = {value}");
-    }
-    Ok(())
+    super::print_value(&to_value(configuration)?, json)
 }
 
 /// Changes what the board has now, value by value, or replaces it.
