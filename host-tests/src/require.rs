@@ -5,6 +5,7 @@
 //! error, which the test harness does not capture: a plain `cargo test` shows it.
 
 use std::io::Write;
+use std::process::Command;
 
 /// Names what must be there, separated by commas.
 pub const VARIABLE: &str = "GYRONET_REQUIRE";
@@ -85,6 +86,20 @@ fn say(test: &str, why: &str, out: &mut impl Write) {
 /// When it was not found and is required, or the list has an unknown word.
 pub fn wants<T>(test: &str, need: Need, found: Result<T, String>) -> Option<T> {
     Required::from_env().wants(test, need, found, &mut std::io::stderr())
+}
+
+/// The Python with these packages: `GYRONET_PYTHON`, or `python3`.
+///
+/// # Panics
+/// As [`wants`].
+#[must_use]
+pub fn python(test: &str, packages: &[&str]) -> Option<String> {
+    let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let packages = packages.join(", ");
+    let check = Command::new(&python).args(["-c", &format!("import {packages}")]).output();
+    let there = check.is_ok_and(|output| output.status.success());
+    let found = there.then(|| python.clone()).ok_or_else(|| format!("{python} has not all of {packages}"));
+    wants(test, Need::Python, found)
 }
 
 #[cfg(test)]

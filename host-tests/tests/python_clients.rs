@@ -13,7 +13,7 @@ use gyronet::can::{DataFrame, slcan};
 use gyronet::compensate::Lag;
 use gyronet::units::{AngularRate, Yaw};
 use gyronet::vehicle::VehicleSample;
-use gyronet_host_tests::require::{self, Need};
+use gyronet_host_tests::require;
 use gyronet_host_tests::{image, qemu, replay, synthetic};
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind, Read, Write};
@@ -31,16 +31,7 @@ const FLOATS: f64 = 1e-8;
 const LIMIT: Duration = Duration::from_secs(60);
 const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 
-fn python(test: &str) -> Option<String> {
-    let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let check = Command::new(&python).args(["-c", "import can, serial, cantools"]).output();
-    let found = if check.is_ok_and(|output| output.status.success()) {
-        Ok(python)
-    } else {
-        Err(format!("{python} has no python-can, pyserial and cantools"))
-    };
-    require::wants(test, Need::Python, found)
-}
+const PACKAGES: &[&str] = &["can", "serial", "cantools"];
 
 /// A parked car that seems to turn at 0.001 deg/s.
 fn parked(tick: u32, yaw: &mut Yaw) -> VehicleSample {
@@ -98,7 +89,7 @@ fn converse(stream: &mut TcpStream, config: Config, samples: u32, yaw: &mut Yaw)
 
 #[test]
 fn the_whole_angle_of_a_minute() {
-    let Some(python) = python("the_whole_angle_of_a_minute") else { return };
+    let Some(python) = require::python("the_whole_angle_of_a_minute", PACKAGES) else { return };
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = listener.local_addr().expect("a port");
     let board = std::thread::spawn(move || serve(listener.accept()?.0, Config::DEFAULT, MINUTE));
@@ -125,7 +116,7 @@ fn the_board_for_ten_minutes() {
 /// The image in QEMU, a car that is parked and a gyro whose error goes up by 0.001 deg/s when its
 /// bias has just been taken.
 fn board(test: &str, samples: u32) {
-    let Some(python) = python(test) else { return };
+    let Some(python) = require::python(test, PACKAGES) else { return };
     let Some(elf) = image::coprocessor(test, env!("CARGO_TARGET_TMPDIR")) else { return };
     let mut board = qemu::Board::boot(&elf, 2, &[]);
     let address = board.serve(2);

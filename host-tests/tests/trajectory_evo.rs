@@ -3,22 +3,13 @@
 
 use gyronet::odometry::Track;
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::require::{self, Need};
+use gyronet_host_tests::require;
 use gyronet_tools::trajectory_error::{Point, TrajectoryError};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-fn python(test: &str) -> Option<String> {
-    let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let check = Command::new(&python).args(["-c", "import evo, numpy"]).output();
-    let found = if check.is_ok_and(|output| output.status.success()) {
-        Ok(python)
-    } else {
-        Err(format!("{python} has no evo"))
-    };
-    require::wants(test, Need::Python, found)
-}
+const PACKAGES: &[&str] = &["evo", "numpy"];
 
 /// Rmse and mean, as they lie and aligned.
 fn evo(python: &str, estimate: &[Point], truth: &[Point]) -> [f64; 4] {
@@ -57,7 +48,7 @@ fn paths(seed: u64) -> (Vec<Point>, Vec<Point>) {
 
 #[test]
 fn equal_to_evo() {
-    let Some(python) = python("equal_to_evo") else { return };
+    let Some(python) = require::python("equal_to_evo", PACKAGES) else { return };
     for seed in 0..3 {
         let (estimate, truth) = paths(seed);
         let theirs = evo(&python, &estimate, &truth);
