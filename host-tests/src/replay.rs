@@ -112,6 +112,10 @@ impl Board {
     pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
         let config = Config::new(configuration.can).expect("a configuration that can be stored");
         let fog_blob = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
+        let mut lane = FogLane::new(FogConfig::DEFAULT, true);
+        if configuration.fog.is_some() {
+            lane.expect(Micros(0));
+        }
         Self {
             network: GyroNet::new(blob),
             mti: Mti::new(),
@@ -120,7 +124,7 @@ impl Board {
             wheels: WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"),
             wheels_known: None,
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
-            lane: FogLane::new(FogConfig::DEFAULT, true),
+            lane,
             fog_network: FogNet::new(fog_blob, Box::leak(Box::new(FogNetState::ZERO))),
             fog_feed: FogFeed::new(configuration.fog_ids),
             sample_time: Micros(0),

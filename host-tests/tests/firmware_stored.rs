@@ -13,7 +13,7 @@ use gyronet::service::message::{FlashState, Info, Origin, Refusal};
 use gyronet::service::{Reply, Request};
 use gyronet::store::layout::{SLOT_SIZE, SLOTS, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, FieldError, ImuPart, Mounting, Record, Slot, StoreError};
+use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Mounting, Record, Slot, StoreError};
 use gyronet_host_tests::connected::{self, Step};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::{Stored, other_weights};
@@ -163,6 +163,19 @@ fn fibre_optic_gyro_under_other_identifiers() {
     let outcome = connected::run(&mut board, &configuration, &steps);
     let sent = |id| connected::rates(&outcome.followed.lines, id).count();
     assert!(sent(OTHER) >= 48 && sent(FOG_IDS[0]) == 0, "{} {}", sent(OTHER), sent(FOG_IDS[0]));
+}
+
+#[test]
+fn fibre_optic_gyro_that_is_configured_is_missed() {
+    const NAME: &str = "fibre_optic_gyro_that_is_configured_is_missed";
+    let configuration = Configuration { fog: Some(FogPart::Dsp1760), ..Configuration::DEFAULT };
+    let stored = Stored::default().record(&configuration);
+    let host = || replay::Board::configured(&configuration, built_in());
+    let Some(board) = Told::by(NAME, &stored, host) else { return };
+    // No byte of it has come; every 10 ms the bus says so.
+    let rates = board.rates(FOG_IDS[0]);
+    assert!(rates.len() >= SAMPLES - 2, "{}", rates.len());
+    assert!(rates.iter().all(|rate| rate.quality == Quality::Unusable));
 }
 
 /// The configuration cannot be used: built-in values, the bus and the log say so, nothing is good.

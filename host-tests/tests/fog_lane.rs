@@ -99,6 +99,23 @@ fn a_gyro_that_says_the_same_is_stuck() {
 }
 
 #[test]
+fn a_gyro_that_is_expected_is_missed_from_the_start() {
+    let mut lane = FogLane::new(FogConfig::DEFAULT, true);
+    assert_eq!(run(&mut lane, 0..101, |_| false), []);
+    let mut lane = FogLane::new(FogConfig::DEFAULT, true);
+    lane.expect(Micros(0));
+    let sent = run(&mut lane, 0..501, |step| step > 100);
+    // Step 0 is due 10 ms on; each of silence is no rate.
+    assert_eq!(sent.len(), 501);
+    let silent = sent.iter().take_while(|yaw| yaw.quality == Quality::Unusable).count();
+    assert!((100..=102).contains(&silent), "{silent}");
+    assert!(sent[..silent].iter().all(|yaw| yaw.faults.0 & Faults::GAP.0 != 0 && yaw.rate.0 == 0));
+    // Then all is as if it had been heard from the start.
+    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
+    assert_eq!(lane.counters().gaps as usize, silent);
+}
+
+#[test]
 fn what_is_missing_is_said() {
     let mut lane = FogLane::new(FogConfig::DEFAULT, false);
     let sent = run(&mut lane, 1..301, |_| true);

@@ -181,8 +181,9 @@ impl Streams {
         self.restarts
     }
 
-    /// The first sample sets the grid: the first step is the next one from there.
-    fn begin(&mut self, time: Micros) {
+    /// The first step is the next one from there. The first sample does so by itself; whoever expects
+    /// one calls this before, and gets steps with nothing in them until it comes.
+    pub fn begin(&mut self, time: Micros) {
         self.next.get_or_insert(time.0.next_multiple_of(PERIOD_US));
     }
 }

@@ -1,4 +1,4 @@
-//! The yaw messages of a fibre-optic gyro, which are sent while it is heard.
+//! The yaw messages of a fibre-optic gyro: sent from when it is heard, from the start where one is configured.
 
 use super::config::SAMPLE_MS;
 use super::e2e::{DataIdMode, P01, Profile};
@@ -29,7 +29,7 @@ impl FogFeed {
         ids.map(|data_id| Profile::P01(P01 { data_id, mode: DataIdMode::Both }))
     }
 
-    /// Every message that is sent while the gyro is heard; none for identifiers of over 11 bits.
+    /// Every message of the gyro; none for identifiers of over 11 bits.
     #[must_use]
     pub fn messages(ids: [u16; 3]) -> Vec<Periodic, 3> {
         let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS };

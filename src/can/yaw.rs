@@ -24,7 +24,7 @@ pub use crate::health::{Faults, Quality, Source};
 use crate::units::{AngularRate, Yaw};
 
 /// Identifiers of the same three messages for a fibre-optic gyro, and their E2E data identifiers, where
-/// nothing else is configured. They are sent while it is heard.
+/// nothing else is configured. They are sent from when it is heard, or expected.
 pub const FOG_IDS: [u16; 3] = [0x1A4, 0x1A5, 0x1A6];
 
 /// Rate code that says "not available".

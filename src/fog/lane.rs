@@ -9,7 +9,7 @@
 //! |---|---|---|---|---|
 //! | an estimate is in use | less the correction | FoGNet | good | |
 //! | none yet, late, not believed, no weights, no wheels | as it is | raw | degraded | LATE, IMPLAUSIBLE, STORED, WHEELS |
-//! | increments are missing in the step | not available | raw | unusable | GAP |
+//! | increments are missing in the step, or none have come yet ([`FogLane::expect`]) | not available | raw | unusable | GAP |
 //! | five turns in a row are equal ([`STUCK_AFTER`]), until one differs | not available | raw | unusable | STUCK |
 
 use super::{FogConfig, FogCorrector, FogOutput, IncrementRate};
@@ -90,6 +90,11 @@ impl FogLane {
         }
     }
 
+    /// There is a gyro, whether it is heard or not: messages go out from `now` on, and its silence is told.
+    pub fn expect(&mut self, now: Micros) {
+        self.streams.begin(now);
+    }
+
     /// Takes a sample that has arrived at `now`. Call [`FogLane::next_step`] until `None` after it.
     pub fn push(&mut self, now: Micros, sample: FogSample) {
         match self.streams.push_fog(now, sample) {
@@ -99,7 +104,7 @@ impl FogLane {
     }
 
     /// What goes out for the next 10 ms, if they are complete or due; nothing before the first
-    /// sample. To be called every few milliseconds, too, for silence is told here.
+    /// sample of a gyro that is not expected. To be called every few milliseconds, too, for silence is told here.
     #[inline(never)]
     pub fn next_step(
         &mut self,

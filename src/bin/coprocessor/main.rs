@@ -110,6 +110,7 @@ mod app {
     use gyronet::health::supervisor::Task;
     use gyronet::model::GyroNet;
     use gyronet::service::message::AllCounters;
+    use gyronet::units::Micros;
 
     /// What idle tells of, and what it has found out.
     #[shared]
@@ -139,7 +140,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
-        let start::Parts { output, weights, fog_network, device } = parts;
+        let start::Parts { output, weights, fog_network, fog_expected, device } = parts;
         let network = weights.map(|blob| start::place(cx.local.network_place, || GyroNet::new(blob)));
         let network = WindowTask { network };
         let service = board.service;
@@ -147,6 +148,10 @@ mod app {
         let ports = (board.imu, board.fog, board.slcan, board.can);
         let has_network = fog_network.is_some();
         let fog = start::place(cx.local.fog_place, || FogLane::new(FogConfig::DEFAULT, has_network));
+        if fog_expected {
+            // The board's clock has just begun.
+            fog.expect(Micros(0));
+        }
         let sender =
             start::place(cx.local.sender_place, || output.connect(ports, board.time, board.watchdog));
         let rest = start::place(cx.local.rest_place, || Idle::new(device, service, fog_network, bring_up));

@@ -27,6 +27,8 @@ pub struct Parts {
     /// To be put under the network.
     pub weights: Option<Blob<'static>>,
     pub fog_network: Option<&'static mut FogNet<'static, 'static>>,
+    /// A fibre-optic gyro is configured.
+    pub fog_expected: bool,
     pub device: Stored,
 }
 
@@ -48,6 +50,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let pipeline = configuration.pipeline(device.calibration());
     let windows = Windows::new(blob.is_some(), pipeline.compensate.mode.delay());
     let (part, fog_ids) = (configuration.imu, configuration.fog_ids);
+    let fog_expected = configuration.fog.is_some();
     let doubts = Doubts { stored: device.stored_damaged(), configuration: device.configuration_lost() };
     // What is stored has been checked.
     let config = Config::new(configuration.can).unwrap_or(Config::DEFAULT);
@@ -57,6 +60,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
         output: Unconnected { guard, config, wheels: Some(WHEELS), windows, part, fog_ids, doubts },
         weights: blob,
         fog_network: fog_network(),
+        fog_expected,
         device: (device, check),
     })
 }

@@ -12,7 +12,7 @@ use std::io::{self, Write};
 ///
 /// For each configuration that comes with the library: identifiers, periods (ms), the load of the bus
 /// with as many stuff bits as there can be, and of SLCAN lines. The messages of a fibre-optic gyro are
-/// sent while it is heard.
+/// sent from when it is heard, from the start where one is configured.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {}
 
