@@ -1,5 +1,6 @@
 //! The asking side of the service line: requests out, replies in, over whatever carries bytes.
 
+pub mod calibration;
 pub mod line;
 pub mod settings;
 pub mod upload;

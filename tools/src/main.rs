@@ -1,4 +1,5 @@
 //! The `gyronet` command.
+#![deny(clippy::print_stdout, reason = "it panics where the reader has gone: `gyronet size | head`")]
 
 mod commands;
 

@@ -1,6 +1,6 @@
 //! The command line as a whole: help, exit statuses, colours, completions.
 
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn gyronet(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_gyronet")).args(arguments).output().unwrap()
@@ -32,6 +32,19 @@ fn every_help_begins_with_one_line_and_ends_with_examples() {
         assert!(help.contains("Examples:") || without_files.contains(&name.as_str()), "{name}");
     }
     assert!(text(&gyronet(&["--help"]).stdout).contains("Exit status: 0 done; 1 failed"));
+}
+
+#[test]
+fn a_reader_that_has_gone_is_no_failure() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_gyronet"))
+        .arg("bus")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
 }
 
 #[test]

@@ -6,13 +6,14 @@ use gyronet_tools::parser_load::ParserLoad;
 use gyronet_tools::schedule::Schedule;
 use gyronet_tools::target_bench::{self, Count, Counts};
 use gyronet_tools::task_bench::{self, Tasks};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// Count instructions and modelled cycles on the target, in QEMU.
 ///
-/// Of every kernel, network and sensor parser, on a Cortex-M4F. Needs qemu-system-arm; cycles need a C compiler too. Prints one line each,
-/// `name instructions=N cycles=N stack=BYTES`, then sizes, then what the parsers cost for a byte
-/// and of the processor's time. Cycles are modelled (zero wait states), not
+/// Of every kernel, network and sensor parser, on a Cortex-M4F. Needs qemu-system-arm; cycles need a C
+/// compiler too. Prints one line each, `name instructions=N cycles=N stack=BYTES`, then sizes, then what
+/// the parsers cost for a byte and of the processor's time. Cycles are modelled (zero wait states), not
 /// measured on silicon. Then every task and interrupt of the flashed image, counted while it runs, and
 /// whether each meets its deadline at 168 MHz. Exit status 1 when the count of a window depends on
 /// its input, or a deadline can be missed.
@@ -38,17 +39,19 @@ pub fn run(_: &Args, common: Common) -> super::Result {
     let image = target_bench::build(&workspace, "coprocessor", &folder)?;
     let coprocessor = ImageSize::read(&image)?;
     let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
+    let out = &mut io::stdout().lock();
     if common.json {
-        println!("{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)));
+        writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))?;
     } else {
-        print(&counts, &coprocessor);
+        print(out, &counts, &coprocessor)?;
         if let Some((tasks, schedule)) = &tasks {
-            println!("{tasks}\n{schedule}");
+            writeln!(out, "{tasks}\n{schedule}")?;
         }
         if !counts.exact() {
-            println!(
+            writeln!(
+                out,
                 "no C compiler or no plugins: instructions from SysTick, +-6; cycles and deadlines left out"
-            );
+            )?;
         }
     }
     if !counts.constant() {
@@ -72,36 +75,40 @@ fn schedule(workspace: &Path, image: &Path) -> Result<Timing, Box<dyn std::error
     Ok((tasks, schedule))
 }
 
-fn print(counts: &Counts, coprocessor: &ImageSize) {
+fn print(out: &mut impl Write, counts: &Counts, coprocessor: &ImageSize) -> io::Result<()> {
     for Count { name, instructions, cycles, stack } in &counts.regions {
         match cycles {
-            Some(cycles) => println!("{name} instructions={instructions} cycles={cycles} stack={stack}"),
-            None => println!("{name} instructions={instructions} stack={stack}"),
+            Some(cycles) => {
+                writeln!(out, "{name} instructions={instructions} cycles={cycles} stack={stack}")?
+            }
+            None => writeln!(out, "{name} instructions={instructions} stack={stack}")?,
         }
     }
     for (name, bytes) in &counts.sizes {
-        println!("{name} bytes={bytes}");
+        writeln!(out, "{name} bytes={bytes}")?;
     }
     let ImageSize { flash, kernels, static_ram } = coprocessor;
-    println!("coprocessor/flash bytes={flash}");
-    println!("coprocessor/static_ram bytes={static_ram}");
-    println!("kernels/code bytes={kernels}");
+    writeln!(out, "coprocessor/flash bytes={flash}")?;
+    writeln!(out, "coprocessor/static_ram bytes={static_ram}")?;
+    writeln!(out, "kernels/code bytes={kernels}")?;
     for load in ParserLoad::all(counts) {
-        println!("{load}");
+        writeln!(out, "{load}")?;
     }
     for (name, instructions, cycles) in CMSIS_NN_S8 {
         if let Some(count) = counts.get(name) {
             let fewer = |peer: u64, ours: u64| peer as f64 / ours.max(1) as f64;
-            print!(
+            write!(
+                out,
                 "{name} against CMSIS-NN s8: {:.2}x fewer instructions",
                 fewer(instructions, count.instructions)
-            );
+            )?;
             match count.cycles {
-                Some(ours) => println!(", {:.2}x fewer modelled cycles", fewer(cycles, ours)),
-                None => println!(),
+                Some(ours) => writeln!(out, ", {:.2}x fewer modelled cycles", fewer(cycles, ours))?,
+                None => writeln!(out)?,
             }
         }
     }
+    Ok(())
 }
 
 fn json(counts: &Counts, coprocessor: &ImageSize, schedule: Option<&Schedule>) -> serde_json::Value {

@@ -1,19 +1,19 @@
 //! `gyronet device`: what the board is, does and remembers, over its service line.
 
+mod calibration;
 mod settings;
 
 use super::Common;
-use clap::{Subcommand, ValueEnum};
-use gyronet::service::calibrate::{State, Task};
-use gyronet::service::message::{Calibrate, Info};
+use clap::Subcommand;
+use gyronet::service::message::Info;
 use gyronet::service::{Reply, Request};
 use gyronet_tools::device::line::Line;
 use gyronet_tools::device::settings::{flat, value as value_of};
 use gyronet_tools::device::upload::upload;
 use gyronet_tools::device::{Device, DeviceError};
 use serde::Serialize;
+use std::io::{self, Write};
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 /// Ask and configure a board over its service line.
 ///
@@ -51,7 +51,7 @@ enum Action {
     Calibrate {
         /// What to find, or `show` what is known.
         #[arg(value_enum)]
-        task: CalibrateTask,
+        task: calibration::What,
         /// Store the result, so that it survives a restart.
         #[arg(long)]
         store: bool,
@@ -69,22 +69,6 @@ enum Action {
     Restart,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CalibrateTask {
-    /// The gyro's bias, at rest.
-    Static,
-    /// Roll and pitch of the sensor, at rest on level ground.
-    Mounting,
-    /// What is known.
-    Show,
-    /// Stop without a result.
-    Cancel,
-}
-
-/// Three seconds at rest, and as many again for a slow line.
-const CALIBRATION: Duration = Duration::from_secs(10);
-const POLL: Duration = Duration::from_millis(200);
-
 type Board = Device<Line>;
 
 /// Runs the command.
@@ -98,11 +82,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     match &args.action {
         Action::Info => {
             let Reply::Info(info) = device.ask(&Request::Info)? else { return mismatch() };
-            if json { print_json(&info)? } else { print_info(&info) }
+            if json { print_json(&info)? } else { print_info(&info)? }
         }
         Action::Get => settings::print(&settings::get(&mut device)?, json)?,
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
-        Action::Calibrate { task, store } => calibrate(&mut device, *task, *store, json)?,
+        Action::Calibrate { task, store } => calibration::run(&mut device, *task, *store, json)?,
         Action::Log => log(&mut device, json)?,
         Action::Counters => {
             let Reply::Counters(counters) = device.ask(&Request::Counters)? else { return mismatch() };
@@ -111,7 +95,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Action::Weights { file } => weights(&mut device, file, json, common)?,
         Action::Restart => {
             device.ask(&Request::Restart)?;
-            done(json, "the board restarts");
+            done(json, "the board restarts")?;
         }
     }
     Ok(())
@@ -121,16 +105,13 @@ fn mismatch<T>() -> Result<T, Box<dyn std::error::Error>> {
     Err(DeviceError::Mismatch.into())
 }
 
-fn done(json: bool, what: &str) {
-    if json {
-        println!("{}", serde_json::json!({ "done": what }));
-    } else {
-        println!("{what}");
-    }
+fn done(json: bool, what: &str) -> io::Result<()> {
+    let out = &mut io::stdout().lock();
+    if json { writeln!(out, "{}", serde_json::json!({ "done": what })) } else { writeln!(out, "{what}") }
 }
 
 fn print_json(value: &impl Serialize) -> super::Result {
-    super::print_json(&mut std::io::stdout().lock(), value)
+    super::print_json(&mut io::stdout().lock(), value)
 }
 
 /// JSON, or a line for each value.
@@ -138,80 +119,44 @@ fn print_value(value: &impl Serialize, json: bool) -> super::Result {
     if json {
         return print_json(value);
     }
+    let out = &mut io::stdout().lock();
     for (name, value) in flat(&value_of(value)?) {
-        println!("{name} = {value}");
+        writeln!(out, "{name} = {value}")?;
     }
     Ok(())
 }
 
-fn print_info(info: &Info) {
+fn print_info(info: &Info) -> io::Result<()> {
+    let out = &mut io::stdout().lock();
     let identity = &info.identity;
     let [major, minor, patch] = identity.firmware;
-    println!("firmware      {major}.{minor}.{patch}, protocol {}", info.protocol);
+    writeln!(out, "firmware      {major}.{minor}.{patch}, protocol {}", info.protocol)?;
     match identity.device_id {
-        Some(id) => println!("part          {:#05x} revision {:#06x}", id & 0xFFF, id >> 16),
-        None => println!("part          does not say (the emulator)"),
+        Some(id) => writeln!(out, "part          {:#05x} revision {:#06x}", id & 0xFFF, id >> 16)?,
+        None => writeln!(out, "part          does not say (the emulator)")?,
     }
-    println!("clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6);
-    println!("bus           {}", if identity.can { "CAN, SLCAN" } else { "SLCAN alone" });
-    println!("started by    {}", identity.reset);
+    writeln!(out, "clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6)?;
+    writeln!(out, "bus           {}", if identity.can { "CAN, SLCAN" } else { "SLCAN alone" })?;
+    writeln!(out, "started by    {}", identity.reset)?;
     if let Some(crash) = identity.crash {
-        println!("crashed       {crash}");
+        writeln!(out, "crashed       {crash}")?;
     }
-    println!("status        {}", info.status);
+    writeln!(out, "status        {}", info.status)?;
     if let Some(fault) = info.sensor {
-        println!("sensor        {fault}");
+        writeln!(out, "sensor        {fault}")?;
     }
     let writable = if info.writable { "" } else { ", no controller: nothing can be stored" };
-    println!("flash         {}{writable}", info.flash);
-    println!("configuration {}, layout {}", info.configuration, info.record_versions[0]);
-    println!("calibration   {}, layout {}", info.calibration, info.record_versions[1]);
+    writeln!(out, "flash         {}{writable}", info.flash)?;
+    writeln!(out, "configuration {}, layout {}", info.configuration, info.record_versions[0])?;
+    writeln!(out, "calibration   {}, layout {}", info.calibration, info.record_versions[1])?;
     let crc = info.weights_crc.map(|crc| format!(", checksum {crc:08x}")).unwrap_or_default();
-    println!("weights       {}{crc}", info.weights);
+    writeln!(out, "weights       {}{crc}", info.weights)?;
     for (slot, refused) in ["A", "B"].into_iter().zip(info.refused_slots) {
         if let Some(error) = refused {
-            println!("slot {slot}        not used: {error}");
+            writeln!(out, "slot {slot}        not used: {error}")?;
         }
     }
-}
-
-fn calibrate(device: &mut Board, task: CalibrateTask, store: bool, json: bool) -> super::Result {
-    let task = match task {
-        CalibrateTask::Show => None,
-        CalibrateTask::Cancel => {
-            device.ask(&Request::Calibrate(Calibrate::Cancel))?;
-            None
-        }
-        CalibrateTask::Static => Some(Task::Static),
-        CalibrateTask::Mounting => Some(Task::Mounting),
-    };
-    if let Some(task) = task {
-        device.ask(&Request::Calibrate(Calibrate::Start(task)))?;
-    }
-    let until = Instant::now() + CALIBRATION;
-    loop {
-        let Reply::Calibration { state, calibration, .. } = device.ask(&Request::GetCalibration)? else {
-            return mismatch();
-        };
-        match state {
-            State::Running(_) if task.is_some() => {
-                if Instant::now() > until {
-                    device.ask(&Request::Calibrate(Calibrate::Cancel))?;
-                    return Err("no three seconds of samples have come from the sensor".into());
-                }
-                std::thread::sleep(POLL);
-            }
-            State::Failed(_, fault) if task.is_some() => {
-                return Err(format!("nothing was found: {fault}").into());
-            }
-            _ => {
-                if store {
-                    device.ask(&Request::Calibrate(Calibrate::Store))?;
-                }
-                return print_value(&calibration, json);
-            }
-        }
-    }
+    Ok(())
 }
 
 fn log(device: &mut Board, json: bool) -> super::Result {
@@ -227,11 +172,12 @@ fn log(device: &mut Board, json: bool) -> super::Result {
     if json {
         return print_json(&serde_json::json!({ "events": events, "lost": lost }));
     }
+    let out = &mut io::stdout().lock();
     if lost > 0 {
-        println!("{lost} older events are lost");
+        writeln!(out, "{lost} older events are lost")?;
     }
     for event in events {
-        println!("{:6} {:9.2} s  {}", event.number, f64::from(event.tick) / 100.0, event.kind);
+        writeln!(out, "{:6} {:9.2} s  {}", event.number, f64::from(event.tick) / 100.0, event.kind)?;
     }
     Ok(())
 }
@@ -248,7 +194,7 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
     if json {
         print_json(&serde_json::json!({ "slot": uploaded.slot, "crc": uploaded.crc }))
     } else {
-        println!("slot {} holds file {:08x}; it is used after a restart", uploaded.slot, uploaded.crc);
-        Ok(())
+        let (slot, crc) = (uploaded.slot, uploaded.crc);
+        Ok(writeln!(io::stdout(), "slot {slot} holds file {crc:08x}; it is used after a restart")?)
     }
 }

@@ -4,6 +4,7 @@ use super::Common;
 use gyronet_tools::image_size::ImageSize;
 use gyronet_tools::image_stack::{Handler, ImageStack, Way};
 use gyronet_tools::target_bench;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 /// Measure the firmware image: flash, static RAM and the worst stack, bytes.
@@ -32,6 +33,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let measured = [size.flash, size.static_ram, stack.worst().into()];
     let names = ["flash", "static_ram", "stack"];
     let rows = || names.into_iter().zip(measured).zip(BUDGETS);
+    let out = &mut io::stdout().lock();
     if common.json {
         let rows = rows().map(|((name, bytes), budget)| {
             (name.to_owned(), serde_json::json!({ "bytes": bytes, "budget": budget }))
@@ -44,28 +46,29 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         json["stack_main"] = serde_json::json!({ "bytes": stack.main, "deepest": stack.deepest_main });
         json["stack_handlers"] = handlers.collect();
         json["indirect_calls"] = stack.indirect_calls.into();
-        println!("{json:#}");
+        writeln!(out, "{json:#}")?;
     } else {
         for ((name, bytes), budget) in rows() {
-            println!("{name} bytes={bytes} budget={budget}");
+            writeln!(out, "{name} bytes={bytes} budget={budget}")?;
         }
-        print("start", stack.start, &stack.deepest);
-        print("main", stack.main, &stack.deepest_main);
-        println!("stack/handlers bytes={}", stack.handlers());
+        print(out, "start", stack.start, &stack.deepest)?;
+        print(out, "main", stack.main, &stack.deepest_main)?;
+        writeln!(out, "stack/handlers bytes={}", stack.handlers())?;
         for Handler { priority, bytes, deepest } in &stack.handlers {
             let name = priority.map_or(String::from("fault"), |priority| format!("priority {priority}"));
-            print(&name, *bytes, deepest);
+            print(out, &name, *bytes, deepest)?;
         }
-        println!("calls through a register: {}", stack.indirect_calls);
+        writeln!(out, "calls through a register: {}", stack.indirect_calls)?;
     }
     let over: Vec<_> =
         rows().filter(|((_, bytes), budget)| bytes > budget).map(|((name, _), _)| name).collect();
     if over.is_empty() { Ok(()) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
 }
 
-fn print(name: &str, bytes: u32, deepest: &Way) {
-    println!("stack/{name} bytes={bytes}");
+fn print(out: &mut impl Write, name: &str, bytes: u32, deepest: &Way) -> io::Result<()> {
+    writeln!(out, "stack/{name} bytes={bytes}")?;
     for (name, own) in deepest {
-        println!("  {own:5} {name}");
+        writeln!(out, "  {own:5} {name}")?;
     }
+    Ok(())
 }

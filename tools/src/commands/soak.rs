@@ -5,11 +5,13 @@ use super::{Common, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet::sample::RATE_HZ;
 use gyronet_tools::soak;
+use std::io::Write;
 
 /// Run hours of a simulated drive from bytes to bytes, every counter wrapping.
 ///
-/// From a part's bytes to a receiver of the CAN frames. Every clock and counter on the way wraps. Prints what was counted; exit status 1 where a
-/// sample or frame is lost, a clock or the yaw drifts, or memory grows.
+/// From a part's bytes to a receiver of the CAN frames. Every clock and counter on the way wraps. Prints
+/// what was counted; exit status 1 where a sample or frame is lost, a clock or the yaw drifts, or memory
+/// grows.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -30,14 +32,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let soak = soak::run(minutes * 60 * RATE_HZ, &mut network, || bar.inc(1));
     bar.finish_and_clear();
     let faults = soak.faults();
+    let out = &mut std::io::stdout().lock();
     if common.json {
-        print_json(&mut std::io::stdout().lock(), &serde_json::json!({ "soak": soak, "faults": faults }))?;
+        print_json(out, &serde_json::json!({ "soak": soak, "faults": faults }))?;
     } else {
-        if common.json {
-            super::print_json(&mut std::io::stdout(), &soak)?;
-        } else {
-            println!("{soak}");
-        }
+        writeln!(out, "{soak}")?;
     }
     if faults.is_empty() { Ok(()) } else { Err(faults.join("; ").into()) }
 }

@@ -115,7 +115,7 @@ fn walk(name: &str, value: &Value, lines: &mut Vec<(String, String)>) {
 }
 
 /// With as few decimals as lead back to the code.
-fn shortest(rate: AngularRate) -> f64 {
+pub(super) fn shortest(rate: AngularRate) -> f64 {
     let exact = rate.rad_per_sec();
     let mut rounded = (1..=RATE_DECIMALS).filter_map(|decimals| format!("{exact:.decimals$}").parse().ok());
     rounded.find(|rounded| code(*rounded) == Some(rate.0)).unwrap_or(exact)

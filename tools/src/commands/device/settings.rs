@@ -42,6 +42,5 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
     let configuration = from_value(wanted)?;
     configuration.check()?;
     device.ask(&Request::SetConfiguration { version: Configuration::VERSION, configuration })?;
-    done(json, "stored; it takes effect after a restart");
-    Ok(())
+    Ok(done(json, "stored; it takes effect after a restart")?)
 }
