@@ -5,6 +5,7 @@ pub mod line;
 pub mod settings;
 pub mod upload;
 
+use crate::connection::{ConnectError, is_silence};
 use gyronet::service::frame::{Deframer, FrameError, emit};
 use gyronet::service::message::Refusal;
 use gyronet::service::{Reply, Request};
@@ -21,7 +22,10 @@ const ATTEMPTS: u32 = 3;
 /// Why there is no answer, or not the one that was hoped for.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
-    /// The line cannot be opened or used.
+    /// The line cannot be opened.
+    #[error(transparent)]
+    Connect(#[from] ConnectError),
+    /// The line cannot be used.
     #[error("{port}: {source}")]
     Line {
         /// Its name.
@@ -101,7 +105,7 @@ impl<L: Read + Write> Device<L> {
             let len = match self.line.read(&mut bytes) {
                 Ok(0) => return Err(self.broken(ErrorKind::UnexpectedEof.into())),
                 Ok(len) => len,
-                Err(error) if waits(error.kind()) => continue,
+                Err(error) if is_silence(&error) => continue,
                 Err(error) => return Err(self.broken(error)),
             };
             for byte in &bytes[..len] {
@@ -123,9 +127,4 @@ impl<L: Read + Write> Device<L> {
     fn broken(&self, source: std::io::Error) -> DeviceError {
         DeviceError::Line { port: self.port.clone(), source }
     }
-}
-
-/// Nothing has come yet.
-fn waits(kind: ErrorKind) -> bool {
-    matches!(kind, ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }

@@ -5,6 +5,7 @@ pub mod bundled;
 pub mod campaign;
 pub mod candump;
 pub mod checkpoint;
+pub mod connection;
 mod curve;
 pub mod demo;
 pub mod device;

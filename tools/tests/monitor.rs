@@ -164,7 +164,7 @@ fn what_cannot_be_read_is_named() {
     let foreign = file("foreign.log", b"(1.000000) can0 123#00\n");
     let (text, foreign) = (text.to_str().unwrap(), foreign.to_str().unwrap());
     for (arguments, part) in [
-        (&["/no/such/port"][..], "/no/such/port: not a file, not host:port"),
+        (&["/no/such/port"][..], "/no/such/port: not host:port, and not a serial port"),
         (&[&closed], "cannot be connected"),
         (&[text], "no.log: no CAN frame in it"),
         (&[foreign, "--once"], "foreign.log: no whole set of messages"),

@@ -4,39 +4,24 @@
 //! end.
 
 use super::line::Splitter;
+use crate::connection::{ConnectError, Connection, is_silence};
 use gyronet::can::slcan::host::bit_rate_digit;
 use std::fmt;
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::io::{self, Read, Write};
 use std::path::Path;
 use std::time::Duration;
 
 /// Longest wait for bytes.
 pub const WAIT: Duration = Duration::from_millis(100);
-/// Longest wait for a connection, and for a line to take our commands.
-const CONNECT: Duration = Duration::from_secs(5);
 
 /// Why there is no source, or no longer one.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// A serial port that cannot be opened.
-    #[error("{name}: not a file, not host:port, and not a serial port that can be opened: {source}")]
-    Serial {
-        /// As asked for.
-        name: String,
-        /// What the system says.
-        source: serialport::Error,
-    },
-    /// A socket that cannot be connected.
-    #[error("{name}: cannot be connected: {source}")]
-    Connect {
-        /// As asked for.
-        name: String,
-        /// What the system says.
-        source: io::Error,
-    },
+    /// No line, nor a file.
+    #[error(transparent)]
+    Connect(#[from] ConnectError),
     /// A file that cannot be opened.
     #[error("{name}: {source}")]
     Open {
@@ -65,8 +50,7 @@ pub enum Lines {
 }
 
 enum Kind {
-    Serial(Box<dyn serialport::SerialPort>),
-    Tcp(TcpStream),
+    Line(Connection),
     Log(File),
 }
 
@@ -93,11 +77,8 @@ impl Source {
         let kind = if Path::new(name).is_file() {
             let open = |source| SourceError::Open { name: name.into(), source };
             Kind::Log(File::open(name).map_err(open)?)
-        } else if is_address(name) {
-            Kind::Tcp(connect(name).map_err(|source| SourceError::Connect { name: name.into(), source })?)
         } else {
-            let port = serialport::new(name, baud).timeout(WAIT).open();
-            Kind::Serial(port.map_err(|source| SourceError::Serial { name: name.into(), source })?)
+            Kind::Line(Connection::open(name, baud, WAIT)?)
         };
         let mut source = Self { name: name.into(), kind, splitter: Splitter::default() };
         let rate = bit_rate_digit(bus_bits_per_second).map(char::from);
@@ -136,8 +117,7 @@ impl Source {
 
     fn say(&mut self, text: &str) -> io::Result<()> {
         match &mut self.kind {
-            Kind::Serial(port) => port.write_all(text.as_bytes()),
-            Kind::Tcp(stream) => stream.write_all(text.as_bytes()),
+            Kind::Line(line) => line.write_all(text.as_bytes()),
             Kind::Log(_) => Ok(()),
         }
     }
@@ -157,34 +137,8 @@ impl Drop for Source {
 impl Read for Kind {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         match self {
-            Self::Serial(port) => port.read(bytes),
-            Self::Tcp(stream) => stream.read(bytes),
+            Self::Line(line) => line.read(bytes),
             Self::Log(file) => file.read(bytes),
         }
     }
-}
-
-fn is_silence(error: &io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
-}
-
-/// `host:port`, but no device and no drive letter.
-fn is_address(name: &str) -> bool {
-    let address = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
-    name.rsplit_once(':').is_some_and(address)
-}
-
-fn connect(name: &str) -> io::Result<TcpStream> {
-    let mut last = io::Error::from(ErrorKind::AddrNotAvailable);
-    for address in name.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, CONNECT) {
-            Ok(stream) => {
-                stream.set_read_timeout(Some(WAIT))?;
-                stream.set_write_timeout(Some(CONNECT))?;
-                return Ok(stream);
-            }
-            Err(error) => last = error,
-        }
-    }
-    Err(last)
 }
