@@ -32,7 +32,7 @@ impl FogNetwork {
         true
     }
 
-    /// Does a piece (under 0.2 M modelled cycles, which anything may interrupt); gives the estimate
+    /// Does a piece (0.23 M modelled cycles at most, which anything may interrupt); gives the estimate
     /// with the last one.
     #[inline(never)]
     pub fn advance(&mut self) -> Option<(u32, FogEstimate)> {
