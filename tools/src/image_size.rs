@@ -3,6 +3,9 @@
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
 
+/// What an image with both networks and everything else may take, bytes: flash, static RAM, stack.
+pub const BUDGETS: [u64; 3] = [640 << 10, 48 << 10, 8 << 10];
+
 /// Sizes of one image, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ImageSize {

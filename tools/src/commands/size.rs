@@ -1,7 +1,7 @@
 //! `gyronet size`: what the firmware image takes, against its budgets.
 
 use super::Common;
-use gyronet_tools::image_size::ImageSize;
+use gyronet_tools::image_size::{BUDGETS, ImageSize};
 use gyronet_tools::image_stack::{Handler, ImageStack, Way};
 use gyronet_tools::target_bench;
 use std::io::{self, Write};
@@ -17,9 +17,6 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
 }
-
-/// Both networks and everything else, as designed: flash, static RAM, stack.
-const BUDGETS: [u64; 3] = [640 << 10, 48 << 10, 8 << 10];
 
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
