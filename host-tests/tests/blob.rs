@@ -185,7 +185,7 @@ fn every_flipped_bit_is_noticed() {
 #[test]
 fn refusals_say_why() {
     for (error, text) in [
-        (BlobError::Magic(*b"ELF!"), "magic is [45, 4c, 46, 21], not [47, 59, 52, 4e]"),
+        (BlobError::Magic(*b"ELF!"), "this is none, it begins with [45, 4c, 46, 21], not [47, 59, 52, 4e]"),
         (BlobError::Version(7), "format version 7, this reads 2"),
         (BlobError::Length { expected: 10, found: 9 }, "9 bytes, should be 10"),
         (BlobError::Misaligned, "not on a 4-byte boundary"),

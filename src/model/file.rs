@@ -89,7 +89,9 @@ pub enum BlobError {
 impl core::fmt::Display for BlobError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {
-            Self::Magic(found) => write!(f, "weight file: magic is {found:02x?}, not {MAGIC:02x?}"),
+            Self::Magic(found) => {
+                write!(f, "weight file: this is none, it begins with {found:02x?}, not {MAGIC:02x?}")
+            }
             Self::Version(found) => write!(f, "weight file: format version {found}, this reads {VERSION}"),
             Self::Topology { found, expected } => {
                 let [network, window, inputs, hidden, layers] = found;

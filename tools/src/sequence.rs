@@ -96,14 +96,19 @@ struct Files {
 /// Whose layout a folder has.
 ///
 /// # Errors
-/// [`SequenceError::Unknown`].
+/// [`SequenceError::Unknown`], or [`SequenceError::Io`] where there is no folder.
 pub fn layout(folder: &Path) -> Result<Layout, SequenceError> {
     if folder.join("sensor_data").is_dir() {
         Ok(Layout::Kaist)
     } else if folder.join("kvh.csv").is_file() || folder.join("ms25.csv").is_file() {
         Ok(Layout::Nclt)
     } else {
-        Err(SequenceError::Unknown { path: folder.display().to_string() })
+        let path = folder.display().to_string();
+        let there = fs::metadata(folder);
+        Err(there.map_or_else(
+            |source| SequenceError::Io { path: path.clone(), source },
+            |_| SequenceError::Unknown { path: path.clone() },
+        ))
     }
 }
 

@@ -1,6 +1,6 @@
 //! `gyronet campaign`: faults on purpose.
 
-use super::networks::Weights;
+use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_tools::bundled;

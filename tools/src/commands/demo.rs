@@ -1,6 +1,6 @@
 //! `gyronet demo`: one drive, everything that comes of it.
 
-use super::{Common, WriteError, networks, paint, print_json, progress, replay};
+use super::{Common, WriteError, paint, print_json, progress, replay, weights};
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long)]
     no_board: bool,
     #[command(flatten)]
-    networks: networks::Files,
+    networks: weights::Files,
 }
 
 /// Runs the subcommand.

@@ -1,6 +1,6 @@
 //! `gyronet evaluate`: yaw errors of each method on recorded drives.
 
-use super::{Common, networks, paint, print_json, progress};
+use super::{Common, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::{DriveErrors, Report};
@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(long)]
     lags: bool,
     #[command(flatten)]
-    networks: networks::Files,
+    networks: weights::Files,
 }
 
 /// Runs the subcommand.

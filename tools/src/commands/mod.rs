@@ -1,4 +1,4 @@
-//! What the binary can do: one file for each subcommand, arguments in, text and files out.
+//! What the binary can do: one file for each subcommand, arguments in, text and files out, and what they share.
 
 pub mod bench_target;
 pub mod bus;
@@ -9,7 +9,6 @@ pub mod device;
 pub mod evaluate;
 pub mod import;
 pub mod monitor;
-mod networks;
 mod paint;
 mod progress;
 pub mod quantize;
@@ -18,6 +17,7 @@ pub mod simulate;
 pub mod size;
 pub mod soak;
 pub mod tables;
+mod weights;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.

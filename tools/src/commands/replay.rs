@@ -1,6 +1,6 @@
 //! `gyronet replay`: a recording through the integer pipeline, its CAN frames to a log.
 
-use super::networks::Weights;
+use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
 use gyronet::can::config::Config;
 use gyronet::can::feeds::Feeds;

@@ -1,6 +1,6 @@
 //! `gyronet soak`: hours of a drive, every clock and counter wrapping.
 
-use super::networks::Weights;
+use super::weights::Weights;
 use super::{Common, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet::sample::RATE_HZ;

@@ -1,6 +1,6 @@
 //! `gyronet tables`: the paper's evaluation on the sequences at hand.
 
-use super::networks::Weights;
+use super::weights::Weights;
 use super::{Common, WriteError, import, print_json, progress, remark};
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogNet, GyroNet};

@@ -15,7 +15,9 @@ pub enum SequenceError {
         source: std::io::Error,
     },
     /// The folder is of neither data set.
-    #[error("{path}: neither a KAIST Urban sequence (sensor_data/fog.csv) nor an NCLT one (kvh.csv)")]
+    #[error(
+        "{path}: neither a KAIST Urban sequence (a folder with sensor_data in it) nor an NCLT one (with kvh.csv or ms25.csv)"
+    )]
     Unknown {
         /// The folder.
         path: String,
