@@ -6,8 +6,8 @@
 //!
 //! | fault | found when | then | over when |
 //! |---|---|---|---|
-//! | silent | no sample for [`TIMEOUT_US`] | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
-//! | stuck | [`STUCK_AFTER`] equal samples of gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
+//! | silent | no sample for [`TIMEOUT_US`], or for [`START_US`] since the start | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
+//! | stuck | [`STUCK_AFTER`] samples equal to the one before in gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
 //! | wrong | a reading that is further from the last one than a vehicle goes in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
 //! | accumulated yaw changed in memory | its step is neither the rate nor zero | fault bit `IMPLAUSIBLE` | at once |
 //! | saturated | the part says so | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |

@@ -8,15 +8,18 @@ pub mod supervisor;
 /// State of the corrected yaw rate: one state machine. No state needs a restart to leave it, but
 /// damaged weights, which leave `Degraded` at best.
 ///
+/// In a fault there is no yaw rate: our own messages say not available, Bosch's set failed, VDC2 error, each with
+/// the fault bit.
+///
 /// | state | status | entered when | yaw rate on CAN | left when | counter |
 /// |---|---|---|---|---|---|
 /// | init | `Init` | start; the clock jumped before the bias was known | raw gyro, marked initialising | 3 s at rest | `moving` |
 /// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is believed | `missing`, `late`, `implausible` |
 /// | ready | `Ready` | a believable window covers the recent samples | gyro less bias and correction | as above | `windows` |
-/// | fault | `Clipped` | the part says that it is saturated | marked failed | 50 ms after the last such sample | `clipped`, `held` |
-/// | fault | `Clipped` | a reading that no vehicle can have ([`crate::guard`]) | marked failed, fault bit `IMPLAUSIBLE` | a reading near the last good one, or the fourth in a row | `wrong` |
-/// | fault | `Stuck` | seven samples equal in gyro, accelerometer or one axis | marked failed, fault bit `STUCK` | a sample that differs | `stuck` |
-/// | fault | `Silent` | 29 ms without a sample, by the board's clock | not available, every 10 ms | the next sample | `silences` |
+/// | fault | `Clipped` | the part says that it is saturated | none, `CLIPPED` | 50 ms after the last such sample | `clipped`, `held` |
+/// | fault | `Clipped` | a reading that no vehicle can have ([`crate::guard`]) | none, `IMPLAUSIBLE` | a reading near the last good one, or the fourth in a row | `wrong` |
+/// | fault | `Stuck` | samples equal to the one before, as [`crate::guard`] counts them | none, `STUCK` | a sample that differs | `stuck` |
+/// | fault | `Silent` | 29 ms without a sample, by the board's clock; 2 s after the start without the first | none, every 10 ms, `GAP` | the next sample | `silences` |
 ///
 /// From a fault it goes back to init where no bias is known, else to degraded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

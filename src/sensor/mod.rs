@@ -2,7 +2,8 @@
 //!
 //! What the pipeline sees of a part is its samples alone: [`ImuSample`] or [`FogSample`], in
 //! fixed point, with the part's own time unwrapped. [`Source`] names what every part has in
-//! common; which part is fitted is a type in the firmware's wiring, and nothing else changes.
+//! common: firmware for one part is generic over it, and nothing else changes. The image chooses among
+//! the parts that it drives at its start, by configuration.
 //!
 //! | part | line | type | sample |
 //! |---|---|---|---|
@@ -14,7 +15,7 @@
 //!
 //! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`,
 //! and brought to their configuration by [`serial::configure`]; SPI parts take an
-//! `embedded_hal::spi::SpiDevice`. Either way the firmware names one type, a [`Source`].
+//! `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
 //!
 //! # What a parser finds out about damage
 //!
@@ -30,7 +31,7 @@
 //! The last two have no check on the wire at all: keep their lines short, and let the pipeline's
 //! own limits judge the numbers.
 //!
-//! # Adding a part, in five steps
+//! # Adding a part, in six steps
 //!
 //! 1. Write down its bytes: a file of its own with `parse` and `emit` over byte slices, and an
 //!    error that says what is wrong and where. No input or output in it.
@@ -45,6 +46,9 @@
 //! 5. Test it with recorded or published frames both ways, every truncation and every flipped
 //!    bit, noise with frames strewn in, a mocked bus; add a fuzz target (`host-tests/fuzz`) and
 //!    a line in the bench image (`src/bin/support/parsers.rs`).
+//! 6. For the image of this repository: a name in [`crate::store::ImuPart`] or
+//!    [`crate::store::FogPart`], and an arm where the image reads its part (`imu.rs` or `output.rs` in
+//!    `src/bin/coprocessor`, the list of what it drives in `start.rs`).
 
 pub mod adis16465;
 pub mod crc;

@@ -6,7 +6,8 @@
 //! | weight files | two 128 KiB sectors, [`slots`] | the slot that is not in use | the slot in use |
 //!
 //! Records are found by key and protected by CRC-32; each carries the version of its layout, and
-//! every value is checked against its range when it is stored and when it is read. A weight file is used only after all of [`crate::model::Blob::new_checked`].
+//! every value is checked against its range when it is stored and when it is read. A weight file is
+//! used only after all of [`crate::model::Blob::new_checked`].
 //! [`layout`] says where everything lies.
 
 pub mod calibration;

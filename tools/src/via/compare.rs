@@ -9,8 +9,8 @@
 //! - **bias**: the mean of the 300 samples of static initialisation is off by q / sqrt(12) /
 //!   sqrt(300), and that is taken off every sample: times N dt. Both terms count four times, as
 //!   4 sigma.
-//! - **network**, and the zero-rate updates behind it: their answer is no formula. It is measured, not on the part's samples but on
-//!   stand-ins: the recording with even noise of the same steps on all six channels, from
+//! - **network**, and the zero-rate updates behind it: their answer is no formula. It is measured, not on
+//!   the part's samples but on stand-ins: the recording with even noise of the same steps on all six channels, from
 //!   [`STAND_INS`] seeds. Twice the largest departure that the sum of the corrections shows.
 //!
 //! The bound is the sum of the three. For the rates' rms they are q/2, four sigma of the bias, and
