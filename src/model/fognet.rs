@@ -122,7 +122,8 @@ impl<'w, 's> FogNet<'w, 's> {
             linear += i128::from(second.turn.0) * i128::from(*gain);
             let turn = (second.turn.0 >> ANGLE_TO_RATE).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
             let codes = second.features.into_iter().chain([turn]);
-            state.clamped_inputs += load_step(&mut state.input, step, codes, &blob.normalisation, clamp);
+            let (input, normalisation) = (&mut state.input, &blob.normalisation);
+            state.clamped_inputs += load_step::<INPUTS, COLUMNS>(input, step, codes, normalisation, clamp);
         }
         let linear = (linear + (1 << (GAIN_FRACTION_BITS - 1))) >> GAIN_FRACTION_BITS;
         state.linear = Angle(linear.clamp(i64::MIN.into(), i64::MAX.into()) as i64);

@@ -125,7 +125,9 @@ impl<'w> GyroNet<'w> {
         let mut clamped = 0;
         for (step, features) in window.iter().enumerate() {
             let codes = features.iter().copied();
-            clamped += load_step(&mut self.state.input, step, codes, &self.blob.normalisation, clamp);
+            let normalisation = &self.blob.normalisation;
+            clamped +=
+                load_step::<FEATURES, FEATURES>(&mut self.state.input, step, codes, normalisation, clamp);
         }
         clamped
     }
@@ -144,13 +146,15 @@ impl WindowNetwork for GyroNet<'_> {
 }
 
 /// Normalises the codes of a step into its place in a first layer's input; counts what had to be clamped.
-pub(super) fn load_step<const COLUMNS: usize>(
+/// A row of that input has `COLUMNS`, two in a word: an odd number of inputs has a zero behind it.
+pub(super) fn load_step<const INPUTS: usize, const COLUMNS: usize>(
     input: &mut [u32],
     step: usize,
     codes: impl Iterator<Item = i32>,
-    normalisation: &[Normalisation; COLUMNS],
+    normalisation: &[Normalisation; INPUTS],
     clamp: i32,
 ) -> u16 {
+    const { assert!(COLUMNS == INPUTS.next_multiple_of(2), "the last input has no word, or the next row moves") };
     let mut clamped = 0;
     let mut values = [0; COLUMNS];
     for ((to, code), n) in values.iter_mut().zip(codes).zip(normalisation) {
