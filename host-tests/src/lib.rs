@@ -8,6 +8,7 @@ pub mod golden;
 pub mod image;
 pub mod noise;
 pub mod packing;
+pub mod parallel;
 pub mod qemu;
 pub mod recordings;
 pub mod replay;

@@ -2,11 +2,12 @@
 //! against the f32 one, in its output and in the yaw that comes of it.
 
 use gyronet::model::{Blob, GyroNet, weights};
-use gyronet_host_tests::recordings;
+use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::methods::{Method, Rates};
 use gyronet_tools::metrics::YawError;
 use gyronet_tools::quantization_error::Both;
 use gyronet_tools::recording::Recording;
+use std::path::Path;
 
 /// The test trials.
 const TRIALS: [u32; 2] = [9, 11];
@@ -17,45 +18,51 @@ const OUTPUT: f64 = 0.02;
 /// The same of the scale of the expected error.
 const SCALE: f64 = 0.02;
 
+/// A line of the table, and what does not hold.
+fn judge(trial: u32, path: &Path) -> (String, Vec<String>) {
+    let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
+    let recording = Recording::read(path).expect("a recording");
+    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+    let (mut integer, mut float, mut beside) =
+        (GyroNet::new(blob), checkpoint.network(), checkpoint.network());
+    let mut both = Both::new(&mut integer, &mut beside);
+    let rates = Rates::new(&recording, &mut float, &mut both, || {}).expect("it stands still first");
+    let reference = rates.reference.as_ref().expect("the trials have a reference");
+    let errors = rates.rates.map(|rates| YawError::new(rates, reference).expect("whole seconds").mean_1s_rad);
+    let ratio = errors[Method::GyronetInt] / errors[Method::GyronetF32];
+    let difference = both.error();
+    let row = format!(
+        "{trial:02}      {:.6}  {:.6}  {:.6}  {ratio:.4}      {:.4}     {:.4}   {:6}  {:7}\n",
+        errors[Method::Static],
+        errors[Method::GyronetF32],
+        errors[Method::GyronetInt],
+        difference.relative_rms(),
+        difference.scale_rms(),
+        difference.windows,
+        difference.clamped_inputs,
+    );
+    let mut failures = Vec::new();
+    let mut must =
+        |holds: bool, what: &str| failures.extend((!holds).then(|| format!("trial {trial:02}: {what}")));
+    must((ratio - 1.0).abs() <= YAW_ERROR, "1 s yaw errors differ by more than 3 %");
+    must(difference.relative_rms() <= OUTPUT, "outputs differ by more than 2 % RMS");
+    must(difference.scale_rms() <= SCALE, "scales differ by more than 2 % RMS");
+    must(difference.clamped_inputs == 0, "inputs were clamped");
+    must(difference.windows > 2_000, "too few windows were run");
+    (row, failures)
+}
+
 #[test]
 fn integer_network_against_f32() {
     let paths = TRIALS.map(|trial| recordings::trial("integer_network_against_f32", trial));
     let [Some(_), Some(_)] = paths else { return };
-    let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
-    let mut table = String::from(
-        "trial      static   1 s f32  1 s int    ratio  output RMS  scale RMS  windows  clamped\n",
+    let drives: Vec<_> = TRIALS.into_iter().zip(paths.into_iter().flatten()).collect();
+    let (rows, failures): (Vec<_>, Vec<_>) =
+        parallel::map(&drives, |(trial, path)| judge(*trial, path)).into_iter().unzip();
+    let table = format!(
+        "trial      static   1 s f32  1 s int    ratio  output RMS  scale RMS  windows  clamped\n{}",
+        rows.concat()
     );
-    let mut failures = Vec::new();
-    for (trial, path) in TRIALS.into_iter().zip(paths.into_iter().flatten()) {
-        let recording = Recording::read(&path).expect("a recording");
-        let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-        let (mut integer, mut float, mut beside) =
-            (GyroNet::new(blob), checkpoint.network(), checkpoint.network());
-        let mut both = Both::new(&mut integer, &mut beside);
-        let rates = Rates::new(&recording, &mut float, &mut both, || {}).expect("it stands still first");
-        let reference = rates.reference.as_ref().expect("the trials have a reference");
-        let errors =
-            rates.rates.map(|rates| YawError::new(rates, reference).expect("whole seconds").mean_1s_rad);
-        let ratio = errors[Method::GyronetInt] / errors[Method::GyronetF32];
-        let difference = both.error();
-        table += &format!(
-            "{trial:02}      {:.6}  {:.6}  {:.6}  {ratio:.4}      {:.4}     {:.4}   {:6}  {:7}\n",
-            errors[Method::Static],
-            errors[Method::GyronetF32],
-            errors[Method::GyronetInt],
-            difference.relative_rms(),
-            difference.scale_rms(),
-            difference.windows,
-            difference.clamped_inputs,
-        );
-        let mut must =
-            |holds: bool, what: &str| failures.extend((!holds).then(|| format!("trial {trial:02}: {what}")));
-        must((ratio - 1.0).abs() <= YAW_ERROR, "1 s yaw errors differ by more than 3 %");
-        must(difference.relative_rms() <= OUTPUT, "outputs differ by more than 2 % RMS");
-        must(difference.scale_rms() <= SCALE, "scales differ by more than 2 % RMS");
-        must(difference.clamped_inputs == 0, "inputs were clamped");
-        must(difference.windows > 2_000, "too few windows were run");
-    }
     println!("{table}");
-    assert!(failures.is_empty(), "{failures:?}\n{table}");
+    assert!(failures.concat().is_empty(), "{failures:?}\n{table}");
 }

@@ -17,10 +17,11 @@ use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet::window::{Features, WINDOW};
-use gyronet_host_tests::recordings;
+use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::{Drive, Step};
 use gyronet_tools::metrics::YawError;
 use gyronet_tools::recording::Recording;
+use std::path::Path;
 
 /// Largest ratio of 1 s errors.
 const WITHIN: f64 = 1.1;
@@ -135,50 +136,59 @@ impl Rates {
     }
 }
 
+/// Lines of the table, and what does not hold.
+fn judge(trial: u32, path: &Path) -> (String, Vec<String>) {
+    let (mut table, mut failures) = (String::new(), Vec::new());
+    let recorded = Recording::read(path).expect("a recording");
+    let same = Rates::new(&recorded, SAME);
+    let base = same.error(&same.settled);
+    table += &format!(
+        "{trial:02}  {:18}  {:.6} |  {base:.6}  1.000 |  {base:.6}  1.000 |  0.000000   {base:.6}  1.000\n",
+        SAME.name,
+        same.error(&same.uncorrected),
+    );
+    // All of them on the validation drive, all at once on the others.
+    for unit in UNITS.into_iter().skip(if trial == TRIALS[0] { 0 } else { UNITS.len() - 1 }) {
+        let seen = Rates::new(&recorded, unit);
+        let inputs = seen.error(&seen.settled);
+        let modified = Rates::new(&unit.recording(&recorded), SAME);
+        let whole = modified.error(&modified.settled);
+        let own = modified.difference(&same);
+        let [perfect, unmoved] = [&same.reference, &same.settled].map(|rates| {
+            same.error(&rates.iter().zip(&own).map(|(rate, own)| rate + own).collect::<Vec<_>>())
+        });
+        table += &format!(
+            "{trial:02}  {:18}  {:.6} |  {inputs:.6}  {:.3} |  {whole:.6}  {:.3} |  {perfect:.6}   {unmoved:.6}  {:.3}\n",
+            unit.name,
+            modified.error(&modified.uncorrected),
+            inputs / base,
+            whole / base,
+            unmoved / base,
+        );
+        let mut must = |holds: bool, what: &str| {
+            failures.extend((!holds).then(|| format!("trial {trial:02}, {}: {what}", unit.name)));
+        };
+        must(unit.bias > DRIFT || inputs <= WITHIN * base, "the correction moves");
+        let unseen = unit.gain == 1.0 && unit.mounting == [0.0; 3];
+        must(!unseen || whole <= WITHIN * base, "static initialisation leaves the bias");
+        must(whole <= WITHIN * unmoved, "the network adds to the unit's own error");
+    }
+    (table, failures)
+}
+
 #[test]
 fn another_unit_of_the_part() {
     let paths = TRIALS.map(|trial| recordings::trial("another_unit_of_the_part", trial));
-    let mut table = String::from(
-        "1 s errors, rad           static |    inputs  ratio | recording  ratio |   perfect    unmoved  ratio\n",
-    );
-    let mut failures = Vec::new();
-    for (trial, path) in TRIALS.into_iter().zip(paths) {
-        let Some(path) = path else { return };
-        let recorded = Recording::read(&path).expect("a recording");
-        let same = Rates::new(&recorded, SAME);
-        let base = same.error(&same.settled);
-        table += &format!(
-            "{trial:02}  {:18}  {:.6} |  {base:.6}  1.000 |  {base:.6}  1.000 |  0.000000   {base:.6}  1.000\n",
-            SAME.name,
-            same.error(&same.uncorrected),
-        );
-        // All of them on the validation drive, all at once on the others.
-        for unit in UNITS.into_iter().skip(if trial == TRIALS[0] { 0 } else { UNITS.len() - 1 }) {
-            let seen = Rates::new(&recorded, unit);
-            let inputs = seen.error(&seen.settled);
-            let modified = Rates::new(&unit.recording(&recorded), SAME);
-            let whole = modified.error(&modified.settled);
-            let own = modified.difference(&same);
-            let [perfect, unmoved] = [&same.reference, &same.settled].map(|rates| {
-                same.error(&rates.iter().zip(&own).map(|(rate, own)| rate + own).collect::<Vec<_>>())
-            });
-            table += &format!(
-                "{trial:02}  {:18}  {:.6} |  {inputs:.6}  {:.3} |  {whole:.6}  {:.3} |  {perfect:.6}   {unmoved:.6}  {:.3}\n",
-                unit.name,
-                modified.error(&modified.uncorrected),
-                inputs / base,
-                whole / base,
-                unmoved / base,
-            );
-            let mut must = |holds: bool, what: &str| {
-                failures.extend((!holds).then(|| format!("trial {trial:02}, {}: {what}", unit.name)));
-            };
-            must(unit.bias > DRIFT || inputs <= WITHIN * base, "the correction moves");
-            let unseen = unit.gain == 1.0 && unit.mounting == [0.0; 3];
-            must(!unseen || whole <= WITHIN * base, "static initialisation leaves the bias");
-            must(whole <= WITHIN * unmoved, "the network adds to the unit's own error");
-        }
+    if paths.iter().any(Option::is_none) {
+        return;
     }
+    let drives: Vec<_> = TRIALS.into_iter().zip(paths.into_iter().flatten()).collect();
+    let (rows, failures): (Vec<_>, Vec<_>) =
+        parallel::map(&drives, |(trial, path)| judge(*trial, path)).into_iter().unzip();
+    let table = format!(
+        "1 s errors, rad           static |    inputs  ratio | recording  ratio |   perfect    unmoved  ratio\n{}",
+        rows.concat()
+    );
     println!("{table}");
-    assert!(failures.is_empty(), "{failures:#?}\n{table}");
+    assert!(failures.concat().is_empty(), "{failures:#?}\n{table}");
 }
