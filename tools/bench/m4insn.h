@@ -1,0 +1,128 @@
+/* An instruction as it was translated: what it costs, and what it does to handlers and locks. */
+#ifndef M4INSN_H
+#define M4INSN_H
+
+#include "m4cost.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+enum marker {
+    NO_MARKER,
+    REGION_BEGINS,
+    REGION_ENDS,
+};
+
+/* What becomes of interrupts: PRIMASK keeps all of them off, BASEPRI some. */
+enum lock_change {
+    LOCK_UNCHANGED,
+    ALL_OFF,
+    ALL_ON,
+    SOME_OFF,
+    SOME_ON,
+};
+
+enum { NO_HANDLER = -1 };
+
+struct insn {
+    uint32_t pc;
+    uint32_t size;
+    struct cost cost;
+    enum marker marker;
+    enum lock_change lock_change;
+    bool returns; /* or would, were its condition met */
+    bool watched;
+    int enters; /* the handler that begins here, or NO_HANDLER */
+    int leaves; /* the handler that ends here, or NO_HANDLER */
+    const char *text;
+    uint64_t executed; /* in the region */
+};
+
+static uint32_t halfword(const uint8_t *bytes)
+{
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8;
+}
+
+/* By the first halfword: 0b11101, 0b11110 and 0b11111 begin a 32-bit instruction.
+ * Not qemu_plugin_insn_size(): QEMU 7.2 over-reports it near the ends of 1 KiB pages. */
+static uint32_t size_of(const uint8_t *bytes)
+{
+    return bytes[1] >> 3 >= 0x1D ? 4 : 2;
+}
+
+/* DBG #1 and DBG #2. */
+static enum marker marker_of(uint32_t first, uint32_t second)
+{
+    if (first == 0xF3AF && second == 0x80F1) {
+        return REGION_BEGINS;
+    }
+    if (first == 0xF3AF && second == 0x80F2) {
+        return REGION_ENDS;
+    }
+    return NO_MARKER;
+}
+
+/* Assumption: PRIMASK is written only to have interrupts on again, and BASEPRI only to be what it
+ * was before BASEPRI_MAX was raised. What is written is not looked at. */
+static enum lock_change lock_change_of(uint32_t first, uint32_t second)
+{
+    if (first == 0xB672) { /* cpsid i */
+        return ALL_OFF;
+    }
+    if (first == 0xB662) { /* cpsie i */
+        return ALL_ON;
+    }
+    if ((first & 0xFFF0) != 0xF380) { /* msr */
+        return LOCK_UNCHANGED;
+    }
+    switch (second) {
+    case 0x8810: /* primask */
+        return ALL_ON;
+    case 0x8812: /* basepri_max */
+        return SOME_OFF;
+    case 0x8811: /* basepri */
+        return SOME_ON;
+    default:
+        return LOCK_UNCHANGED;
+    }
+}
+
+static bool is_return(uint32_t first, uint32_t second)
+{
+    return first == 0x4770                             /* bx lr */
+        || (first & 0xFF00) == 0xBD00                  /* pop {.., pc} */
+        || (first == 0xE8BD && (second & 0x8000) != 0) /* pop.w {.., pc} */
+        || (first == 0xF85D && second == 0xFB04);      /* ldr pc, [sp], #4 */
+}
+
+/* All that its encoding and its text say; the text must stay where it is. */
+static void decode(struct insn *insn, uint32_t pc, const uint8_t *bytes, const char *text)
+{
+    insn->pc = pc;
+    insn->size = size_of(bytes);
+    uint32_t first = halfword(bytes);
+    uint32_t second = insn->size == 4 ? halfword(bytes + 2) : 0;
+    insn->marker = marker_of(first, second);
+    insn->lock_change = lock_change_of(first, second);
+    insn->returns = is_return(first, second);
+    insn->text = text;
+    insn->cost = cost_of(text);
+    if (insn->marker != NO_MARKER) {
+        insn->cost.class = CLASS_MARKER;
+    }
+}
+
+static bool jumps(const struct insn *insn, const struct insn *previous)
+{
+    return insn->pc != previous->pc + previous->size;
+}
+
+/* Cycles of an instruction behind another one, or behind NULL. */
+static unsigned cycles_of(const struct insn *insn, const struct insn *previous)
+{
+    if (previous == NULL) {
+        return cycles_behind(&insn->cost, NULL, false);
+    }
+    return cycles_behind(&insn->cost, &previous->cost, jumps(insn, previous));
+}
+
+#endif
