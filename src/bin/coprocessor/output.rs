@@ -3,7 +3,7 @@
 use crate::board::SUPERVISOR;
 use crate::chip::bus::Bus;
 use crate::chip::watchdog::Watchdog;
-use crate::clock::BoardTime;
+use crate::clock::{self, BoardTime};
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{Imu, TURN};
 use crate::outgoing::{Outgoing, SlcanPort};
@@ -56,6 +56,8 @@ pub struct Output {
     windows: Windows,
     doubts: Doubts,
     tick: u32,
+    /// The millisecond in which the other lines were looked at.
+    looked: u32,
     wheels: Wheels,
     feeds: Feeds,
     outgoing: Outgoing,
@@ -87,6 +89,7 @@ impl Unconnected {
             windows,
             doubts,
             tick: 0,
+            looked: 0,
             wheels: Wheels::new(wheels),
             feeds: Feeds::new(config),
             outgoing: Outgoing::new(slcan, config.settings().bits_per_second, can),
@@ -106,8 +109,13 @@ impl Output {
     pub fn turn(&mut self, counters: &mut AllCounters, weights_damaged: bool, lane: &mut FogLane) {
         self.windows.has_network &= !weights_damaged;
         let now = self.time.now();
-        self.frames_in();
-        self.fog_in(lane, now);
+        // A part's bytes come one by one. All else is looked at with the next tick, or before the sample
+        // that they make.
+        let tick = clock::milliseconds();
+        let mut looked = core::mem::replace(&mut self.looked, tick) != tick;
+        if looked {
+            self.look(lane, now);
+        }
         let mut turn = TURN;
         loop {
             self.windows.deliver(self.guard.pipeline());
@@ -117,6 +125,9 @@ impl Output {
             }
             match self.imu.next_sample(&mut turn) {
                 Some(Ok(sample)) => {
+                    if !core::mem::replace(&mut looked, true) {
+                        self.look(lane, now);
+                    }
                     self.process(sample, now);
                     self.fog_out(lane, now);
                     self.frames_out();
@@ -124,6 +135,9 @@ impl Output {
                 Some(Err(())) => count(&mut self.lines.sensor_errors, 1),
                 None => break,
             }
+        }
+        if !looked {
+            return;
         }
         if let Some(vehicle) = self.guard.poll(now) {
             self.silence(vehicle, now);
@@ -139,6 +153,14 @@ impl Output {
         if SUPERVISOR.complete() {
             self.watchdog.feed();
         }
+    }
+
+    /// What has come on all other lines.
+    #[inline(never)]
+    fn look(&mut self, lane: &mut FogLane, now: Micros) {
+        self.frames_in();
+        self.fog_in(lane, now);
+        self.frames_out();
     }
 
     #[inline(never)]
