@@ -39,6 +39,11 @@ impl Outgoing {
         self.port.set_bus(if self.off() { StatusFlags::BUS_ERROR } else { StatusFlags::default() });
         // A byte that the line lost is answered as a bad line, or missing in it.
         let _ = self.port.service(&mut self.slcan, take);
+        self.refill();
+    }
+
+    /// Gives the controller what it has room for.
+    pub fn refill(&mut self) {
         if let Some(can) = self.can.as_mut() {
             self.queue.service(can);
         }

@@ -108,10 +108,10 @@ impl Output {
     #[inline(never)]
     pub fn turn(&mut self, counters: &mut AllCounters, weights_damaged: bool, lane: &mut FogLane) {
         self.windows.has_network &= !weights_damaged;
-        let now = self.time.now();
         // A part's bytes come one by one. All else is looked at with the next tick, or before the sample
-        // that they make.
+        // that they make; but for the CAN controller, which takes three frames at a time.
         let tick = clock::milliseconds();
+        let now = self.time.now();
         let mut looked = core::mem::replace(&mut self.looked, tick) != tick;
         if looked {
             self.look(lane, now);
@@ -137,12 +137,13 @@ impl Output {
             }
         }
         if !looked {
+            self.outgoing.refill();
             return;
         }
         if let Some(vehicle) = self.guard.poll(now) {
             self.silence(vehicle, now);
+            self.frames_out();
         }
-        self.frames_out();
         let watch = *self.guard.counters();
         *counters = AllCounters {
             pipeline: *self.guard.pipeline().counters(),
