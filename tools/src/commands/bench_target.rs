@@ -40,27 +40,19 @@ pub fn run(_: &Args, common: Common) -> super::Result {
     let coprocessor = ImageSize::read(&image)?;
     let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
     let out = &mut io::stdout().lock();
-    if common.json {
-        writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))?;
+    let told = if common.json {
+        writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))
     } else {
-        print(out, &counts, &coprocessor)?;
-        if let Some((tasks, schedule)) = &tasks {
-            writeln!(out, "{tasks}\n{schedule}")?;
-        }
-        if !counts.exact() {
-            writeln!(
-                out,
-                "no C compiler or no plugins: instructions from SysTick, +-6; cycles and deadlines left out"
-            )?;
-        }
-    }
+        print(out, &counts, &coprocessor, tasks.as_ref())
+    };
+    // Whether somebody reads it or not.
     if !counts.constant() {
         return Err("the count of a window depends on its input".into());
     }
     if tasks.is_some_and(|(_, schedule)| !schedule.met()) {
         return Err("a task of the image can miss its deadline".into());
     }
-    Ok(())
+    Ok(told?)
 }
 
 /// What the image's handlers cost, and whether that is in time.
@@ -75,7 +67,12 @@ fn schedule(workspace: &Path, image: &Path) -> Result<Timing, Box<dyn std::error
     Ok((tasks, schedule))
 }
 
-fn print(out: &mut impl Write, counts: &Counts, coprocessor: &ImageSize) -> io::Result<()> {
+fn print(
+    out: &mut impl Write,
+    counts: &Counts,
+    coprocessor: &ImageSize,
+    tasks: Option<&Timing>,
+) -> io::Result<()> {
     for Count { name, instructions, cycles, stack } in &counts.regions {
         match cycles {
             Some(cycles) => {
@@ -107,6 +104,15 @@ fn print(out: &mut impl Write, counts: &Counts, coprocessor: &ImageSize) -> io::
                 None => writeln!(out)?,
             }
         }
+    }
+    if let Some((tasks, schedule)) = tasks {
+        writeln!(out, "{tasks}\n{schedule}")?;
+    }
+    if !counts.exact() {
+        writeln!(
+            out,
+            "no C compiler or no plugins: instructions from SysTick, +-6; cycles and deadlines left out"
+        )?;
     }
     Ok(())
 }

@@ -28,38 +28,46 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let size = ImageSize::read(&elf)?;
     let stack = ImageStack::read(&std::fs::read(&elf)?)?;
     let measured = [size.flash, size.static_ram, stack.worst().into()];
-    let names = ["flash", "static_ram", "stack"];
-    let rows = || names.into_iter().zip(measured).zip(BUDGETS);
+    let rows: Vec<Row> = ["flash", "static_ram", "stack"].into_iter().zip(measured).zip(BUDGETS).collect();
     let out = &mut io::stdout().lock();
-    if common.json {
-        let rows = rows().map(|((name, bytes), budget)| {
-            (name.to_owned(), serde_json::json!({ "bytes": bytes, "budget": budget }))
-        });
-        let handlers = stack.handlers.iter().map(|handler| {
-            serde_json::json!({ "priority": handler.priority, "bytes": handler.bytes, "deepest": handler.deepest })
-        });
-        let mut json = serde_json::Value::Object(rows.collect());
-        json["stack_start"] = serde_json::json!({ "bytes": stack.start, "deepest": stack.deepest });
-        json["stack_main"] = serde_json::json!({ "bytes": stack.main, "deepest": stack.deepest_main });
-        json["stack_handlers"] = handlers.collect();
-        json["indirect_calls"] = stack.indirect_calls.into();
-        writeln!(out, "{json:#}")?;
-    } else {
-        for ((name, bytes), budget) in rows() {
-            writeln!(out, "{name} bytes={bytes} budget={budget}")?;
-        }
-        print(out, "start", stack.start, &stack.deepest)?;
-        print(out, "main", stack.main, &stack.deepest_main)?;
-        writeln!(out, "stack/handlers bytes={}", stack.handlers())?;
-        for Handler { priority, bytes, deepest } in &stack.handlers {
-            let name = priority.map_or(String::from("fault"), |priority| format!("priority {priority}"));
-            print(out, &name, *bytes, deepest)?;
-        }
-        writeln!(out, "calls through a register: {}", stack.indirect_calls)?;
+    let told =
+        if common.json { writeln!(out, "{:#}", json(&rows, &stack)) } else { tell(out, &rows, &stack) };
+    let over = rows.iter().filter(|((_, bytes), budget)| bytes > budget);
+    let over: Vec<_> = over.map(|((name, _), _)| *name).collect();
+    // Whether somebody reads it or not.
+    if over.is_empty() { Ok(told?) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
+}
+
+/// Name, bytes, budget.
+type Row = ((&'static str, u64), u64);
+
+fn json(rows: &[Row], stack: &ImageStack) -> serde_json::Value {
+    let rows = rows.iter().map(|((name, bytes), budget)| {
+        (String::from(*name), serde_json::json!({ "bytes": bytes, "budget": budget }))
+    });
+    let handlers = stack.handlers.iter().map(|handler| {
+        serde_json::json!({ "priority": handler.priority, "bytes": handler.bytes, "deepest": handler.deepest })
+    });
+    let mut json = serde_json::Value::Object(rows.collect());
+    json["stack_start"] = serde_json::json!({ "bytes": stack.start, "deepest": stack.deepest });
+    json["stack_main"] = serde_json::json!({ "bytes": stack.main, "deepest": stack.deepest_main });
+    json["stack_handlers"] = handlers.collect();
+    json["indirect_calls"] = stack.indirect_calls.into();
+    json
+}
+
+fn tell(out: &mut impl Write, rows: &[Row], stack: &ImageStack) -> io::Result<()> {
+    for ((name, bytes), budget) in rows {
+        writeln!(out, "{name} bytes={bytes} budget={budget}")?;
     }
-    let over: Vec<_> =
-        rows().filter(|((_, bytes), budget)| bytes > budget).map(|((name, _), _)| name).collect();
-    if over.is_empty() { Ok(()) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
+    print(out, "start", stack.start, &stack.deepest)?;
+    print(out, "main", stack.main, &stack.deepest_main)?;
+    writeln!(out, "stack/handlers bytes={}", stack.handlers())?;
+    for Handler { priority, bytes, deepest } in &stack.handlers {
+        let name = priority.map_or(String::from("fault"), |priority| format!("priority {priority}"));
+        print(out, &name, *bytes, deepest)?;
+    }
+    writeln!(out, "calls through a register: {}", stack.indirect_calls)
 }
 
 fn print(out: &mut impl Write, name: &str, bytes: u32, deepest: &Way) -> io::Result<()> {
