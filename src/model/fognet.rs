@@ -16,7 +16,7 @@
 //! the linear part is computed from the increments themselves, in [`Angle`]: it is exact.
 
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
-use super::gyronet::load_step;
+use super::input::load_step;
 use crate::nn::bilstm::{self, Layer, Pass, Run, Way};
 use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};

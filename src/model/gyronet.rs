@@ -1,11 +1,12 @@
 //! GyroNet in integers: ten samples in, the yaw gyro's error at each of them out, and how far off
 //! that may be.
 
-use super::blob::{Blob, HIDDEN, Normalisation};
+use super::blob::{Blob, HIDDEN};
+use super::input::load_step;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::nn::bilstm::{self, Pass, Run, Way};
 use crate::nn::lstm::Scratch;
-use crate::nn::{dense::Dense, exp2::times_exp2, pack};
+use crate::nn::{dense::Dense, exp2::times_exp2};
 use crate::units::AngularRate;
 use crate::window::{FEATURES, Features, WINDOW};
 
@@ -143,36 +144,4 @@ impl WindowNetwork for GyroNet<'_> {
             }
         }
     }
-}
-
-/// Normalises the codes of a step into its place in a first layer's input; counts what had to be clamped.
-/// A row of that input has `COLUMNS`, two in a word: an odd number of inputs has a zero behind it.
-pub(super) fn load_step<const INPUTS: usize, const COLUMNS: usize>(
-    input: &mut [u32],
-    step: usize,
-    codes: impl Iterator<Item = i32>,
-    normalisation: &[Normalisation; INPUTS],
-    clamp: i32,
-) -> u16 {
-    const { assert!(COLUMNS == INPUTS.next_multiple_of(2), "the last input has no word, or the next row moves") };
-    let mut clamped = 0;
-    let mut values = [0; COLUMNS];
-    for ((to, code), n) in values.iter_mut().zip(codes).zip(normalisation) {
-        let value = normalise(code, *n);
-        let inside = value.min(clamp).max(-clamp);
-        clamped += u16::from(inside != value);
-        *to = inside as i16;
-    }
-    for (k, [first, second]) in values.as_chunks::<2>().0.iter().enumerate() {
-        if let Some(word) = input.get_mut(bilstm::word_index(step, 2 * k, COLUMNS)) {
-            *word = pack(*first, *second);
-        }
-    }
-    clamped
-}
-
-/// (code - offset) * multiplier / 2^31 to nearest, saturated to 32 bits.
-fn normalise(code: i32, n: Normalisation) -> i32 {
-    let product = i64::from(code.saturating_sub(n.offset)) * i64::from(n.multiplier);
-    ((product + (1 << 30)) >> 31).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }

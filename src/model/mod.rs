@@ -8,6 +8,7 @@ pub mod fognet_blob;
 pub mod fognet_f32;
 pub mod gyronet;
 pub mod gyronet_f32;
+mod input;
 pub mod weights;
 
 pub use blob::{Blob, BlobError};
