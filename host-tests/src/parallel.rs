@@ -1,5 +1,16 @@
 //! Drives side by side: each takes a core for tens of seconds.
 
+/// A table of the lines that `judge` gives for each item, printed; what does not hold is told with it.
+///
+/// # Panics
+/// Where something does not hold.
+pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String, Vec<String>) + Sync) {
+    let (lines, failures): (Vec<_>, Vec<_>) = map(items, judge).into_iter().unzip();
+    let table = format!("{heading}\n{}", lines.concat());
+    println!("{table}");
+    assert!(failures.concat().is_empty(), "{failures:#?}\n{table}");
+}
+
 /// What `judge` says of each item, a thread for each, in their order.
 ///
 /// # Panics

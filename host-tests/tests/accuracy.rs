@@ -57,12 +57,6 @@ fn integer_network_against_f32() {
     let paths = TRIALS.map(|trial| recordings::trial("integer_network_against_f32", trial));
     let [Some(_), Some(_)] = paths else { return };
     let drives: Vec<_> = TRIALS.into_iter().zip(paths.into_iter().flatten()).collect();
-    let (rows, failures): (Vec<_>, Vec<_>) =
-        parallel::map(&drives, |(trial, path)| judge(*trial, path)).into_iter().unzip();
-    let table = format!(
-        "trial      static   1 s f32  1 s int    ratio  output RMS  scale RMS  windows  clamped\n{}",
-        rows.concat()
-    );
-    println!("{table}");
-    assert!(failures.concat().is_empty(), "{failures:?}\n{table}");
+    let heading = "trial      static   1 s f32  1 s int    ratio  output RMS  scale RMS  windows  clamped";
+    parallel::table(heading, &drives, |(trial, path)| judge(*trial, path));
 }

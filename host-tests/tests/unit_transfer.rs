@@ -183,12 +183,6 @@ fn another_unit_of_the_part() {
         return;
     }
     let drives: Vec<_> = TRIALS.into_iter().zip(paths.into_iter().flatten()).collect();
-    let (rows, failures): (Vec<_>, Vec<_>) =
-        parallel::map(&drives, |(trial, path)| judge(*trial, path)).into_iter().unzip();
-    let table = format!(
-        "1 s errors, rad           static |    inputs  ratio | recording  ratio |   perfect    unmoved  ratio\n{}",
-        rows.concat()
-    );
-    println!("{table}");
-    assert!(failures.concat().is_empty(), "{failures:#?}\n{table}");
+    let heading = "1 s errors, rad           static |    inputs  ratio | recording  ratio |   perfect    unmoved  ratio";
+    parallel::table(heading, &drives, |(trial, path)| judge(*trial, path));
 }
