@@ -104,11 +104,10 @@ pub fn layout(folder: &Path) -> Result<Layout, SequenceError> {
         Ok(Layout::Nclt)
     } else {
         let path = folder.display().to_string();
-        let there = fs::metadata(folder);
-        Err(there.map_or_else(
-            |source| SequenceError::Io { path: path.clone(), source },
-            |_| SequenceError::Unknown { path: path.clone() },
-        ))
+        Err(match fs::metadata(folder) {
+            Ok(_) => SequenceError::Unknown { path },
+            Err(source) => SequenceError::Io { path, source },
+        })
     }
 }
 
