@@ -1,0 +1,134 @@
+"""A board without a processor: time, events, interrupt lines and memory for the tests of single peripherals."""
+
+import heapq
+import sys
+from itertools import count
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from virtual_board.peripherals import create  # noqa: E402
+from virtual_board.peripherals.flash_map import BASE, SIZE  # noqa: E402
+
+US, MS, S = 1_000_000, 1_000_000_000, 1_000_000_000_000
+RAM = 0x2000_0000
+
+
+class Handle:
+    """A scheduled call that can be cancelled."""
+
+    def __init__(self, callback):
+        self.callback = callback
+
+    def cancel(self):
+        self.callback = None
+
+
+class FakeBoard:
+    """The board's side of the interface between core and peripherals."""
+
+    def __init__(self):
+        self.now = 0
+        self.queue, self.order = [], count()
+        self.lines, self.log, self.resets, self.nmis = {}, [], [], 0
+        self.stalled_until, self.clock_changes = 0, 0
+        self.flash, self.ram = bytearray(b"\xFF" * SIZE), bytearray(0x2_0000)
+        self.peripherals = {}
+        for peripheral in create(self):
+            self.peripherals[peripheral.name] = peripheral
+        self.rcc = self.peripherals["RCC"]
+        self.reset("por")
+
+    def schedule(self, delay_ps, callback):
+        handle = Handle(callback)
+        heapq.heappush(self.queue, (self.now + delay_ps, next(self.order), handle))
+        return handle
+
+    def irq(self, number, level):
+        self.lines[number] = level
+
+    def nmi(self):
+        self.nmis += 1
+
+    def request_reset(self, cause):
+        self.resets.append((self.now, cause))
+        self.stalled_until = 0
+        self.reset(cause)
+
+    def reset(self, cause):
+        for peripheral in self.peripherals.values():
+            peripheral.reset(cause)
+
+    def stall(self, until_ps):
+        self.stalled_until = until_ps
+
+    def record(self, kind, **fields):
+        self.log.append({"at": self.now, "kind": kind, **fields})
+
+    def clocks_changed(self):
+        self.clock_changes += 1
+
+    def _memory(self, address):
+        return (self.flash, address - BASE) if address < RAM else (self.ram, address - RAM)
+
+    def memory_read(self, address, length):
+        memory, start = self._memory(address)
+        return bytes(memory[start:start + length])
+
+    def memory_write(self, address, data):
+        memory, start = self._memory(address)
+        memory[start:start + len(data)] = data
+
+    # -- what a test does ------------------------------------------------------------------------------------------
+
+    def advance(self, duration_ps):
+        """Time passes, and every event on the way happens."""
+        end = self.now + duration_ps
+        while self.queue and self.queue[0][0] <= end:
+            at, _, handle = heapq.heappop(self.queue)
+            if handle.callback:
+                self.now = max(self.now, at)
+                callback, handle.callback = handle.callback, None
+                callback()
+        self.now = end
+
+    def read(self, name, offset, size=4):
+        return self.peripherals[name].read(offset, size)
+
+    def write(self, name, offset, value, size=4):
+        self.peripherals[name].write(offset, value, size)
+
+    def configure(self, name, key, value):
+        self.peripherals[name].configure(key, value)
+
+    def events(self, kind):
+        return [event for event in self.log if event["kind"] == kind]
+
+    def enable(self, *names):
+        """The RCC opens the gates of these peripherals."""
+        from virtual_board.peripherals.clock_names import ENABLE
+        for offset, bits in ENABLE.items():
+            for bit, name in bits.items():
+                if name in names:
+                    self.write("RCC", offset, self.read("RCC", offset) | 1 << bit)
+        self.advance(1 * US)
+
+    def alternate(self, letter, pin, function, speed=2):
+        """A pin gets an alternate function and a speed."""
+        port = "GPIO" + letter
+        self.write(port, 0x00, self.read(port, 0x00) & ~(3 << 2 * pin) | 2 << 2 * pin)
+        self.write(port, 0x08, self.read(port, 0x08) & ~(3 << 2 * pin) | speed << 2 * pin)
+        offset = 0x20 + 4 * (pin >> 3)
+        shift = 4 * (pin & 7)
+        self.write(port, offset, self.read(port, offset) & ~(15 << shift) | function << shift)
+
+    def run_at_168_mhz(self):
+        """A 25 MHz crystal and the PLL give 168, 42 and 84 MHz."""
+        self.write("FLASH", 0x00, 5)
+        self.write("RCC", 0x00, 0x0001_0083)
+        self.advance(3 * MS)
+        self.write("RCC", 0x04, 0x0740_5419)
+        self.write("RCC", 0x00, 0x0101_0083)
+        self.advance(1 * MS)
+        self.write("RCC", 0x08, 0x0000_9402)
+        self.advance(1 * US)

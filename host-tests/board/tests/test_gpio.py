@@ -1,0 +1,65 @@
+"""Ports, SYSCFG, EXTI and the debug component: sections 8, 9, 12 and 38 of RM0090."""
+
+import unittest
+
+from .fake_board import FakeBoard
+
+
+class Gpio(unittest.TestCase):
+    def setUp(self):
+        self.board = FakeBoard()
+
+    def test_reset_values(self):
+        self.assertEqual([self.board.read("GPIOA", offset) for offset in (0, 8, 12)], [0xA800_0000, 0x0C00_0000, 0x6400_0000])
+        self.assertEqual([self.board.read("GPIOB", offset) for offset in (0, 8, 12)], [0x280, 0xC0, 0x100])
+        self.assertEqual(self.board.read("GPIOC", 0), 0)
+
+    def test_bsrr_sets_before_it_resets(self):
+        self.board.write("GPIOC", 0x14, 0x000F)
+        self.board.write("GPIOC", 0x18, 0x0003_0031)
+        self.assertEqual(self.board.read("GPIOC", 0x14), 0x003D)
+
+    def test_an_output_is_seen_and_recorded(self):
+        self.board.configure("GPIOA", "watch", [10])
+        self.board.write("GPIOA", 0x00, 0xA800_0000 | 1 << 20)
+        self.board.write("GPIOA", 0x18, 1 << 10)
+        self.assertEqual(self.board.read("GPIOA", 0x10) >> 10 & 1, 1)
+        self.assertEqual([event["level"] for event in self.board.events("pin")], [True])
+
+    def test_inputs(self):
+        self.assertEqual(self.board.read("GPIOC", 0x10), 0)
+        self.board.write("GPIOC", 0x0C, 1)
+        self.assertEqual(self.board.read("GPIOC", 0x10), 1)
+        self.board.configure("GPIOC", "drive", (0, False))
+        self.assertEqual(self.board.read("GPIOC", 0x10), 0)
+
+    def test_locked_pins_keep_their_configuration(self):
+        for value in (0x1_0001, 0x0_0001, 0x1_0001):
+            self.board.write("GPIOC", 0x1C, value)
+        self.assertTrue(self.board.read("GPIOC", 0x1C) & 1 << 16)
+        self.board.write("GPIOC", 0x00, 0x5)
+        self.assertEqual(self.board.read("GPIOC", 0x00), 0x4)
+
+    def test_a_pin_interrupts_through_syscfg_and_exti(self):
+        self.board.write("SYSCFG", 0x08, 2)
+        self.board.write("EXTI", 0x00, 1)
+        self.board.write("EXTI", 0x08, 1)
+        self.board.configure("GPIOC", "drive", (0, True))
+        self.assertTrue(self.board.lines[6])
+        self.board.write("EXTI", 0x14, 1)
+        self.assertFalse(self.board.lines[6])
+
+    def test_software_interrupt(self):
+        self.board.write("EXTI", 0x00, 1 << 5)
+        self.board.write("EXTI", 0x10, 1 << 5)
+        self.assertTrue(self.board.lines[23])
+        self.board.write("EXTI", 0x14, 1 << 5)
+        self.assertEqual(self.board.read("EXTI", 0x10), 0)
+
+    def test_identity(self):
+        self.assertEqual(self.board.read("DBGMCU", 0) & 0xFFF, 0x413)
+        self.assertEqual(self.board.read("SIGNATURE", 0x22, 2), 1024)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,158 @@
+"""Timers: sections 18 and 19 of RM0090."""
+
+import random
+import unittest
+
+from .fake_board import MS, US, FakeBoard
+from virtual_board.violation import Violation
+
+CR1, DIER, SR, EGR, CCMR1, CCER, CNT, PSC, ARR, CCR1, OR = 0, 0x0C, 0x10, 0x14, 0x18, 0x20, 0x24, 0x28, 0x2C, 0x34, 0x50
+
+
+class Timers(unittest.TestCase):
+    def setUp(self):
+        self.board = FakeBoard()
+        self.board.enable("TIM2", "TIM5", "TIM11")
+
+    def test_free_running_microseconds_over_the_wrap(self):
+        self.board.write("TIM5", PSC, 15)
+        self.board.write("TIM5", EGR, 1)
+        self.board.write("TIM5", SR, 0)
+        self.board.write("TIM5", CR1, 1)
+        self.board.advance(123 * US)
+        self.assertEqual(self.board.read("TIM5", CNT), 123)
+        self.board.advance(2**32 * US)
+        self.assertEqual(self.board.read("TIM5", CNT), 123)
+        self.assertEqual(self.board.read("TIM5", SR) & 1, 1)
+
+    def test_prescaler_waits_for_an_update(self):
+        self.board.write("TIM2", PSC, 15)
+        self.board.write("TIM2", CR1, 1)
+        self.board.advance(1 * US)
+        self.assertEqual(self.board.read("TIM2", CNT), 16)
+
+    def test_update_interrupt(self):
+        self.board.write("TIM2", PSC, 15)
+        self.board.write("TIM2", ARR, 999)
+        self.board.write("TIM2", EGR, 1)
+        self.board.write("TIM2", SR, 0)
+        self.board.write("TIM2", DIER, 1)
+        self.board.write("TIM2", CR1, 1)
+        self.board.advance(999 * US)
+        self.assertFalse(self.board.lines[28])
+        self.board.advance(1 * US)
+        self.assertTrue(self.board.lines[28])
+        self.board.write("TIM2", SR, 0)
+        self.assertFalse(self.board.lines[28])
+        self.board.advance(1 * MS)
+        self.assertTrue(self.board.lines[28])
+
+    def test_compare_interrupt(self):
+        self.board.write("TIM5", PSC, 15)
+        self.board.write("TIM5", EGR, 1)
+        self.board.write("TIM5", SR, 0)
+        self.board.write("TIM5", CCR1, 500)
+        self.board.write("TIM5", CR1, 1)
+        self.board.write("TIM5", DIER, 2)
+        self.board.advance(499 * US)
+        self.assertFalse(self.board.lines.get(50))
+        self.board.advance(2 * US)
+        self.assertTrue(self.board.lines[50])
+        self.board.write("TIM5", SR, 0xFFFF_FFFD)
+        self.board.write("TIM5", CCR1, 600)
+        self.assertFalse(self.board.lines[50])
+        self.board.advance(100 * US)
+        self.assertTrue(self.board.lines[50])
+
+    def test_a_change_of_clock_keeps_the_count(self):
+        self.board.write("TIM5", PSC, 15)
+        self.board.write("TIM5", EGR, 1)
+        self.board.write("TIM5", CR1, 1)
+        self.board.advance(1 * MS)
+        self.board.run_at_168_mhz()
+        after = self.board.read("TIM5", CNT)
+        self.board.advance(1 * MS)
+        self.assertAlmostEqual(self.board.read("TIM5", CNT) - after, 84_000 / 16, delta=1)
+
+    def test_tim11_measures_the_crystal_against_the_bus_clock(self):
+        self.board.run_at_168_mhz()
+        self.board.write("RCC", 0x08, self.board.read("RCC", 0x08) & ~(31 << 16) | 25 << 16)
+        self.board.write("TIM11", OR, 2)
+        self.board.write("TIM11", CCMR1, 1 | 3 << 2)
+        self.board.write("TIM11", CCER, 1)
+        self.board.write("TIM11", CR1, 1)
+        captures = []
+        while len(captures) < 3:
+            self.board.advance(1 * US)
+            if self.board.read("TIM11", SR) & 2:
+                captures.append(self.board.read("TIM11", CCR1))
+        differences = {(b - a) % 65_536 for a, b in zip(captures, captures[1:])}
+        self.assertEqual(differences, {8 * 168})
+
+    def test_overcapture(self):
+        self.board.run_at_168_mhz()
+        self.board.write("RCC", 0x08, self.board.read("RCC", 0x08) & ~(31 << 16) | 25 << 16)
+        self.board.write("TIM11", OR, 2)
+        self.board.write("TIM11", CCMR1, 1)
+        self.board.write("TIM11", CCER, 1)
+        self.board.write("TIM11", CR1, 1)
+        self.board.advance(10 * US)
+        self.assertEqual(self.board.read("TIM11", SR) & 0x202, 0x202)
+
+    def test_tim5_measures_the_lsi(self):
+        self.board.write("RCC", 0x74, 1)
+        self.board.advance(1 * MS)
+        self.board.write("TIM5", OR, 0x40)
+        self.board.write("TIM5", 0x1C, 0x0100)
+        self.board.write("TIM5", CCER, 1 << 12)
+        self.board.write("TIM5", DIER, 1 << 4)
+        self.board.write("TIM5", CR1, 1)
+        captures = []
+        for _ in range(100):
+            self.board.advance(1 * US)
+            if self.board.lines[50]:
+                captures.append(self.board.read("TIM5", 0x40))
+        self.assertEqual({b - a for a, b in zip(captures, captures[1:])}, {500})
+
+    def test_against_a_count_step_by_step(self):
+        """Flags and counter after any wait are those of a counter that is stepped one by one."""
+        source = random.Random(1)
+        for _ in range(200):
+            board = FakeBoard()
+            board.enable("TIM3")
+            arr, ccr, counter = source.randrange(1, 30), source.randrange(40), source.randrange(40)
+            prescaler, late = source.randrange(4), source.randrange(4)
+            board.write("TIM3", PSC, prescaler)
+            board.write("TIM3", ARR, arr)
+            board.write("TIM3", CCR1, ccr)
+            board.write("TIM3", EGR, 1)
+            board.write("TIM3", PSC, late)
+            board.write("TIM3", CNT, counter)
+            board.write("TIM3", SR, 0)
+            board.write("TIM3", CR1, 1)
+            flags, clock = 0, 0
+            for _ in range(3):
+                wait = source.randrange(300)
+                board.advance(wait * 62_500)
+                for _ in range(wait):
+                    clock += 1
+                    if clock > prescaler:
+                        clock = 0
+                        if counter == arr or counter == 0xFFFF:
+                            counter, prescaler = 0, late
+                            flags |= 1
+                        else:
+                            counter += 1
+                        flags |= 2 if counter == ccr else 0
+                if source.random() < 0.5:
+                    self.assertEqual(board.read("TIM3", CNT), counter)
+                self.assertEqual(board.read("TIM3", SR) & 3, flags)
+                self.assertEqual(board.read("TIM3", CNT), counter)
+
+    def test_modes_left_out(self):
+        with self.assertRaises(Violation):
+            self.board.write("TIM2", CR1, 0x11)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,32 @@
+"""Serves a board over standard input and output: a JSON object a line, answered by a JSON object a line.
+
+Time passes only during the command `run`, so a test and the board are in lockstep.
+"""
+
+import argparse
+import json
+import sys
+
+from .session import Session
+from .violation import Violation
+
+
+def main() -> None:
+    """Answers commands until standard input ends."""
+    parser = argparse.ArgumentParser(prog="virtual_board", description=__doc__)
+    parser.add_argument("--elf", required=True, help="the image, as it is flashed")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the noise in RAM at power-on")
+    arguments = parser.parse_args()
+    session = Session(arguments.elf, arguments.seed)
+    for line in sys.stdin:
+        try:
+            answer = session.answer(json.loads(line))
+        except Violation as violation:
+            answer = {"error": str(violation), "violation": True}
+        except Exception as error:  # The client hears of any error, and the board goes on.
+            answer = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main()

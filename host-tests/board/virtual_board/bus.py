@@ -1,0 +1,125 @@
+"""The bus: which register block an address belongs to, and what is refused.
+
+A peripheral whose clock is off does not answer (RM0090 section 7.3), an address without a modelled register cannot be
+answered, and the bit-band aliases are not modelled: each is a violation.
+"""
+
+from .violation import Violation
+
+PRIVATE = 0xE000_0000
+
+
+class Fixed:
+    """Registers of the core with fixed contents: ICTR (96 lines) and ACTLR."""
+
+    base, size = 0xE000E004, 8
+
+    def __init__(self):
+        self.actlr = 0
+
+    def read(self, offset: int, size: int) -> int:
+        """Reads a register."""
+        return self.actlr if offset >= 4 else 2
+
+    def write(self, offset: int, value: int, size: int) -> None:
+        """Writes ACTLR, whose bits change timing alone."""
+        if offset < 4:
+            raise Violation("ICTR is read-only")
+        self.actlr = value
+
+
+class Bus:
+    """Routes accesses to peripherals and to the core's own registers."""
+
+    def __init__(self, board):
+        self.board = board
+        self.blocks: dict[int, object] = {}
+        self.private: dict[int, object] = {}
+        #: Names of peripherals whose accesses go to the event log.
+        self.traced: set[str] = set()
+        #: Name of the peripheral whose accesses are counted, the count that is left, and what happens then.
+        self.counted: str | None = None
+        self.left = 0
+        self.on_count = None
+
+    def attach(self, peripheral) -> None:
+        """Adds a peripheral at its addresses."""
+        for block in range(peripheral.base >> 10, (peripheral.base + peripheral.size + 1023) >> 10):
+            if block in self.blocks:
+                raise ValueError(f"{peripheral.name} lies on {self.blocks[block].name}")
+            self.blocks[block] = peripheral
+
+    def attach_private(self, device) -> None:
+        """Adds registers of the core."""
+        for word in range(device.base >> 2, (device.base + device.size) >> 2):
+            self.private[word] = device
+
+    def _find(self, address: int):
+        if address >= PRIVATE:
+            device = self.private.get(address >> 2)
+            if device is not None:
+                return device
+        peripheral = self.blocks.get(address >> 10)
+        if peripheral is None:
+            if 0x4200_0000 <= address < 0x4400_0000:
+                raise Violation("the bit-band alias is not modelled", address)
+            raise Violation("no peripheral is modelled here", address)
+        if peripheral.clock is not None and not self.board.rcc.enabled(peripheral.clock):
+            raise Violation(f"{peripheral.name} is used while its clock ({peripheral.clock}) is off", address)
+        return peripheral
+
+    def read(self, address: int, size: int) -> int:
+        """Reads a register."""
+        if self.board.halted_inside_slice:
+            return 0
+        device = self._find(address)
+        if address & size - 1:
+            raise Violation("unaligned register access", address)
+        try:
+            value = device.read(address - device.base, size)
+        except Violation as violation:
+            violation.address = address
+            raise
+        if self.traced or self.counted:
+            self._note(device, "read", address, value)
+        return value
+
+    def write(self, address: int, value: int, size: int) -> None:
+        """Writes a register."""
+        if self.board.halted_inside_slice:
+            return
+        device = self._find(address)
+        if address & size - 1:
+            raise Violation("unaligned register access", address)
+        try:
+            device.write(address - device.base, value, size)
+        except Violation as violation:
+            violation.address = address
+            raise
+        if self.traced or self.counted:
+            self._note(device, "write", address, value)
+
+    def _note(self, device, access: str, address: int, value: int) -> None:
+        name = getattr(device, "name", None)
+        if name in self.traced:
+            self.board.record("register", peripheral=name, access=access, address=address, value=value)
+        if name is not None and name == self.counted:
+            self._count()
+
+    def _count(self) -> None:
+        self.left -= 1
+        if self.left <= 0:
+            self.counted = None
+            self.on_count()
+
+    def count(self, name: str, accesses: int, callback) -> None:
+        """Calls back after so many accesses to a peripheral. Writes to the flash array count for FLASH."""
+        self.counted, self.left, self.on_count = name, accesses, callback
+
+    def write_memory(self, address: int, value: int, size: int) -> None:
+        """Hands a write to the flash array to the flash controller."""
+        if self.board.halted_inside_slice:
+            return
+        self.board.flash.program(address, value, size)
+        if self.counted == self.board.flash.name:
+            self._count()

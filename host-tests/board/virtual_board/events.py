@@ -1,0 +1,57 @@
+"""The queue of what happens at a known board time.
+
+Times are integer picoseconds. Events of one time run in the order in which they were scheduled.
+"""
+
+import heapq
+
+
+class Handle:
+    """A scheduled call, which can be cancelled until it has run."""
+
+    __slots__ = ("callback",)
+
+    def __init__(self, callback):
+        self.callback = callback
+
+    def cancel(self) -> None:
+        """Takes the call out of the queue. Nothing happens when it has run."""
+        self.callback = None
+
+
+class EventQueue:
+    """Holds the scheduled calls, the earliest first."""
+
+    def __init__(self):
+        #: (time, order, handle); the order is unique, so handles are never compared.
+        self.heap: list[tuple[int, int, Handle]] = []
+        self.order = 0
+
+    def schedule(self, time: int, callback) -> Handle:
+        """Adds a call at a board time."""
+        self.order += 1
+        handle = Handle(callback)
+        heapq.heappush(self.heap, (time, self.order, handle))
+        return handle
+
+    def next_time(self) -> int | None:
+        """Returns the time of the earliest call, or `None` when the queue is empty."""
+        heap = self.heap
+        while heap and heap[0][2].callback is None:
+            heapq.heappop(heap)
+        return heap[0][0] if heap else None
+
+    def pop_due(self, now: int):
+        """Takes out the earliest call that is due and returns it, or `None`."""
+        time = self.next_time()
+        if time is None or time > now:
+            return None
+        handle = heapq.heappop(self.heap)[2]
+        callback, handle.callback = handle.callback, None
+        return callback
+
+    def clear(self) -> None:
+        """Cancels everything."""
+        for _, _, handle in self.heap:
+            handle.callback = None
+        self.heap = []

@@ -1,0 +1,246 @@
+"""Exception entry and return (DDI0403 B1.5.6 to B1.5.8) and faults (B1.5.14, B1.5.15).
+
+An entry stores the frame at once, with the FPU's registers when CONTROL.FPCA is set; the chip stores these lazily. A
+program sees the difference only in the time and in FPCCR.LSPACT. Tail-chaining is a return followed by an entry before
+any instruction runs.
+"""
+
+import struct
+
+from .nvic import BUS_FAULT, HARD_FAULT, MEM_MANAGE, NMI, SVCALL, USAGE_FAULT
+from .registers import Batch
+from .violation import Violation
+
+# Bits of CFSR.
+IACCVIOL, MSTKERR = 1 << 0, 1 << 4
+IBUSERR, PRECISERR, UNSTKERR, STKERR, BFARVALID = 1 << 8, 1 << 9, 1 << 11, 1 << 12, 1 << 15
+UNDEFINSTR, INVSTATE, INVPC, NOCP = 1 << 16, 1 << 17, 1 << 18, 1 << 19
+# Bits of HFSR.
+VECTTBL, FORCED, DEBUGEVT = 1 << 1, 1 << 30, 1 << 31
+# Bits of CONTROL. SFPA is ARMv8-M's. Unicorn takes its M4 for one in the secure state, and gives a program whose CONTROL has FPCA
+# without SFPA a new FPSCR with its next FPU instruction: both are set and cleared together.
+SPSEL, FPCA, SFPA = 2, 4, 8
+
+#: Unicorn's numbers of what a program raises.
+UC_SVC, UC_BKPT, UC_EXCEPTION_RETURN, UC_NOCP, UC_INVSTATE = 2, 7, 8, 17, 18
+#: Core clocks from the last instruction to the first of the handler, and back (DDI0439 section 3.9.1, no wait states).
+ENTRY_CLOCKS, RETURN_CLOCKS = 12, 10
+
+
+class Exceptions:
+    """Moves the processor into and out of handlers."""
+
+    def __init__(self, board):
+        self.board = board
+        processor = board.processor
+        self.frame = Batch(processor.handle, "r0 r1 r2 r3 r12 lr pc xpsr sp control primask basepri faultmask")
+        self.enter_batch = Batch(processor.handle, "sp control all_xpsr apsr_nzcv lr pc")
+        self.at_return = Batch(processor.handle, "pc control faultmask msp psp")
+        # The exception number goes first: in Thread mode CONTROL.SPSEL can be written, and then `sp` is the right one.
+        self.leave = Batch(processor.handle, "all_xpsr control r0 r1 r2 r3 r12 lr sp apsr_nzcv pc")
+        #: In the order and with the padding of the frame.
+        self.fpu = Batch(processor.handle, " ".join(f"d{n}" for n in range(8)) + " fpscr")
+        #: The exception number in IPSR.
+        self.current = 0
+
+    def reset(self) -> None:
+        """Forgets the handler that was running."""
+        self.current = 0
+
+    def dispatch(self) -> bool:
+        """Enters the exception that is due now. Returns whether there was one."""
+        highest = self.board.nvic.highest_pending()
+        if highest is None:
+            return False
+        number, priority = highest
+        registers = self.frame.read()
+        if self.board.nvic.group(priority) >= self.board.nvic.execution_priority(*registers[-3:]):
+            return False
+        self.enter(number, registers)
+        return True
+
+    def execution_priority(self) -> int:
+        """Returns the current execution priority."""
+        primask, basepri, faultmask, _ = self.board.processor.masks.read()
+        return self.board.nvic.execution_priority(primask, basepri, faultmask)
+
+    def enter(self, number: int, registers: list[int] | None = None) -> None:
+        """Stores the frame and begins the handler. `registers`: those of `frame`, where they have been read."""
+        board = self.board
+        r0, r1, r2, r3, r12, lr, pc, xpsr, sp, control, *_ = registers or self.frame.read()
+        extended = control & FPCA
+        length = 104 if extended else 32
+        frame = sp - length & ~7 & 0xFFFF_FFFF
+        saved_xpsr = xpsr & ~(1 << 9) | (sp >> 2 & 1) << 9
+        data = struct.pack("<8I", r0, r1, r2, r3, r12, lr, pc, saved_xpsr)
+        if extended:
+            data += self.fpu.read_bytes()
+            board.scb.fpcar = frame + 32
+        in_thread = self.current == 0
+        excret = 0xFFFF_FFE1 | (0 if extended else 0x10) | (0x8 if in_thread else 0)
+        if in_thread and control & SPSEL:
+            excret |= 4
+        if not board.memory.write_stack(frame, data):
+            number = self._stacking_error(number, frame)
+        self._begin(number, frame, xpsr, control, excret)
+
+    def _stacking_error(self, number: int, frame: int) -> int:
+        """Returns the exception that is entered when the frame of `number` cannot be stored (B1.5.7, B1.5.15).
+
+        The frame is lost, the stack pointer moves all the same, and `number` stays pending behind the fault. HardFault
+        and NMI are entered in spite of it.
+        """
+        nvic, scb = self.board.nvic, self.board.scb
+        self.board.record("fault", what="the exception frame cannot be stored", sp=frame)
+        scb.cfsr |= STKERR
+        if number in (NMI, HARD_FAULT):
+            return number
+        nvic.pending |= 1 << number
+        own = nvic.group(nvic.priority[BUS_FAULT])
+        if nvic.enabled >> BUS_FAULT & 1 and own < nvic.group(nvic.priority[number]):
+            return BUS_FAULT
+        scb.hfsr |= FORCED
+        return HARD_FAULT
+
+    def _begin(self, number: int, frame: int, xpsr: int, control: int, excret: int) -> None:
+        board = self.board
+        vector = board.memory.read(board.scb.vtor + 4 * number, 4)
+        if vector is None:
+            board.scb.hfsr |= VECTTBL
+            if number in (HARD_FAULT, NMI):
+                board.lock_up("the vector of a fault cannot be read")
+                return
+            board.nvic.pending |= 1 << number
+            number = HARD_FAULT
+            vector = board.memory.read(board.scb.vtor + 4 * number, 4)
+            if vector is None:
+                board.lock_up("the vector of HardFault cannot be read")
+                return
+        target = int.from_bytes(vector, "little")
+        board.nvic.activate(number)
+        self.current = number
+        entered = xpsr & 0xF80F_0000 | (target & 1) << 24 | number
+        self.enter_batch.write(frame, control & ~(SPSEL | FPCA | SFPA), entered, entered & 0xF000_0000, excret, target)
+        board.processor.start_at = target & ~1
+        board.spend(ENTRY_CLOCKS)
+        board.exception_entered(number)
+
+    def processor_event(self, number: int) -> None:
+        """Handles what unicorn reports while it runs: SVC, BKPT, the return from an exception, a missing coprocessor."""
+        if number == UC_EXCEPTION_RETURN:
+            self._return()
+            while self.dispatch():
+                pass
+        elif number == UC_SVC:
+            self.raise_synchronous(SVCALL)
+        elif number == UC_BKPT:
+            # Without a debugger a breakpoint is a HardFault (C1.3).
+            self.board.scb.hfsr |= DEBUGEVT
+            self._hard_fault("a breakpoint without a debugger")
+        elif number == UC_NOCP:
+            self.usage_fault(NOCP, "an instruction for a coprocessor that is absent or off")
+        elif number == UC_INVSTATE:
+            self.usage_fault(INVSTATE, "an instruction with EPSR.T = 0")
+        else:
+            raise Violation(f"unicorn raised event {number}")
+
+    def _return(self) -> None:
+        board = self.board
+        nvic = board.nvic
+        excret, control, faultmask, msp, psp = self.at_return.read()
+        excret |= 1
+        known = excret in (0xFFFF_FFE1, 0xFFFF_FFE9, 0xFFFF_FFED, 0xFFFF_FFF1, 0xFFFF_FFF9, 0xFFFF_FFFD)
+        to_thread = bool(excret & 8)
+        others = nvic.active & ~(1 << self.current)
+        leaving = self.current
+        nvic.deactivate(leaving)
+        if faultmask and leaving != NMI:
+            board.processor.set("faultmask", 0)
+        if not known or (to_thread and others and not board.scb.ccr & 1) or (not to_thread and not others):
+            self._return_fault(excret, f"EXC_RETURN 0x{excret:08X} does not fit the active exceptions")
+            return
+        frame = psp if excret & 4 else msp
+        extended = not excret & 0x10
+        length = 104 if extended else 32
+        data = board.memory.read(frame, length)
+        if data is None:
+            self._return_fault(excret, "the frame cannot be read", BUS_FAULT, UNSTKERR)
+            return
+        r0, r1, r2, r3, r12, lr, pc, xpsr = struct.unpack_from("<8I", data)
+        number = xpsr & 0x1FF
+        if (number == 0) != to_thread:
+            self._return_fault(excret, "the stored xPSR does not fit EXC_RETURN", USAGE_FAULT, INVPC)
+            return
+        if extended:
+            self.fpu.write_bytes(data[32:])
+        sp = frame + length | (xpsr >> 9 & 1) << 2
+        control = control & 1 | (SPSEL if excret & 4 else 0) | (FPCA | SFPA if extended else 0)
+        self.current = number
+        xpsr &= 0xFF0F_FDFF
+        target = pc & ~1 | xpsr >> 24 & 1
+        self.leave.write(xpsr, control, r0, r1, r2, r3, r12, lr, sp, xpsr & 0xF000_0000, target)
+        board.spend(RETURN_CLOCKS)
+        board.exception_left(leaving, to_thread)
+
+    def _return_fault(self, excret: int, why: str, kind: int = USAGE_FAULT, bit: int = INVPC) -> None:
+        """Takes a fault of the return itself: the frame stays, and the handler's LR holds EXC_RETURN."""
+        board = self.board
+        board.processor.set("lr", excret)
+        self.current = 0 if excret & 8 else self.current
+        board.record("fault", what=why)
+        number = self._fault_number(kind, bit, why)
+        if number is None:
+            return
+        xpsr, sp, control = self.frame.read()[7:10]
+        self._begin(number, sp, xpsr, control, excret)
+
+    def raise_synchronous(self, number: int) -> None:
+        """Takes an exception that an instruction asks for; one that may not preempt becomes a HardFault."""
+        nvic = self.board.nvic
+        if nvic.group(nvic.priority[number]) < self.execution_priority():
+            self.enter(number)
+        else:
+            self._hard_fault("an SVC that its priority does not allow")
+
+    def usage_fault(self, bit: int, why: str) -> None:
+        """Takes a UsageFault."""
+        self._fault(USAGE_FAULT, bit, why)
+
+    def bus_fault(self, bit: int, address: int | None, why: str) -> None:
+        """Takes a BusFault; `address` goes to BFAR."""
+        if address is not None:
+            self.board.scb.bfar = address
+            bit |= BFARVALID
+        self._fault(BUS_FAULT, bit, why)
+
+    def mem_manage(self, bit: int, why: str) -> None:
+        """Takes a MemManage fault."""
+        self._fault(MEM_MANAGE, bit, why)
+
+    def _fault(self, kind: int, bit: int, why: str) -> None:
+        pc, = self.board.processor.pc.read()
+        self.board.record("fault", what=why, pc=pc, symbol=self.board.symbol_at(pc))
+        number = self._fault_number(kind, bit, why)
+        if number is not None:
+            self.enter(number)
+
+    def _fault_number(self, kind: int, bit: int, why: str) -> int | None:
+        """Sets the status bits and returns the exception to enter. `None`: the core has locked up."""
+        nvic, scb = self.board.nvic, self.board.scb
+        scb.cfsr |= bit
+        priority = self.execution_priority()
+        if nvic.enabled >> kind & 1 and nvic.group(nvic.priority[kind]) < priority:
+            return kind
+        if priority <= -1:
+            self.board.lock_up(why)
+            return None
+        scb.hfsr |= FORCED
+        return HARD_FAULT
+
+    def _hard_fault(self, why: str) -> None:
+        pc, = self.board.processor.pc.read()
+        self.board.record("fault", what=why, pc=pc, symbol=self.board.symbol_at(pc))
+        if self.execution_priority() <= -1:
+            self.board.lock_up(why)
+        else:
+            self.enter(HARD_FAULT)

@@ -1,0 +1,138 @@
+"""The interrupt controller (DDI0403 B3.4) and the priorities of all exceptions (B1.5.4).
+
+Exceptions are numbered as in IPSR: 2 NMI, 3 HardFault, 11 SVCall, 14 PendSV, 15 SysTick, 16 onwards the external
+interrupts. Sets of exceptions are integers with one bit each. The STM32F405 has 82 interrupts and 4 priority bits
+(RM0090 section 12.1).
+"""
+
+from .violation import Violation
+
+INTERRUPTS = 82
+COUNT = 16 + INTERRUPTS
+PRIORITY_MASK = 0xF0
+NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT, SVCALL, PENDSV, SYSTICK = 2, 3, 4, 5, 6, 11, 14, 15
+#: The execution priority of Thread mode with nothing masked.
+LOWEST = 256
+
+
+def bits(mask: int):
+    """Yields the positions of the bits that are set."""
+    while mask:
+        lowest = mask & -mask
+        yield lowest.bit_length() - 1
+        mask ^= lowest
+
+
+class Nvic:
+    """Holds which exceptions are enabled, pending and active, and their priorities."""
+
+    base, size = 0xE000E100, 0xC00
+
+    def __init__(self, board):
+        self.board = board
+        self.reset()
+
+    def reset(self) -> None:
+        """Disables, ends and forgets everything. Lines keep their level: the peripherals drive them."""
+        self.enabled = 1 << NMI | 1 << HARD_FAULT | 1 << SVCALL | 1 << PENDSV | 1 << SYSTICK
+        self.pending = 0
+        self.active = 0
+        self.lines = getattr(self, "lines", 0)
+        self.priority = [LOWEST] * 2 + [-2, -1] + [0] * (COUNT - 4)
+        self.group_mask = 0xFF  # AIRCR.PRIGROUP = 0: bits 7 to 1 preempt, and bit 0 is not implemented.
+
+    def set_line(self, number: int, level: bool) -> None:
+        """Drives an interrupt line. A rising edge makes the interrupt pending, of an active one once more after its end."""
+        bit = 1 << 16 + number
+        if not 0 <= number < INTERRUPTS:
+            raise ValueError(f"interrupt {number}")
+        if not level:
+            self.lines &= ~bit
+        elif not self.lines & bit:
+            self.lines |= bit
+            self.pend(16 + number)
+
+    def pend(self, number: int) -> None:
+        """Makes an exception pending."""
+        self.pending |= 1 << number
+        if self.enabled >> number & 1:
+            self.board.interrupt_raised()
+
+    def activate(self, number: int) -> None:
+        """Begins an exception."""
+        self.active |= 1 << number
+        self.pending &= ~(1 << number)
+
+    def deactivate(self, number: int) -> None:
+        """Ends an exception. A line that is still high makes it pending again."""
+        bit = 1 << number
+        self.active &= ~bit
+        if self.lines & bit:
+            self.pending |= bit
+
+    def highest_pending(self) -> tuple[int, int] | None:
+        """Returns number and priority of the pending, enabled exception that comes first."""
+        ready = self.pending & self.enabled
+        if not ready:
+            return None
+        if not ready & ready - 1:
+            number = ready.bit_length() - 1
+            return number, self.priority[number]
+        return min(((self.priority[n], n) for n in bits(ready)))[::-1]
+
+    def preempts(self) -> bool:
+        """Says whether a pending exception comes before the active ones, if no mask holds it back."""
+        highest = self.highest_pending()
+        return highest is not None and self.group(highest[1]) < self.execution_priority(0, 0, 0)
+
+    def execution_priority(self, primask: int, basepri: int, faultmask: int) -> int:
+        """Returns the priority that an exception must undercut to be taken."""
+        lowest = min([self.group(self.priority[n]) for n in bits(self.active)]) if self.active else LOWEST
+        if basepri & PRIORITY_MASK:
+            lowest = min(lowest, self.group(basepri & PRIORITY_MASK))
+        if primask & 1:
+            lowest = min(lowest, 0)
+        if faultmask & 1:
+            lowest = min(lowest, -1)
+        return lowest
+
+    def group(self, priority: int) -> int:
+        """Returns the part of a priority that decides on preemption."""
+        return priority if priority < 0 else priority & self.group_mask
+
+    def read(self, offset: int, size: int) -> int:
+        """Reads ISER, ICER, ISPR, ICPR, IABR and IPR."""
+        block, word = offset >> 7, offset >> 2 & 0x1F
+        if block in (0, 1, 2, 3, 4) and size == 4 and word < 16:
+            source = (self.enabled, self.enabled, self.pending, self.pending, self.active)[block]
+            return source >> 16 + 32 * word & 0xFFFF_FFFF
+        if 0x300 <= offset < 0x3F0:
+            first = 16 + offset - 0x300
+            values = (self.priority[n] if n < COUNT else 0 for n in range(first, first + size))
+            return int.from_bytes(bytes(values), "little")
+        raise Violation(f"NVIC: {size}-byte read at offset 0x{offset:X} is not modelled")
+
+    def write(self, offset: int, value: int, size: int) -> None:
+        """Writes the registers that `read` knows, and STIR."""
+        block, word = offset >> 7, offset >> 2 & 0x1F
+        if block in (0, 1, 2, 3) and size == 4 and word < 16:
+            chosen = (value << 16 + 32 * word) & ((1 << COUNT) - 1)
+            if block == 0:
+                self.enabled |= chosen
+            elif block == 1:
+                self.enabled &= ~chosen
+            elif block == 2:
+                self.pending |= chosen
+            else:
+                # A line that is high keeps an inactive interrupt pending.
+                self.pending &= ~chosen | self.lines & ~self.active
+        elif 0x300 <= offset < 0x3F0:
+            for n in range(size):
+                if 16 + offset - 0x300 + n < COUNT:
+                    self.priority[16 + offset - 0x300 + n] = value >> 8 * n & PRIORITY_MASK
+        elif offset == 0xE00 and size == 4:
+            if value & 0x1FF < INTERRUPTS:
+                self.pending |= 1 << 16 + (value & 0x1FF)
+        else:
+            raise Violation(f"NVIC: {size}-byte write at offset 0x{offset:X} is not modelled")
+        self.board.interrupt_raised()

@@ -1,0 +1,33 @@
+"""The base class of every peripheral of the virtual board.
+
+A peripheral answers reads and writes of its registers, counted in bytes from its base. The board checks the clock gate
+before it calls either. Both raise `Violation` for a register or an access size that is not modelled.
+"""
+
+
+class Peripheral:
+    """A block of registers on the bus."""
+
+    name: str
+    base: int
+    size: int = 0x400
+    #: The RCC enable bit that gates the block, such as "CAN1" or "PWR". `None`: always clocked.
+    clock: str | None = None
+
+    def __init__(self, board):
+        self.board = board
+
+    def reset(self, cause: str) -> None:
+        """Is called at every reset. `cause`: por, bor, pin, software, iwdg, wwdg or lowpower."""
+
+    def read(self, offset: int, size: int) -> int:
+        """Reads 1, 2 or 4 bytes."""
+        raise NotImplementedError
+
+    def write(self, offset: int, value: int, size: int) -> None:
+        """Writes 1, 2 or 4 bytes."""
+        raise NotImplementedError
+
+    def configure(self, name: str, value) -> None:
+        """Sets a fault or a condition of the environment, such as the crystal's frequency."""
+        raise KeyError(f"{self.name} has no setting {name!r}")

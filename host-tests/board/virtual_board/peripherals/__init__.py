@@ -1,0 +1,33 @@
+"""Peripherals of the STM32F405, one file each, written from RM0090 and the data sheets."""
+
+from .backup import BackupSram, Rtc
+from .bxcan import BxCan
+from .crc_unit import CrcUnit
+from .dbgmcu import Dbgmcu, Signature
+from .dma import Dma
+from .exti import Exti
+from .flash import Flash
+from .gpio import Gpio
+from .icm42688 import Icm42688
+from .iwdg import Iwdg
+from .pwr import Pwr
+from .rcc import Rcc
+from .spi import spis
+from .syscfg import Syscfg
+from .timer import timers
+from .usart import usarts
+from .wwdg import Wwdg
+
+
+def create(board):
+    """All modelled peripherals, with the inertial sensor soldered to SPI1 and PA4.
+
+    The clock tree comes first, because the others ask it for their clocks.
+    """
+    ports = [Gpio(board, letter) for letter in "ABCDEFGHI"]
+    serial = spis(board)
+    serial[0].attach(Icm42688(board), ports[0], 4)
+    return [Rcc(board), Pwr(board), Flash(board), Exti(board), Syscfg(board), *ports, Dbgmcu(board), Signature(board),
+            Iwdg(board), *usarts(board), *timers(board), BxCan(board), *serial,
+            Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rtc(board), BackupSram(board), Wwdg(board),
+            CrcUnit(board)]

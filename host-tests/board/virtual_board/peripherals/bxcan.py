@@ -1,0 +1,479 @@
+"""bxCAN, controller CAN1 (RM0090 section 32): modes, mailboxes, FIFOs, error management, interrupts.
+
+The bus behind it is `can_bus.CanBus`, reached as `bus`; the filters are `can_filters.Filters`.
+Left out: time-triggered communication, the debug freeze, CAN2.
+Rests on the manual's silence: a receive pin without its alternate function reads dominant, so the controller does not synchronise;
+mailboxes keep their requests in initialisation and in bus-off; MSR.RX shows the level between frames; entering initialisation or Sleep
+outside of a frame takes one bit.
+
+Settings: those of `CanBus`: `bit_rate`, `acknowledge`, `connected`, `short`, `babble`, `keep_log`.
+"""
+
+from ..peripheral import Peripheral
+from ..violation import Violation
+from . import registers
+from .can_bus import ACKNOWLEDGE_ERROR, CanBus
+from .can_filters import Filters, identifier_word
+from .can_frame import frame_bits
+from .can_mailboxes import ALST, TERR, TXOK, Mailboxes
+from .gpio import connected
+
+PS = 1_000_000_000_000
+INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM, TTCM, RESET = (1 << bit for bit in (0, 1, 2, 3, 4, 5, 6, 7, 15))
+INAK, SLAK, ERRI, WKUI, SLAKI, TXM, RXM, SAMP, RX = (1 << bit for bit in (0, 1, 2, 3, 4, 8, 9, 10, 11))
+LECIE, ERRIE, WKUIE, SLKIE = 1 << 11, 1 << 15, 1 << 16, 1 << 17
+EWGF, EPVF, BOFF = 1, 2, 4
+SILM, LBKM = 1 << 31, 1 << 30
+FULL, FOVR, RFOM = 1 << 3, 1 << 4, 1 << 5
+TX_IRQ, RX0_IRQ, RX1_IRQ, SCE_IRQ = 19, 20, 21, 22
+MCR_RESET, BTR_RESET = 0x0001_0002, 0x0123_0000
+TX_PINS = (("A", 12), ("B", 9), ("D", 1))
+RX_PINS = (("A", 11), ("B", 8), ("D", 0), ("I", 9))
+FUNCTION = 9
+RECOVERY_SEQUENCES, SEQUENCE_BITS = 128, 11
+
+
+class BxCan(Peripheral):
+    """CAN1 with its registers of section 32.9."""
+
+    name, base, clock = "CAN1", 0x4000_6400, "CAN1"
+
+    def __init__(self, board):
+        super().__init__(board)
+        self.bus = CanBus(board, self)
+        self.mode_event = self.recovery = self.loop_event = None
+        self.bit_ps = 1_000_000
+        self._registers()
+
+    def _registers(self):
+        self.mcr, self.btr, self.ier = MCR_RESET, BTR_RESET, 0
+        self.state, self.wanted = "sleep", None
+        self.flags = 0
+        self.tec = self.rec = self.lec = 0
+        self.bus_off = False
+        self.mailboxes = Mailboxes()
+        self.sending = None
+        self.fifos = ([], [])
+        self.fifo_flags = [0, 0]
+        self.output = [(0, 0, 0, 0), (0, 0, 0, 0)]
+        self.filters = Filters()
+        self.suspended_until = 0
+        self.last_status = 0
+        self.recovering, self.recovery_left, self.recovery_seen = False, 0, (0, 0, 0)
+        self.levels = [False] * 4
+
+    def reset(self, cause):
+        for handle in (self.mode_event, self.recovery, self.loop_event):
+            if handle:
+                handle.cancel()
+        self.mode_event = self.recovery = self.loop_event = None
+        self.bus.cut("reset")
+        self._registers()
+        self.bit_ps = self._bit_time()
+        for number in (TX_IRQ, RX0_IRQ, RX1_IRQ, SCE_IRQ):
+            self.board.irq(number, False)
+        if cause == "por":
+            self.bus.power_on()
+        else:
+            self.bus.wake()
+
+    def power_off(self):
+        """The board's events are gone with its power."""
+        self.mode_event = self.recovery = self.loop_event = None
+        self.bus.power_off()
+
+    # -- modes (section 32.4) ----------------------------------------------------------------------------------------
+
+    def _bit_time(self):
+        """Bit time from BTR and PCLK1 (section 32.7.7)."""
+        quanta = 3 + (self.btr >> 16 & 15) + (self.btr >> 20 & 7)
+        return ((self.btr & 0x3FF) + 1) * quanta * PS // self.board.rcc.clock_hz("PCLK1")
+
+    def clocks_changed(self):
+        """The bit time follows the bus clock."""
+        self.bit_ps = self._bit_time()
+
+    def _request_mode(self):
+        """The mode that MCR asks for, by the state diagram of figure 336."""
+        if self.mcr & SLEEP and (self.state == "sleep" or not self.mcr & INRQ):
+            wanted = "sleep"
+        elif self.mcr & INRQ:
+            wanted = "init"
+        else:
+            wanted = "normal"
+        if self.mode_event:
+            self.mode_event.cancel()
+            self.mode_event = None
+        self.wanted = None if wanted == self.state else wanted
+        if self.wanted == "normal":
+            self._synchronise()
+        elif self.wanted:
+            delay = self.bit_ps
+            if self.bus.flight and self.state == "normal" and self.listens():
+                delay = max(self.bus.free_at - self.board.now, delay)
+            self.mode_event = self.board.schedule(delay, self._acknowledge_mode)
+
+    def _synchronise(self):
+        """Normal mode begins after eleven recessive bits (section 32.4.2)."""
+        self.bit_ps = self._bit_time()
+        if self.btr & LBKM:
+            delay = SEQUENCE_BITS * self.bit_ps
+        elif not connected(self.board, RX_PINS, FUNCTION):
+            return
+        else:
+            delay = self.bus.idle_delay(SEQUENCE_BITS)
+        if delay is not None:
+            self.mode_event = self.board.schedule(delay, self._acknowledge_mode)
+
+    def _acknowledge_mode(self):
+        self.mode_event = None
+        wanted, self.wanted = self.wanted, None
+        if wanted == "normal" and not self.btr & LBKM and not self.bus.recessive:
+            self.wanted = "normal"
+            return
+        self.state = wanted
+        if wanted == "sleep":
+            self.flags |= SLAKI if self.ier & SLKIE else 0
+            self._interrupts()
+        elif wanted == "normal":
+            if self.bus_off:
+                self._recover()
+            self._wake_transmitter()
+
+    def bus_recovered(self):
+        """The bus is recessive again; a start that waited for it goes on."""
+        if self.wanted == "normal" and self.mode_event is None:
+            self._synchronise()
+        if self.recovering and self.recovery is None and self.state == "normal":
+            self._await_recovery()
+
+    def activity(self, source):
+        """A start of frame wakes a sleeping controller (section 32.4.3)."""
+        if self.state == "sleep" and source != "board" and self.bus.connected and connected(self.board, RX_PINS, FUNCTION):
+            self.flags |= WKUI
+            if self.mcr & AWUM:
+                self.mcr &= ~SLEEP
+                self._request_mode()
+            self._interrupts()
+
+    # -- transmission (section 32.7.1) -------------------------------------------------------------------------------
+
+    def _ready(self):
+        return self.state == "normal" and self.wanted is None and not self.bus_off
+
+    def _next(self):
+        return self.mailboxes.next(self.mcr & TXFP)
+
+    def contender(self, now):
+        """The frame with which the controller enters arbitration now, or None."""
+        if not self._ready() or self.btr & (SILM | LBKM) or now < self.suspended_until:
+            return None
+        box = self._next()
+        if box is None or not connected(self.board, TX_PINS, FUNCTION):
+            return None
+        self.sending = box
+        return box.frame()
+
+    def not_before(self, now):
+        """The end of the suspended transmission of an error-passive node, where a frame waits for it."""
+        if self.suspended_until > now and self._ready() and self._next() is not None:
+            return self.suspended_until
+        return None
+
+    def _wake_transmitter(self):
+        if not self._ready() or self._next() is None:
+            return
+        if self.btr & LBKM:
+            if self.loop_event is None:
+                box = self.sending = self._next()
+                frame = box.frame()
+                self.loop_event = self.board.schedule(frame_bits(frame) * self.bit_ps, self._looped)
+        elif not self.btr & SILM:
+            self.bus.wake()
+
+    def _looped(self):
+        """Loop-back: the frame is received by its sender, and a missing acknowledgement does not matter (section 32.5.2)."""
+        self.loop_event = None
+        frame = self.sending.frame()
+        if not self.btr & SILM and connected(self.board, TX_PINS, FUNCTION):
+            self.bus.observe_loopback(self.board.now - frame_bits(frame) * self.bit_ps, frame)
+        self.transmission_done()
+        self._accept(frame)
+        self._wake_transmitter()
+
+    def arbitration_lost(self):
+        """Another node had the better identifier."""
+        self._attempt_failed(ALST)
+
+    def transmission_done(self):
+        """The frame was acknowledged by another node, or looped back."""
+        box, self.sending = self.sending, None
+        box.end(TXOK)
+        self.tec = max(self.tec - 1, 0)
+        self._error_changed(0)
+        self._suspend()
+        self._interrupts()
+
+    def transmission_failed(self, code):
+        """An error ended the attempt; without an acknowledgement an error-passive node counts nothing (ISO 11898-1 12.1.4.2)."""
+        if not (code == ACKNOWLEDGE_ERROR and self.tec > 127):
+            self.tec += 8
+        self._attempt_failed(TERR)
+        self._error_changed(code)
+        self._suspend()
+        self._interrupts()
+
+    def _attempt_failed(self, flag):
+        box, self.sending = self.sending, None
+        if box is None:
+            return
+        box.status = flag
+        if box.abort or self.mcr & NART:
+            box.end(flag)
+            self._interrupts()
+
+    def _suspend(self):
+        """An error-passive node waits eight bits after the intermission before it sends again."""
+        if self.tec > 127 or self.rec > 127:
+            self.suspended_until = self.bus.free_at + 8 * self.bit_ps
+
+    # -- reception (sections 32.7.3 and 32.7.4) ----------------------------------------------------------------------
+
+    def listens(self):
+        """The controller takes part in what happens on the bus."""
+        return (self.state == "normal" and not self.bus_off and not self.btr & LBKM and self.bus.connected
+                and connected(self.board, RX_PINS, FUNCTION))
+
+    def disturbs(self):
+        """An error-active controller that is not silent destroys what it cannot read."""
+        return not self.btr & SILM and self.tec <= 127 and self.rec <= 127
+
+    def received(self, frame):
+        """A good frame has ended; the filters decide."""
+        if self.listens():
+            self._accept(frame)
+
+    def _accept(self, frame):
+        self.rec = 120 if self.rec > 127 else max(self.rec - 1, 0)
+        self._error_changed(0)
+        word = identifier_word(frame)
+        match = self.filters.match(word)
+        if match is not None:
+            fifo, number = match
+            data = int.from_bytes(frame.data, "little")
+            self._store(fifo, (word, frame.length | number << 8, data & 0xFFFF_FFFF, data >> 32))
+        self._interrupts()
+
+    def _store(self, fifo, entry):
+        stored = self.fifos[fifo]
+        if len(stored) < 3:
+            stored.append(entry)
+            if len(stored) == 3:
+                self.fifo_flags[fifo] |= FULL
+            return
+        self.fifo_flags[fifo] |= FOVR
+        self.board.record("can_overrun", fifo=fifo)
+        if not self.mcr & RFLM:
+            stored[2] = entry
+
+    def reception_failed(self, code):
+        """A frame of another node was unreadable."""
+        if self.listens():
+            self.rec = min(self.rec + 1, 255)
+            self._error_changed(code)
+            self._interrupts()
+
+    def count_dominant(self, transmitting):
+        """Eight more dominant bits; False when they change nothing any more."""
+        if self.bus_off or self.state != "normal":
+            return False
+        if transmitting:
+            self.tec += 8
+        else:
+            self.rec = min(self.rec + 8, 255)
+        self._error_changed(None)
+        self._interrupts()
+        return transmitting or self.rec < 255
+
+    # -- errors (section 32.7.6) -------------------------------------------------------------------------------------
+
+    def _status(self):
+        """EWGF, EPVF and BOFF from the counters."""
+        worst = max(self.tec, self.rec)
+        return (EWGF if worst >= 96 else 0) | (EPVF if worst > 127 else 0) | (BOFF if self.bus_off else 0)
+
+    def _error_changed(self, code):
+        """The counters have moved: bus-off, the flags of CAN_ESR and ERRI follow."""
+        if self.tec > 255 and not self.bus_off:
+            self.bus_off = True
+            self.board.record("bus_off")
+            if self.mcr & ABOM and self.state == "normal":
+                self._recover()
+        status = self._status()
+        risen = status & ~self.last_status
+        self.last_status = status
+        if code is not None:
+            self.lec = code
+        if risen & self.ier >> 8 & 7 or code and self.ier & LECIE:
+            self.flags |= ERRI
+
+    def _recover(self):
+        """Bus-off ends after 128 times eleven recessive bits, with ABOM or after software left initialisation (section 32.7.6)."""
+        if self.recovery is None:
+            self.recovering = True
+            self.recovery_left = RECOVERY_SEQUENCES
+            if self.bus.recessive:
+                self._await_recovery()
+
+    def _await_recovery(self):
+        self.recovery_seen = (self.board.now, self.bus.busy_ps, self.bus.frames)
+        delay = max(round(self.recovery_left * SEQUENCE_BITS * self.bit_ps), 1)
+        self.recovery = self.board.schedule(delay, self._check_recovery)
+
+    def _check_recovery(self):
+        """A free bus gives a sequence every eleven bits, a frame one at its end."""
+        self.recovery = None
+        if self.state != "normal" or not self.bus.recessive:
+            return
+        at, busy, frames = self.recovery_seen
+        free = self.board.now - at - (self.bus.busy_ps - busy)
+        self.recovery_left -= max(free, 0) / (SEQUENCE_BITS * self.bit_ps) + self.bus.frames - frames
+        if self.recovery_left > 0.5:
+            self._await_recovery()
+            return
+        self.bus_off = self.recovering = False
+        self.tec = self.rec = 0
+        self.last_status = 0
+        self.board.record("bus_off_ended")
+        self._wake_transmitter()
+
+    # -- interrupts (section 32.8) -----------------------------------------------------------------------------------
+
+    def _interrupts(self):
+        ier = self.ier
+        levels = [bool(ier & 1 and self.mailboxes.completed()),
+                  self._fifo_level(0, ier >> 1), self._fifo_level(1, ier >> 4),
+                  bool(self.flags & ERRI and ier & ERRIE or self.flags & WKUI and ier & WKUIE
+                       or self.flags & SLAKI and ier & SLKIE)]
+        for index, level in enumerate(levels):
+            if level != self.levels[index]:
+                self.levels[index] = level
+                self.board.irq(TX_IRQ + index, level)
+
+    def _fifo_level(self, fifo, enables):
+        flags = self.fifo_flags[fifo]
+        return bool(enables & 1 and self.fifos[fifo] or enables & 2 and flags & FULL or enables & 4 and flags & FOVR)
+
+    # -- registers (section 32.9) ------------------------------------------------------------------------------------
+
+    def read(self, offset, size):
+        registers.check(self, offset, size, registers.WORD)
+        if offset == 0x08:
+            return self.mailboxes.tsr(self.mcr & TXFP)
+        if offset in (0x0C, 0x10):
+            fifo = (offset - 0x0C) // 4
+            return len(self.fifos[fifo]) | self.fifo_flags[fifo]
+        if offset == 0x04:
+            return self._msr()
+        if 0x180 <= offset < 0x1B0:
+            box = self.mailboxes.boxes[(offset - 0x180) // 16]
+            return (box.tir | box.pending, box.tdtr, box.tdlr, box.tdhr)[offset // 4 & 3]
+        if 0x1B0 <= offset < 0x1D0:
+            fifo = (offset - 0x1B0) // 16
+            if self.fifos[fifo]:
+                self.output[fifo] = self.fifos[fifo][0]
+            return self.output[fifo][offset // 4 & 3]
+        if offset == 0x00:
+            return self.mcr
+        if offset == 0x14:
+            return self.ier
+        if offset == 0x18:
+            return self._status() | self.lec << 4 | min(self.tec, 255) << 16 | self.rec << 24
+        if offset == 0x1C:
+            return self.btr
+        value = self.filters.read(offset)
+        if value is None:
+            raise registers.unmodelled(self, offset, "read")
+        return value
+
+    def _msr(self):
+        if self.wanted == "normal" and self.mode_event is None:
+            self._synchronise()
+        value = self.flags | {"sleep": SLAK, "init": INAK, "normal": 0}[self.state]
+        if self.bus.recessive:
+            value |= SAMP | RX
+        if self.bus.flight and self.state == "normal":
+            value |= TXM if self.bus.flight[2] == "board" else RXM
+        return value
+
+    def write(self, offset, value, size):
+        registers.check(self, offset, size, registers.WORD)
+        if 0x180 <= offset < 0x1B0:
+            self._write_mailbox(self.mailboxes.boxes[(offset - 0x180) // 16], offset // 4 & 3, value)
+        elif offset in (0x0C, 0x10):
+            self._write_fifo((offset - 0x0C) // 4, value)
+        elif offset == 0x08:
+            self.mailboxes.write_tsr(value, self.sending if self.bus.flight or self.loop_event else None)
+        elif offset == 0x00:
+            self._write_mcr(value)
+        elif offset == 0x04:
+            self.flags &= ~(value & (ERRI | WKUI | SLAKI))
+        elif offset == 0x14:
+            self.ier = value & 0x0003_8F7F
+        elif offset == 0x18:
+            self.lec = value >> 4 & 7
+        elif offset == 0x1C:
+            self._write_btr(value)
+        elif 0x1B0 <= offset < 0x1D0:
+            raise Violation(f"CAN1: the receive mailbox at offset {offset:#x} is read-only")
+        else:
+            taken = self.filters.write(offset, value)
+            if taken is None:
+                raise registers.unmodelled(self, offset, "write")
+            if not taken:
+                self.board.record("ignored_write", register=f"CAN1 filter {offset:#x}", value=value)
+        self._interrupts()
+
+    def _write_mcr(self, value):
+        if value & TTCM:
+            raise Violation("CAN1: time-triggered communication is not modelled")
+        if value & RESET:
+            self.reset("rcc")
+            return
+        self.mcr = value & 0x0001_007F
+        self._request_mode()
+
+    def _write_btr(self, value):
+        if self.state != "init":
+            self.board.record("ignored_write", register="CAN_BTR", value=value)
+            return
+        self.btr = value & 0xC37F_03FF
+        self.bit_ps = self._bit_time()
+
+    def _write_fifo(self, fifo, value):
+        self.fifo_flags[fifo] &= ~(value & (FULL | FOVR))
+        if value & RFOM and self.fifos[fifo]:
+            self.output[fifo] = self.fifos[fifo].pop(0)
+
+    def _write_mailbox(self, box, register, value):
+        if box.pending:
+            self.board.record("ignored_write", register="CAN1 transmit mailbox", value=value)
+            return
+        if register == 0:
+            box.tir = value & ~1
+            if value & 1:
+                self.mailboxes.request(box)
+                self._wake_transmitter()
+        elif register == 1:
+            if value & 0x100:
+                raise Violation("CAN1: TGT (time stamps in data) is not modelled")
+            box.tdtr = value & 15
+        elif register == 2:
+            box.tdlr = value
+        else:
+            box.tdhr = value
+
+    def configure(self, key, value):
+        if key not in ("bit_rate", "acknowledge", "connected", "short", "babble", "keep_log"):
+            super().configure(key, value)
+        self.bus.configure(key, value)

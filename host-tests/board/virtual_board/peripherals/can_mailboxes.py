@@ -1,0 +1,82 @@
+"""Transmit mailboxes of bxCAN: requests, their order and CAN_TSR (RM0090 sections 32.7.1 and 32.9.2)."""
+
+from .can_frame import Frame, priority
+
+RQCP, TXOK, ALST, TERR, ABRQ = 1, 2, 4, 8, 0x80
+
+
+class Mailbox:
+    """The registers of one mailbox with its request and its status bits in CAN_TSR."""
+
+    def __init__(self):
+        self.tir = self.tdtr = self.tdlr = self.tdhr = 0
+        self.pending = self.abort = False
+        self.status = 0
+        self.order = 0
+
+    def frame(self):
+        """The frame that the registers describe."""
+        extended, remote, length = bool(self.tir & 4), bool(self.tir & 2), min(self.tdtr & 15, 8)
+        data = b"" if remote else (self.tdlr | self.tdhr << 32).to_bytes(8, "little")[:length]
+        return Frame(self.tir >> 3 if extended else self.tir >> 21, data, extended, remote, length)
+
+    def end(self, status):
+        """The request is over, with TXOK, or with what ended it."""
+        self.pending = self.abort = False
+        self.status = RQCP | status
+
+
+class Mailboxes:
+    """The three mailboxes; `by_request` is MCR.TXFP: first come, first sent."""
+
+    def __init__(self):
+        self.boxes = [Mailbox() for _ in range(3)]
+        self.requests = 0
+
+    def request(self, box):
+        """TXRQ is set: the status of the last request is forgotten."""
+        box.pending, box.status = True, 0
+        self.requests += 1
+        box.order = self.requests
+
+    def _rank(self, number, by_request):
+        box = self.boxes[number]
+        return box.order if by_request else (priority(box.frame()), number)
+
+    def next(self, by_request):
+        """The mailbox that is sent first, or None."""
+        numbers = [number for number in range(3) if self.boxes[number].pending]
+        if not numbers:
+            return None
+        return self.boxes[min(numbers, key=lambda number: self._rank(number, by_request))]
+
+    def completed(self):
+        """A request has ended and was not acknowledged by software."""
+        return any(box.status & RQCP for box in self.boxes)
+
+    def tsr(self, by_request):
+        """CAN_TSR: CODE is the next free mailbox or, with none free, the one sent last; LOW marks that one among several."""
+        value, pending = 0, []
+        for number, box in enumerate(self.boxes):
+            value |= (box.status | (ABRQ if box.abort else 0)) << 8 * number
+            if box.pending:
+                pending.append(number)
+            else:
+                value |= 1 << 26 + number
+        if len(pending) > 1:
+            lowest = max(pending, key=lambda number: self._rank(number, by_request))
+            value |= 1 << 29 + lowest
+        code = lowest if len(pending) == 3 else next(number for number in range(3) if number not in pending)
+        return value | code << 24
+
+    def write_tsr(self, value, in_flight):
+        """RQCP is cleared by a one, with its companions; ABRQ takes back a request, at once unless it is being sent."""
+        for number, box in enumerate(self.boxes):
+            bits = value >> 8 * number
+            if bits & RQCP:
+                box.status = 0
+            if bits & ABRQ and box.pending:
+                if box is in_flight:
+                    box.abort = True
+                else:
+                    box.end(0)

@@ -1,0 +1,300 @@
+"""Embedded flash interface (RM0090 section 3): keys, erase, programming, option bytes and what a cut of the power leaves behind.
+
+The array itself belongs to the board: it calls `program` for each store into the flash and is stalled until an operation ends,
+because code runs from flash and a read during an operation waits for it (section 3.6). The stall begins with the operation even
+where the code runs from RAM; that is stricter than the part.
+Times are those of DS8626 tables 39 and 40 for the parallelism in PSIZE, typical unless `time_factor` is set (2 gives the maximum).
+
+Left out: read protection, the one-time programmable area, x64 (it wants an external voltage on VPP), read-while-write, stale cache
+lines. Rests on the manual's silence: a STRT with neither SER nor MER does nothing; error flags that are still set do not stop the
+next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is open is ignored.
+
+Settings: `time_factor`, `seed` (what a cut leaves), `option_bytes` (OPTCR as loaded at reset).
+"""
+
+import random
+
+from ..peripheral import Peripheral
+from ..violation import Violation
+from . import registers
+from .flash_map import SECTORS, sector_of
+
+PG, SER, MER, STRT, EOPIE, ERRIE, LOCK = 1 << 0, 1 << 1, 1 << 2, 1 << 16, 1 << 24, 1 << 25, 1 << 31
+EOP, OPERR, WRPERR, PGAERR, PGPERR, PGSERR, BSY = 1 << 0, 1 << 1, 1 << 4, 1 << 5, 1 << 6, 1 << 7, 1 << 16
+FLAGS = EOP | OPERR | WRPERR | PGAERR | PGPERR | PGSERR
+KEYS = (0x4567_0123, 0xCDEF_89AB)
+OPTION_KEYS = (0x0819_2A3B, 0x4C5D_6E7F)
+OPTLOCK, OPTSTRT = 1, 2
+FACTORY_OPTIONS = 0x0FFF_AAED
+#: Erase times in milliseconds by PSIZE for sectors of 16, 64 and 128 KiB, and the mass erase.
+ERASE_MS = ({16: 400, 64: 1200, 128: 2000, "mass": 16000}, {16: 300, 64: 700, 128: 1300, "mass": 11000},
+            {16: 250, 64: 550, 128: 1000, "mass": 8000})
+PROGRAM_US = 16
+#: Lowest supply in millivolts for each PSIZE (table 7).
+LEAST_SUPPLY_MV = (1800, 2100, 2700)
+MS = 1_000_000_000
+US = 1_000_000
+
+
+class Flash(Peripheral):
+    """The registers of section 3.9 and the operations that they start."""
+
+    name, base = "FLASH", 0x4002_3C00
+
+    def __init__(self, board):
+        super().__init__(board)
+        self.time_factor = 1.0
+        self.random = random.Random(405)
+        self.options = FACTORY_OPTIONS
+        self.operation = None
+        self.done = None
+        self.loaded_bor = self.options >> 2 & 3
+        self._registers()
+
+    def _registers(self):
+        self.acr, self.latency = 0, 0
+        self.sr, self.cr = 0, LOCK
+        self.key_step, self.key_failed = 0, False
+        self.option_step, self.option_failed = 0, False
+        self.optcr = self.options | OPTLOCK
+
+    @property
+    def bor_level(self):
+        """BOR_LEV as loaded from the option bytes at the last reset."""
+        return self.loaded_bor
+
+    def reset(self, cause):
+        if self.operation:
+            self._interrupted()
+        self._registers()
+        self.loaded_bor = self.options >> 2 & 3
+        self.board.irq(4, False)
+
+    def power_off(self):
+        """The supply fails; what was being erased or programmed stays half done."""
+        if self.operation:
+            self._interrupted()
+
+    # -- registers ---------------------------------------------------------------------------------------------------
+
+    def read(self, offset, size):
+        word = offset & ~3
+        if word == 0x0C:
+            value = self.sr
+        elif word == 0x10:
+            value = self.cr
+        elif word == 0x00:
+            value = self.acr
+        elif word == 0x14:
+            value = self.optcr
+        elif word in (0x04, 0x08):
+            value = 0
+        else:
+            raise registers.unmodelled(self, offset, "read")
+        return registers.cut(value, offset, size)
+
+    def write(self, offset, value, size):
+        word = offset & ~3
+        if word in (0x04, 0x08):
+            registers.check(self, offset, size, registers.WORD)
+        elif size != 4:
+            value = registers.merge(0 if word == 0x0C else self.read(word, 4), value, offset, size)
+        if word == 0x00:
+            self._write_acr(value)
+        elif word == 0x04:
+            self._write_key(value)
+        elif word == 0x08:
+            self._write_option_key(value)
+        elif word == 0x0C:
+            self.sr &= ~(value & FLAGS)
+            self._interrupt()
+        elif word == 0x10:
+            self._write_cr(value)
+        elif word == 0x14:
+            self._write_optcr(value)
+        else:
+            raise registers.unmodelled(self, offset, "write")
+
+    def _write_acr(self, value):
+        for reset_bit, enable_bit, what in ((1 << 11, 1 << 9, "ICRST"), (1 << 12, 1 << 10, "DCRST")):
+            if value & reset_bit and self.acr & enable_bit:
+                raise Violation(f"FLASH: {what} is written while the cache is enabled (section 3.9.1)")
+        self.acr = value & 0x1F07
+        self.latency = value & 7
+        self.board.rcc.check_limits()
+
+    def _write_key(self, value):
+        if self.key_failed:
+            self.board.record("flash_key", accepted=False)
+        elif not self.cr & LOCK:
+            self.board.record("ignored_write", register="FLASH_KEYR", value=value)
+        elif value != KEYS[self.key_step]:
+            self.key_failed = True
+            self.board.record("flash_key", accepted=False)
+        elif self.key_step == 0:
+            self.key_step = 1
+        else:
+            self.key_step = 0
+            self.cr &= ~LOCK
+
+    def _write_option_key(self, value):
+        if self.option_failed or not self.optcr & OPTLOCK or value != OPTION_KEYS[self.option_step]:
+            self.option_failed = self.option_failed or bool(self.optcr & OPTLOCK)
+            self.board.record("flash_key", accepted=False)
+        elif self.option_step == 0:
+            self.option_step = 1
+        else:
+            self.option_step = 0
+            self.optcr &= ~OPTLOCK
+
+    def _write_cr(self, value):
+        if self.cr & LOCK:
+            self.board.record("ignored_write", register="FLASH_CR", value=value)
+            return
+        self.cr = value & (LOCK | EOPIE | ERRIE | 0x37F)
+        self._interrupt()
+        if value & STRT:
+            self._erase()
+
+    def _write_optcr(self, value):
+        if self.optcr & OPTLOCK:
+            self.board.record("ignored_write", register="FLASH_OPTCR", value=value)
+            return
+        if value >> 8 & 0xFF != 0xAA:
+            raise Violation("FLASH: read protection is not modelled; RDP has to stay 0xAA")
+        self.optcr = value & 0x0FFF_FFEF & ~OPTSTRT
+        if value & OPTSTRT:
+            self._begin(("options", None, value & 0x0FFF_FFEC), ERASE_MS[2][16] * MS)
+
+    def _interrupt(self):
+        failed = self.sr & (OPERR if self.cr & ERRIE else 0)
+        self.board.irq(4, bool(self.sr & EOP and self.cr & EOPIE or failed))
+
+    def _refuse(self, flag):
+        """An operation that cannot run sets its flag, and OPERR where error interrupts are enabled (section 3.9.4)."""
+        self.sr |= flag | (OPERR if self.cr & ERRIE else 0)
+        self.board.record("flash_error", flag=flag)
+        self._interrupt()
+
+    # -- operations --------------------------------------------------------------------------------------------------
+
+    def _protected(self, sector):
+        return not self.optcr >> (16 + sector) & 1
+
+    def _parallelism(self):
+        """PSIZE, and whether the supply carries it (table 7)."""
+        size = self.cr >> 8 & 3
+        if size == 3:
+            raise Violation("FLASH: PSIZE x64 wants an external VPP (section 3.6.2)")
+        power = self.board.peripherals.get("PWR")
+        supply = 3300 if power is None else power.supply_mv
+        enough = supply >= LEAST_SUPPLY_MV[size]
+        if not enough:
+            self.board.record("program_below_voltage", psize=size, supply_mv=supply)
+        return size, enough
+
+    def _erase(self):
+        sector = self.cr >> 3 & 15
+        if self.cr & PG and self.cr & (SER | MER) or self.cr & SER and self.cr & MER:
+            raise Violation("FLASH: more than one of PG, SER and MER is set at STRT")
+        if not self.cr & (SER | MER):
+            self.board.record("ignored_write", register="FLASH_CR", value=self.cr | STRT)
+            return
+        if self.cr & SER and sector >= len(SECTORS):
+            raise Violation(f"FLASH: SNB {sector} does not exist on the STM32F405 (table 5)")
+        chosen = range(len(SECTORS)) if self.cr & MER else (sector,)
+        if any(self._protected(number) for number in chosen):
+            self._refuse(WRPERR)
+            return
+        psize, enough = self._parallelism()
+        kind = "mass" if self.cr & MER else SECTORS[sector][1] // 1024
+        self.board.record("flash_erase", sectors=list(chosen))
+        self._begin(("erase", tuple(chosen), enough), ERASE_MS[psize][kind] * MS)
+
+    def program(self, address, value, size):
+        """The core stores `size` bytes at `address` in the array (section 3.6.4)."""
+        if self.operation:
+            self._finish()
+        if not self.cr & PG:
+            self._refuse(PGSERR)
+        elif address % 16 + size > 16:
+            self._refuse(PGAERR)
+        elif size != 1 << (self.cr >> 8 & 3):
+            self._refuse(PGPERR)
+        elif self._protected(sector_of(address)):
+            self._refuse(WRPERR)
+        else:
+            _, enough = self._parallelism()
+            old = int.from_bytes(self.board.memory_read(address, size), "little")
+            if value & ~old:
+                self.board.record("programmed_over", address=address, old=old, value=value)
+            self._begin(("program", (address, size, old, old & value), enough), PROGRAM_US * US)
+
+    def _begin(self, operation, duration_ps):
+        duration = round(duration_ps * self.time_factor)
+        self.operation = (*operation, self.board.now, duration)
+        self.sr |= BSY
+        self.done = self.board.schedule(duration, self._finish)
+        self.board.stall(self.board.now + duration)
+
+    def _finish(self):
+        kind, what, detail, _, _ = self.operation
+        self._end()
+        if kind == "erase":
+            for sector in what:
+                address, length = SECTORS[sector]
+                self.board.memory_write(address, b"\xFF" * length if detail else self.random.randbytes(length))
+        elif kind == "program":
+            address, size, _, value = what
+            if not detail:
+                value = self.random.getrandbits(8 * size)
+            self.board.memory_write(address, value.to_bytes(size, "little"))
+        else:
+            self.options = detail | 1
+        if self.cr & EOPIE:
+            self.sr |= EOP
+        self._interrupt()
+
+    def _end(self):
+        if self.done:
+            self.done.cancel()
+        self.operation, self.done = None, None
+        self.sr &= ~BSY
+
+    def _interrupted(self):
+        """A reset or a loss of power during an operation leaves a mixture of the old contents and the new (section 3.6.1)."""
+        kind, what, _, begun, duration = self.operation
+        self._end()
+        share = (self.board.now - begun) / duration if duration else 1.0
+        self.board.record("flash_interrupted", operation=kind, share=share)
+        if kind == "erase":
+            for sector in what:
+                address, length = SECTORS[sector]
+                old = int.from_bytes(self.board.memory_read(address, length), "little")
+                mixed = old | self._bits(8 * length, share)
+                self.board.memory_write(address, mixed.to_bytes(length, "little"))
+        elif kind == "program":
+            address, size, old, value = what
+            mixed = old & (value | ~self._bits(8 * size, share))
+            self.board.memory_write(address, mixed.to_bytes(size, "little"))
+
+    def _bits(self, count, share):
+        """A word of `count` bits of which about `share` are ones, to one part in 256."""
+        bits = 0
+        for place in range(8):
+            word = self.random.getrandbits(count)
+            bits = bits | word if int(share * 256) >> place & 1 else bits & word
+        return bits
+
+    def configure(self, key, value):
+        if key == "time_factor":
+            self.time_factor = float(value)
+        elif key == "seed":
+            self.random = random.Random(value)
+        elif key == "option_bytes":
+            self.options = value & 0x0FFF_FFED
+            self.loaded_bor = value >> 2 & 3
+            self.optcr = self.options | OPTLOCK
+        else:
+            super().configure(key, value)
+

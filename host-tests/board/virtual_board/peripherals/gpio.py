@@ -1,0 +1,205 @@
+"""General-purpose I/O ports A to I (RM0090 section 8).
+
+Pins have a level, an alternate function and a speed; other models ask for them, and a listener is called when an output changes.
+Left out: analog levels (an analog pin reads 0), shorts between two outputs, and the time that an edge takes.
+
+Settings: `drive` ((pin, level) from outside; level None lets the pin float), `watch` (pins whose output changes are recorded as `pin`).
+"""
+
+from ..peripheral import Peripheral
+from . import registers
+
+OUTPUT, ALTERNATE, ANALOG = 1, 2, 3
+MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFRL, AFRH = range(0, 0x28, 4)
+#: Reset values of MODER, OSPEEDR and PUPDR (sections 8.4.1 to 8.4.4): the debug pins.
+RESET = {"A": (0xA800_0000, 0x0C00_0000, 0x6400_0000), "B": (0x0000_0280, 0x0000_00C0, 0x0000_0100)}
+LCKK = 1 << 16
+
+
+class Gpio(Peripheral):
+    """One port with its sixteen pins."""
+
+    def __init__(self, board, letter):
+        super().__init__(board)
+        self.letter = letter
+        self.number = ord(letter) - ord("A")
+        self.name = self.clock = "GPIO" + letter
+        self.base = 0x4002_0000 + 0x400 * self.number
+        self.driven, self.outside = 0, 0
+        self.listeners = {}
+        self.watched = 0
+        self.output = 0
+        self._registers()
+
+    def _registers(self):
+        self.moder, self.ospeedr, self.pupdr = RESET.get(self.letter, (0, 0, 0))
+        self.otyper = self.odr = self.lckr = self.lock_step = 0
+        self.afr = [0, 0]
+
+    def reset(self, cause):
+        self._registers()
+        self._changed()
+
+    # -- what other models ask ---------------------------------------------------------------------------------------
+
+    def mode(self, pin):
+        """0 input, 1 output, 2 alternate function, 3 analog."""
+        return self.moder >> 2 * pin & 3
+
+    def alternate(self, pin):
+        """The number of the pin's alternate function, or None where the pin is in another mode."""
+        if self.moder >> 2 * pin & 3 != ALTERNATE:
+            return None
+        return self.afr[pin >> 3] >> 4 * (pin & 7) & 15
+
+    def speed(self, pin):
+        """OSPEEDR: 0 low (2 MHz), 1 medium (25 MHz), 2 high (50 MHz), 3 very high (100 MHz)."""
+        return self.ospeedr >> 2 * pin & 3
+
+    def level(self, pin):
+        """The pin's level as the outside sees it."""
+        return bool(self._levels() >> pin & 1)
+
+    def listen(self, pin, callback):
+        """`callback(level)` is called when the pin's level changes."""
+        self.listeners.setdefault(pin, []).append(callback)
+
+    def drive_lines(self):
+        """The EXTI lines that SYSCFG gives to this port take the pins' levels."""
+        syscfg, exti = self.board.peripherals.get("SYSCFG"), self.board.peripherals.get("EXTI")
+        if syscfg and exti:
+            levels = self._levels()
+            for pin in range(16):
+                if syscfg.selects(pin, self.number):
+                    exti.line(pin, bool(levels >> pin & 1))
+
+    def _levels(self):
+        """Outputs give ODR, other pins what drives them from outside, else their pull (a floating pin reads 0)."""
+        levels = 0
+        for pin in range(16):
+            mode = self.moder >> 2 * pin & 3
+            bit = 1 << pin
+            if mode == OUTPUT and not (self.otyper & bit and self.odr & bit):
+                levels |= self.odr & bit
+            elif mode == ANALOG:
+                continue
+            elif self.driven & bit:
+                levels |= self.outside & bit
+            elif self.pupdr >> 2 * pin & 3 == 1:
+                levels |= bit
+        return levels
+
+    def _changed(self):
+        levels = self._levels()
+        changed = levels ^ self.output
+        self.output = levels
+        if not changed:
+            return
+        for pin, callbacks in self.listeners.items():
+            if changed >> pin & 1:
+                for callback in callbacks:
+                    callback(bool(levels >> pin & 1))
+        recorded = changed & self.watched
+        for pin in range(16) if recorded else ():
+            if recorded >> pin & 1:
+                self.board.record("pin", port=self.letter, pin=pin, level=bool(levels >> pin & 1))
+        self.drive_lines()
+
+    # -- registers ---------------------------------------------------------------------------------------------------
+
+    def read(self, offset, size):
+        word = offset & ~3
+        if word == IDR:
+            value = self._levels()
+        elif word == ODR:
+            value = self.odr
+        elif word == MODER:
+            value = self.moder
+        elif word == OTYPER:
+            value = self.otyper
+        elif word == OSPEEDR:
+            value = self.ospeedr
+        elif word == PUPDR:
+            value = self.pupdr
+        elif word == BSRR:
+            value = 0
+        elif word == LCKR:
+            value = self.lckr
+        elif word in (AFRL, AFRH):
+            value = self.afr[(word - AFRL) // 4]
+        else:
+            raise registers.unmodelled(self, offset, "read")
+        return registers.cut(value, offset, size)
+
+    def _kept(self, old, new, width):
+        """Locked pins keep their configuration until the next reset (section 8.3.4)."""
+        if not self.lckr & LCKK:
+            return new
+        mask = sum(((1 << width) - 1) << pin * width for pin in range(16) if self.lckr >> pin & 1)
+        return old & mask | new & ~mask
+
+    def write(self, offset, value, size):
+        word = offset & ~3
+        if word == BSRR:
+            value = registers.merge(0, value, offset, size)
+            self.odr = self.odr & ~(value >> 16) | value & 0xFFFF
+            self._changed()
+            return
+        value = registers.merge(self.read(word, 4), value, offset, size)
+        if word == ODR:
+            self.odr = value & 0xFFFF
+        elif word == MODER:
+            self.moder = self._kept(self.moder, value, 2)
+        elif word == OTYPER:
+            self.otyper = self._kept(self.otyper, value & 0xFFFF, 1)
+        elif word == OSPEEDR:
+            self.ospeedr = self._kept(self.ospeedr, value, 2)
+        elif word == PUPDR:
+            self.pupdr = self._kept(self.pupdr, value, 2)
+        elif word == LCKR:
+            self._lock(value)
+        elif word in (AFRL, AFRH):
+            half = (word - AFRL) // 4
+            both = self._kept(self.afr[0] | self.afr[1] << 32, (self.afr[1 - half] << 32 | value) if half == 0
+                              else (value << 32 | self.afr[0]), 4)
+            self.afr = [both & 0xFFFF_FFFF, both >> 32]
+        elif word != IDR:
+            raise registers.unmodelled(self, offset, "write")
+        self._changed()
+
+    def _lock(self, value):
+        """LCKK is written 1, 0, 1 with the same pins; a step out of order starts again (section 8.4.8)."""
+        if self.lckr & LCKK:
+            return
+        pins, key = value & 0xFFFF, bool(value & LCKK)
+        if self.lock_step and pins != self.lckr & 0xFFFF:
+            self.lock_step = 0
+        if key != (True, False, True)[self.lock_step]:
+            self.lock_step = 0
+        else:
+            self.lock_step += 1
+        self.lckr = pins
+        if self.lock_step == 3:
+            self.lckr |= LCKK
+            self.lock_step = 0
+
+    def configure(self, key, value):
+        if key == "drive":
+            pin, level = value
+            bit = 1 << pin
+            self.driven = self.driven & ~bit if level is None else self.driven | bit
+            self.outside = self.outside & ~bit | (bit if level else 0)
+            self._changed()
+        elif key == "watch":
+            self.watched = sum(1 << pin for pin in value)
+        else:
+            super().configure(key, value)
+
+
+def connected(board, pins, function):
+    """One of the pins, given as (port letter, number), carries the alternate function."""
+    for letter, number in pins:
+        port = board.peripherals.get("GPIO" + letter)
+        if port is not None and port.alternate(number) == function:
+            return True
+    return False

@@ -1,0 +1,417 @@
+"""ICM-42688-P, an inertial sensor on SPI (DS-000347): registers, power modes, FIFO, time stamps and its own oscillator.
+
+Samples are made when somebody looks: at each access those that fell due are computed, unless the INT1 pin is wired, for which
+each sample is an event. The part keeps its state through a reset of the microcontroller and loses it with the power.
+
+Time: the part runs on its own oscillator, `oscillator_error_percent` fast. Without CLKIN its time stamps count units of 32/30 us
+(section 12.7), or sixteen times that with TMST_RES.
+Filters: a tone passes the UI filter of GYRO_ACCEL_CONFIG0 with the gain of a Butterworth low-pass of the order in GYRO_CONFIG1
+(section 5.5) and is then sampled, so what is above half the output rate folds back. Slow motion passes as it is, without delay.
+Noise: white, of the data sheet's density (tables 1 and 2) within the filter's bandwidth, times `noise`.
+Left out: anti-alias and notch filters, their delay, I2C and I3C, APEX, FSYNC, self-test, INT2, full-scale switching by itself
+(AFSR), different output rates of the two sensors.
+Rests on the data sheet's silence: accesses within 1 ms of a reset read 0 and write nothing; a write within 200 us of leaving OFF is
+ignored; the part gives the time-stamp counter's low 16 bits.
+
+Settings (JSON values): `rates_dps`, `acceleration_g` ([x, y, z]), `temperature_c`, `tones` ([[axis, hz, dps], ...]), `motion`
+([[time_us, rates, acceleration], ...], interpolated), `samples` ([[rates, acceleration], ...], one each output, without noise),
+`noise` (a factor, 0 for none), `oscillator_error_percent`, `int1` ([port letter, pin] or None), `who_am_i`.
+"""
+
+from bisect import bisect_right
+from math import pi, sin
+from random import Random
+
+from . import icm42688_registers as reg
+
+PS = 1_000_000_000_000
+US, MS = 1_000_000, 1_000_000_000
+RESET_PS, SWITCH_ON_PS, GYRO_START_PS, ACCEL_START_PS = 1 * MS, 200 * US, 30 * MS, 10 * MS
+FIFO_BYTES = 2048
+OUTPUT_MILLIHERTZ = {1: 32_000_000, 2: 16_000_000, 3: 8_000_000, 4: 4_000_000, 5: 2_000_000, 6: 1_000_000, 7: 200_000, 8: 100_000,
+                     9: 50_000, 10: 25_000, 11: 12_500, 12: 6_250, 13: 3_125, 14: 1_562, 15: 500_000}
+BANDWIDTH_DIVIDER = {1: 4, 2: 5, 3: 8, 4: 10, 5: 16, 6: 20, 7: 40}
+INVALID = -32768
+GYRO_NOISE_DPS, ACCEL_NOISE_G = 0.0028, 70e-6
+#: Noise bandwidth of a second-order Butterworth low-pass by its 3 dB bandwidth.
+NOISE_BANDWIDTH = 1.11
+
+
+class Icm42688:
+    """The part with its five register banks; the SPI calls `select`, `transfer` and `deselect`."""
+
+    def __init__(self, board):
+        self.board = board
+        self.rates, self.acceleration, self.temperature = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 25.0
+        self.tones, self.motion, self.samples = [], [], []
+        self.noise, self.random = 1.0, Random(42688)
+        self.clock_ppm = 1_000_000
+        self.int1 = None
+        self.reading = False
+        self.identity = 0x47
+        self.event = None
+        self.powered = True
+        self._reset(0)
+
+    # -- power and reset (sections 4.16 and 14.1) --------------------------------------------------------------------
+
+    def power_on(self):
+        """The supply has come; registers answer after 1 ms (section 3.2)."""
+        self.powered = True
+        self._reset(self.board.now)
+
+    def power_off(self):
+        """The supply has gone."""
+        self.powered = False
+        self.event = None
+
+    def _reset(self, now):
+        self.banks = [dict(bank) for bank in reg.RESET_VALUES]
+        self.bank = 0
+        self.answers_from = now + RESET_PS
+        self.locked_until = 0
+        self.gyro_on = self.accel_on = None
+        self.started, self.made = now, 0
+        self.epoch = now
+        self.status = reg.RESET_DONE
+        self.data = {**{address: 0x80 for address in reg.DATA[::2]}, **{address: 0 for address in reg.DATA[1::2]}}
+        self.fifo, self.read_from = [], 0
+        self.lost = 0
+        self.count_latch = 0
+        self.address = None
+        if self.event:
+            self.event.cancel()
+            self.event = None
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def _output_code(self):
+        """The output rate: the gyro's while it is on, otherwise the accelerometer's."""
+        bank = self.banks[0]
+        if self.gyro_on is not None:
+            return bank[reg.GYRO_CONFIG0] & 15
+        return bank[reg.ACCEL_CONFIG0] & 15
+
+    def _sample_time(self, index):
+        """Board time of an output since the rate was last set."""
+        rate = OUTPUT_MILLIHERTZ.get(self._output_code(), 1_000_000) * self.clock_ppm
+        return self.started + index * PS * 1_000_000_000 // rate
+
+    def time_stamp(self, at):
+        """The time-stamp counter in units of 32/30 us, or 16 times that (section 12.7)."""
+        config = self.banks[0][reg.TMST_CONFIG]
+        if not config & 1:
+            return 0
+        unit = 16 if config & 8 else 1
+        return (at - self.epoch) * 30 * self.clock_ppm // (32 * US * 1_000_000 * unit)
+
+    def _restart(self):
+        """The rate or the mode has changed: the next output comes one period from now."""
+        self.started, self.made = self.board.now, 0
+        self._plan()
+
+    def _catch_up(self):
+        """All outputs that fell due are made."""
+        if self.gyro_on is None and self.accel_on is None:
+            return
+        now = self.board.now
+        while self._sample_time(self.made + 1) <= now:
+            self.made += 1
+            self._output(self._sample_time(self.made))
+
+    def _plan(self):
+        """Each output is an event while INT1 is wired."""
+        if self.event:
+            self.event.cancel()
+            self.event = None
+        if self.int1 and self.powered and (self.gyro_on is not None or self.accel_on is not None):
+            self.event = self.board.schedule(max(self._sample_time(self.made + 1) - self.board.now, 0), self._due)
+
+    def _due(self):
+        self.event = None
+        self._catch_up()
+        self._plan()
+
+    # -- outputs -----------------------------------------------------------------------------------------------------
+
+    def _truth(self, at):
+        """Rates in degrees per second and acceleration in g at a board time."""
+        if self.samples:
+            rates, acceleration = self.samples[0] if len(self.samples) == 1 else self.samples.pop(0)
+            return list(rates), list(acceleration)
+        if self.motion:
+            return _interpolated(self.motion, at / US)
+        return list(self.rates), list(self.acceleration)
+
+    def bandwidth_hz(self):
+        """The gyro's 3 dB bandwidth by GYRO_UI_FILT_BW in low-noise mode (section 14.42)."""
+        code = self.banks[0][reg.GYRO_ACCEL_CONFIG0] & 15
+        rate = OUTPUT_MILLIHERTZ.get(self.banks[0][reg.GYRO_CONFIG0] & 15, 1_000_000) / 1000
+        if code == 0:
+            return rate / 2
+        if code in BANDWIDTH_DIVIDER:
+            return max(400.0, rate) / BANDWIDTH_DIVIDER[code]
+        return max(400.0, rate) if code == 14 else max(200.0, 8 * rate)
+
+    def _gain(self, hz):
+        order = 1 + (self.banks[0][reg.GYRO_CONFIG1] >> 2 & 3)
+        return (1 + (hz / self.bandwidth_hz()) ** (2 * order)) ** -0.5
+
+    def _output(self, at):
+        rates, acceleration = self._truth(at)
+        for axis, hz, dps in self.tones:
+            rates[axis] += dps * self._gain(hz) * sin(2 * pi * hz * at / PS)
+        if self.noise and not self.samples:
+            root = self.noise * (self.bandwidth_hz() * NOISE_BANDWIDTH) ** 0.5
+            gauss = self.random.gauss
+            rates = [rate + gauss(0, GYRO_NOISE_DPS * root) for rate in rates]
+            acceleration = [g + gauss(0, ACCEL_NOISE_G * root) for g in acceleration]
+        gyro_valid = self.gyro_on is not None and at >= self.gyro_on + GYRO_START_PS
+        accel_valid = self.accel_on is not None and at >= self.accel_on + ACCEL_START_PS
+        bank = self.banks[0]
+        gyro_scale = 32768 / (2000 / (1 << (bank[reg.GYRO_CONFIG0] >> 5)))
+        accel_scale = 2048 << (bank[reg.ACCEL_CONFIG0] >> 5 & 3)
+        gyro = [_clamp(rate * gyro_scale, 16) if gyro_valid else INVALID for rate in rates]
+        accel = [_clamp(g * accel_scale, 16) if accel_valid else INVALID for g in acceleration]
+        temperature = _clamp((self.temperature - 25) * 132.48, 16)
+        big = bool(bank[reg.INTF_CONFIG0] & 0x10)
+        for address, value in zip(reg.DATA[::2], (temperature, *accel, *gyro)):
+            high, low = value >> 8 & 0xFF, value & 0xFF
+            self.data[address], self.data[address + 1] = (high, low) if big else (low, high)
+        self.status |= reg.DATA_READY
+        if bank[reg.FIFO_CONFIG] >> 6:
+            self._store(at, rates, acceleration, gyro, accel, gyro_valid, accel_valid, big)
+        self._drive_int1()
+
+    def _store(self, at, rates, acceleration, gyro, accel, gyro_valid, accel_valid, big):
+        config = self.banks[0][reg.FIFO_CONFIG1]
+        with_accel, with_gyro, fine = config & 1, config & 2, config & 0x10
+        if not with_accel and not with_gyro:
+            return
+        order = "big" if big else "little"
+        stamped = self.banks[0][reg.TMST_CONFIG] & 1
+        header = (0x40 if with_accel else 0) | (0x20 if with_gyro else 0) | (0x10 if fine else 0) | (8 if stamped else 0)
+        stamp = (self.time_stamp(at) & 0xFFFF).to_bytes(2, order)
+        coarse_temperature = (_clamp((self.temperature - 25) * 2.07, 8)).to_bytes(1, "little", signed=True)
+        if fine:
+            gyro = [_clamp(rate * 131, 19) << 1 if gyro_valid else -0x80000 for rate in rates]
+            accel = [_clamp(g * 8192, 18) << 2 if accel_valid else -0x80000 for g in acceleration]
+            temperature = _clamp((self.temperature - 25) * 132.48, 16).to_bytes(2, order, signed=True)
+            extension = bytes((a & 15) << 4 | g & 15 for a, g in zip(accel, gyro))
+            packet = _words([value >> 4 for value in accel + gyro], order) + temperature + stamp + extension
+            packet = bytes([header | 0x60]) + packet
+        elif with_accel and with_gyro:
+            packet = bytes([header]) + _words(accel + gyro, order) + coarse_temperature + stamp
+        else:
+            packet = bytes([header & ~8]) + _words(accel if with_accel else gyro, order) + coarse_temperature
+        if (len(self.fifo) + 1) * len(packet) > FIFO_BYTES:
+            self.lost = min(self.lost + 1, 0xFFFF)
+            self.status |= reg.FIFO_FULL
+            if self.banks[0][reg.FIFO_CONFIG] >> 6 != 1:
+                return
+            self.fifo.pop(0)
+            self.read_from = 0
+        self.fifo.append(packet)
+        if self._count() >= (self.banks[0][reg.FIFO_CONFIG2] | (self.banks[0][reg.FIFO_CONFIG3] & 15) << 8) > 0:
+            self.status |= reg.FIFO_THRESHOLD
+
+    def _count(self):
+        """The count in FIFO_COUNT: bytes, or records with FIFO_COUNT_REC."""
+        if self.banks[0][reg.INTF_CONFIG0] & 0x40:
+            return len(self.fifo)
+        return sum(map(len, self.fifo)) - self.read_from
+
+    def _drive_int1(self):
+        if not self.int1:
+            return
+        active = bool(self.status & self.banks[0][reg.INT_SOURCE0])
+        high = active == bool(self.banks[0][reg.INT_CONFIG] & 1)
+        self.board.peripherals["GPIO" + self.int1[0]].configure("drive", (self.int1[1], high))
+        if active and not self.banks[0][reg.INT_CONFIG] & 4:
+            self.board.schedule(100 * US, self._end_pulse)
+
+    def _end_pulse(self):
+        """A pulsed interrupt ends after 100 us, or 8 us with INT_TPULSE_DURATION, which is not told apart (section 14.52)."""
+        if self.int1:
+            idle = not self.banks[0][reg.INT_CONFIG] & 1
+            self.board.peripherals["GPIO" + self.int1[0]].configure("drive", (self.int1[1], idle))
+
+    # -- serial interface (section 9) --------------------------------------------------------------------------------
+
+    def select(self):
+        """CS falls: the next byte is an address."""
+        self.address = None
+
+    def deselect(self):
+        """CS rises; a packet that was read in part is kept whole, unless reading may resume."""
+        if self.read_from and not self.banks[0][reg.FIFO_CONFIG1] & 0x40:
+            self.board.record("fifo_partial_read", read=self.read_from)
+            self.read_from = 0
+        self.address = None
+
+    def transfer(self, byte, mode, hz):
+        """One byte each way."""
+        if not self.powered:
+            return 0xFF
+        inverted = bool(self.banks[0][reg.DEVICE_CONFIG] & 0x10)
+        if (mode[0] != mode[1]) != inverted or hz > 24_000_000:
+            self.board.record("spi_unreadable", mode=list(mode), hz=hz)
+            return 0xFF
+        if self.address is None:
+            self.address, self.reading = byte & 0x7F, bool(byte & 0x80)
+            self._catch_up()
+            return 0xFF
+        address = self.address
+        if not (address == reg.FIFO_DATA and self.bank == 0):
+            self.address = address + 1 & 0x7F
+        if self.board.now < self.answers_from:
+            self.board.record("sensor_in_reset", address=address)
+            return 0
+        if self.reading:
+            return self._read(address)
+        self._write(address, byte)
+        return 0xFF
+
+    def _read(self, address):
+        if address == reg.REG_BANK_SEL:
+            return self.bank
+        if self.bank:
+            return self._stored(address)
+        if address == reg.FIFO_DATA:
+            return self._read_fifo()
+        if address in self.data:
+            return self.data[address]
+        if address == reg.INT_STATUS:
+            value, self.status = self.status, 0
+            if self.int1 and self.banks[0][reg.INT_CONFIG] & 4:
+                self._end_pulse()
+            return value
+        if address in (reg.FIFO_COUNTH, reg.FIFO_COUNTL):
+            return self._read_count(address)
+        if address == reg.FIFO_LOST_PKT0:
+            return self.lost & 0xFF
+        if address == reg.FIFO_LOST_PKT1:
+            value, self.lost = self.lost >> 8, 0
+            return value
+        if address == reg.WHO_AM_I:
+            return self.identity
+        return self._stored(address)
+
+    def _stored(self, address):
+        if address not in self.banks[self.bank]:
+            self.board.record("sensor_reserved", bank=self.bank, address=address, access="read")
+        return self.banks[self.bank].get(address, 0)
+
+    def _read_count(self, address):
+        """Reading FIFO_COUNTH latches both bytes (section 14.28)."""
+        if address == reg.FIFO_COUNTH:
+            self.count_latch = self._count()
+        big = bool(self.banks[0][reg.INTF_CONFIG0] & 0x20)
+        high = (address == reg.FIFO_COUNTH) == big
+        return self.count_latch >> 8 if high else self.count_latch & 0xFF
+
+    def _read_fifo(self):
+        if not self.fifo:
+            return 0xFF
+        packet = self.fifo[0]
+        byte = packet[self.read_from]
+        self.read_from += 1
+        if self.read_from == len(packet):
+            self.fifo.pop(0)
+            self.read_from = 0
+        return byte
+
+    def _write(self, address, value):
+        if self.board.now < self.locked_until:
+            self.board.record("sensor_write_too_early", address=address, value=value)
+            return
+        if address == reg.REG_BANK_SEL:
+            self.bank = min(value & 7, 4)
+            return
+        bank = self.banks[self.bank]
+        if address not in bank or self.bank == 0 and address in reg.READ_ONLY:
+            self.board.record("sensor_reserved", bank=self.bank, address=address, access="write", value=value)
+            return
+        old, bank[address] = bank[address], value
+        if self.bank:
+            return
+        if address == reg.DEVICE_CONFIG:
+            if value & 1:
+                self._reset(self.board.now)
+        elif address == reg.PWR_MGMT0:
+            self._power_modes(value)
+        elif address == reg.SIGNAL_PATH_RESET:
+            self._signal_path(value)
+            bank[address] = 0
+        elif address in (reg.GYRO_CONFIG0, reg.ACCEL_CONFIG0):
+            if (old ^ value) & 15:
+                self._restart()
+        elif address == reg.FIFO_CONFIG and not value >> 6:
+            self.fifo, self.read_from = [], 0
+        elif address == reg.GYRO_ACCEL_CONFIG0:
+            self.board.record("sensor_bandwidth", hz=self.bandwidth_hz())
+
+    def _power_modes(self, value):
+        """PWR_MGMT0 switches the sensors; no register may be written for 200 us after leaving OFF (section 14.36)."""
+        now = self.board.now
+        was_off = self.gyro_on is None and self.accel_on is None
+        gyro, accel = value >> 2 & 3 == 3, value & 3 >= 2
+        self.gyro_on = (now if self.gyro_on is None else self.gyro_on) if gyro else None
+        self.accel_on = (now if self.accel_on is None else self.accel_on) if accel else None
+        if was_off and (gyro or accel):
+            self.locked_until = now + SWITCH_ON_PS
+        self._restart()
+
+    def _signal_path(self, value):
+        if value & 2:
+            self.fifo, self.read_from = [], 0
+            self.status &= ~(reg.FIFO_FULL | reg.FIFO_THRESHOLD)
+        if value & 4:
+            stamp = self.time_stamp(self.board.now)
+            self.banks[1][reg.TMSTVAL0] = stamp & 0xFF
+            self.banks[1][reg.TMSTVAL0 + 1] = stamp >> 8 & 0xFF
+            self.banks[1][reg.TMSTVAL0 + 2] = stamp >> 16 & 15
+        if value & 8:
+            self._restart()
+
+    # -- environment -------------------------------------------------------------------------------------------------
+
+    def configure(self, key, value):
+        """Motion and faults."""
+        if self.powered:
+            self._catch_up()
+        if key == "oscillator_error_percent":
+            self.clock_ppm = round(1_000_000 * (1 + value / 100))
+            self._restart()
+        elif key == "int1":
+            self.int1 = tuple(value) if value else None
+            self._plan()
+        elif key == "who_am_i":
+            self.identity = value
+        elif key in ("tones", "motion", "samples"):
+            setattr(self, key, list(value))
+        else:
+            names = {"noise": "noise", "rates_dps": "rates", "acceleration_g": "acceleration", "temperature_c": "temperature"}
+            if key not in names:
+                raise KeyError(f"the ICM-42688-P has no setting {key}")
+            setattr(self, names[key], value)
+
+
+def _clamp(value, bits):
+    limit = 1 << bits - 1
+    return max(1 - limit, min(limit - 1, round(value)))
+
+
+def _words(values, order):
+    return b"".join(value.to_bytes(2, order, signed=True) for value in values)
+
+
+def _interpolated(table, time_us):
+    """Motion between the two rows of the table around a time; before the first and after the last it stays."""
+    index = bisect_right(table, time_us, key=lambda row: row[0])
+    if index in (0, len(table)):
+        row = table[min(index, len(table) - 1)]
+        return list(row[1]), list(row[2])
+    (t0, r0, a0), (t1, r1, a1) = table[index - 1], table[index]
+    part = (time_us - t0) / (t1 - t0)
+    return [a + part * (b - a) for a, b in zip(r0, r1)], [a + part * (b - a) for a, b in zip(a0, a1)]

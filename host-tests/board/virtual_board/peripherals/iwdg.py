@@ -1,0 +1,164 @@
+"""Independent watchdog (RM0090 section 21), counted by the LSI and by nothing else.
+
+The counter is computed from the board's time; one event is kept for the moment at which it would reach its end. A new prescaler or
+reload value is taken over five LSI periods after its write and only while the LSI runs; until then the old value counts.
+Rests on the manual's silence: a prescaler that is taken over keeps the counter's value, and the takeover takes the full five periods.
+"""
+
+from ..peripheral import Peripheral
+from . import registers
+
+PS = 1_000_000_000_000
+OPEN, RELOAD, START = 0x5555, 0xAAAA, 0xCCCC
+PVU, RVU = 1, 2
+TAKEOVER_PERIODS = 5
+
+
+class Iwdg(Peripheral):
+    """KR, PR, RLR and SR of section 21.4."""
+
+    name, base = "IWDG", 0x4000_3000
+
+    def __init__(self, board):
+        super().__init__(board)
+        self.end = None
+        self.takeover = {}
+        self._registers()
+
+    def _registers(self):
+        self.open, self.running, self.waiting = False, False, False
+        self.prescaler, self.reload = 0, 0xFFF
+        self.written = {PVU: 0, RVU: 0xFFF}
+        self.busy = 0
+        self.counter, self.since, self.hz = 0xFFF, 0, 1
+
+    def reset(self, cause):
+        self._cancel()
+        self._registers()
+        flash = self.board.peripherals.get("FLASH")
+        if flash is not None and not flash.options & 1 << 5:
+            self._start()
+
+    def _cancel(self):
+        for handle in (self.end, *self.takeover.values()):
+            if handle:
+                handle.cancel()
+        self.end, self.takeover = None, {}
+
+    def _tick_ps(self):
+        """One step of the counter in picoseconds times the LSI's frequency: a divider of 4 to 256 (section 21.4.2)."""
+        return PS * (4 << min(self.prescaler, 6))
+
+    def _count(self):
+        """The counter's value now; the phase within a step is kept in `since`."""
+        if not self.running or self.waiting:
+            return
+        steps = (self.board.now - self.since) * self.hz // self._tick_ps()
+        self.counter -= steps
+        self.since += -(-steps * self._tick_ps() // self.hz)
+
+    def _arm(self):
+        if self.end:
+            self.end.cancel()
+            self.end = None
+        if self.running and not self.waiting:
+            delay = -(-(self.counter + 1) * self._tick_ps() // self.hz) - (self.board.now - self.since)
+            self.end = self.board.schedule(max(delay, 0), self._expired)
+
+    def _expired(self):
+        self.end = None
+        self.board.record("iwdg_expired")
+        self.board.request_reset("iwdg")
+
+    def _start(self):
+        if self.running:
+            return
+        self.running, self.waiting = True, True
+        self.counter = 0xFFF
+        self.board.rcc.force_lsi()
+        if self.board.rcc.csr & 2:
+            self.lsi_ready()
+
+    def lsi_ready(self):
+        """The LSI has begun to swing: counting starts, and writes that waited for it are taken over."""
+        self.hz = self.board.rcc.lsi_hz
+        if self.waiting:
+            self.waiting = False
+            self.since = self.board.now
+            self._arm()
+        for flag in (PVU, RVU):
+            if self.busy & flag and flag not in self.takeover:
+                self._schedule_takeover(flag)
+
+    def clocks_changed(self):
+        """The LSI's frequency has changed; what has been counted so far is kept."""
+        if self.hz != self.board.rcc.lsi_hz:
+            self._count()
+            self.hz = self.board.rcc.lsi_hz
+            self._arm()
+
+    def _schedule_takeover(self, flag):
+        callback = self._take_prescaler if flag == PVU else self._take_reload
+        self.takeover[flag] = self.board.schedule(TAKEOVER_PERIODS * PS // self.board.rcc.lsi_hz, callback)
+
+    def _take_prescaler(self):
+        self._count()
+        self.prescaler = self.written[PVU]
+        self.since = self.board.now
+        self._taken(PVU)
+        self._arm()
+
+    def _take_reload(self):
+        self.reload = self.written[RVU]
+        self._taken(RVU)
+
+    def _taken(self, flag):
+        self.busy &= ~flag
+        del self.takeover[flag]
+
+    def read(self, offset, size):
+        registers.check(self, offset, size, registers.HALF_WORD)
+        if offset == 0x00:
+            return 0
+        if offset == 0x04:
+            return self.written[PVU] if self.busy & PVU else self.prescaler
+        if offset == 0x08:
+            return self.written[RVU] if self.busy & RVU else self.reload
+        if offset == 0x0C:
+            return self.busy
+        raise registers.unmodelled(self, offset, "read")
+
+    def write(self, offset, value, size):
+        registers.check(self, offset, size, registers.HALF_WORD)
+        if offset == 0x00:
+            self._key(value & 0xFFFF)
+        elif offset == 0x04:
+            self._update(PVU, value & 7)
+        elif offset == 0x08:
+            self._update(RVU, value & 0xFFF)
+        else:
+            raise registers.unmodelled(self, offset, "write")
+
+    def _key(self, key):
+        self.open = key == OPEN
+        if key == START:
+            self._start()
+        elif key == RELOAD and self.running:
+            self.counter = self.reload
+            self.since = self.board.now
+            self._arm()
+
+    def _update(self, flag, value):
+        if not self.open or self.busy & flag:
+            self.board.record("ignored_write", register="IWDG_PR" if flag == PVU else "IWDG_RLR", value=value)
+            return
+        self.busy |= flag
+        self.written[flag] = value
+        if self.board.rcc.csr & 2:
+            self._schedule_takeover(flag)
+
+    def configure(self, key, value):
+        if key == "lsi_hz":
+            self.board.rcc.configure(key, value)
+        else:
+            super().configure(key, value)

@@ -1,0 +1,141 @@
+"""Power control (RM0090 section 5) with the supply that the test sets: voltage detector, brown-out and power-on reset.
+
+Thresholds are those of DS8626 table 19 (embedded reset and power control block); the setting `column` chooses min, typ or max.
+Left out: Stop and Standby, the backup regulator, and the time that the voltage detector needs to start (the manual gives none).
+VOSRDY is set 50 us after the regulator's scale was written; the manual gives no time.
+
+Settings: `supply_mv`, `column`.
+"""
+
+from ..peripheral import Peripheral
+from . import registers
+
+#: Falling and rising thresholds in millivolts by PLS, each as (min, typ, max).
+PVD = (((1980, 2040, 2080), (2090, 2140, 2190)), ((2130, 2190, 2250), (2230, 2300, 2370)),
+       ((2290, 2350, 2390), (2390, 2450, 2510)), ((2440, 2510, 2560), (2540, 2600, 2650)),
+       ((2590, 2660, 2710), (2700, 2760, 2820)), ((2650, 2840, 2920), (2860, 2930, 2990)),
+       ((2850, 2930, 2990), (2960, 3030, 3100)), ((2950, 3030, 3090), (3070, 3140, 3210)))
+#: The same for BOR_LEV; 3 is off, 0 is level 3 (section 3.9.10).
+BOR = {2: ((2130, 2190, 2240), (2230, 2290, 2330)), 1: ((2440, 2500, 2560), (2530, 2590, 2630)),
+       0: ((2750, 2830, 2880), (2850, 2920, 2970))}
+POWER_ON = ((1600, 1680, 1760), (1640, 1720, 1800))
+COLUMNS = {"min": 0, "typ": 1, "max": 2}
+#: TRSTTEMPO, the time from a sufficient supply to the start.
+RESET_TIME_PS = 1_500_000_000
+REGULATOR_PS = 50_000_000
+UNTIL_THE_SUPPLY_RETURNS = 10**21
+
+PVDE, DBP, VOS = 1 << 4, 1 << 8, 1 << 14
+PVDO, VOSRDY = 1 << 2, 1 << 14
+CR_WRITABLE = 0x43F3
+
+
+class Pwr(Peripheral):
+    """The registers of section 5.4 (STM32F405) and the supply monitors of section 5.2."""
+
+    name, base, clock = "PWR", 0x4000_7000, "PWR"
+
+    def __init__(self, board):
+        super().__init__(board)
+        self.supply_mv = 3300
+        self.column = COLUMNS["typ"]
+        self.held = None
+        self.release = None
+        self.cr, self.low, self.scale_from = VOS, False, 0
+
+    @property
+    def scale_1(self):
+        """The regulator's scale 1 allows 168 MHz, scale 2 only 144 MHz (section 5.1.3)."""
+        return bool(self.cr & VOS)
+
+    @property
+    def backup_writable(self):
+        """DBP opens the RTC, its backup registers and RCC_BDCR (section 5.1.2)."""
+        return bool(self.cr & DBP)
+
+    def reset(self, cause):
+        self.cr = VOS
+        self.scale_from = self.board.now
+        self._detect()
+        if self.held:
+            self.board.stall(self.board.now + UNTIL_THE_SUPPLY_RETURNS)
+
+    def power_off(self):
+        """The board is without power; the next start is the board's."""
+        self.held = self.release = None
+
+    def read(self, offset, size):
+        registers.check(self, offset, size, registers.HALF_WORD)
+        if offset == 0:
+            return self.cr
+        if offset == 4:
+            settled = self.board.now - self.scale_from >= REGULATOR_PS
+            return (PVDO if self.low else 0) | (VOSRDY if settled else 0)
+        raise registers.unmodelled(self, offset, "read")
+
+    def write(self, offset, value, size):
+        registers.check(self, offset, size, registers.HALF_WORD)
+        if offset == 0:
+            if value & 3:
+                raise registers.unmodelled(self, offset, "write of LPDS or PDDS (Stop and Standby)")
+            if (value ^ self.cr) & VOS:
+                self.scale_from = self.board.now
+            self.cr = value & CR_WRITABLE
+            self._detect()
+            self.board.rcc.check_limits()
+        elif offset != 4 or value & 0x300:
+            raise registers.unmodelled(self, offset, "write")
+
+    def _detect(self):
+        """PVDO compares the supply with the selected level, with hysteresis, and drives EXTI line 16 (section 5.2.3)."""
+        falling, rising = PVD[self.cr >> 5 & 7]
+        if not self.cr & PVDE:
+            low = False
+        elif self.supply_mv < falling[self.column]:
+            low = True
+        else:
+            low = self.low and self.supply_mv < rising[self.column]
+        if low != self.low:
+            self.low = low
+            self.board.record("pvd", low=low, supply_mv=self.supply_mv)
+            self.board.peripherals["EXTI"].line(16, low)
+
+    def _brown_out(self):
+        return BOR.get(self.board.peripherals["FLASH"].bor_level)
+
+    def _monitor(self):
+        """The reset monitors hold the part while the supply is too low and let it start when it has returned."""
+        brown_out = self._brown_out()
+        column, supply = self.column, self.supply_mv
+        cause = None
+        if supply < POWER_ON[0][column]:
+            cause = "por"
+        elif brown_out and supply < brown_out[0][column]:
+            cause = "bor"
+        if cause and self.held != "por" and cause != self.held:
+            self.held = cause
+            self.board.record("supply_reset", cause=cause, supply_mv=supply)
+            self.board.request_reset(cause)
+            self.board.stall(self.board.now + UNTIL_THE_SUPPLY_RETURNS)
+        if not self.held:
+            return
+        enough = supply >= POWER_ON[1][column] and (not brown_out or supply >= brown_out[1][column])
+        if enough and not self.release:
+            self.release = self.board.schedule(RESET_TIME_PS if self.held == "por" else 0, self._start)
+        elif not enough and self.release:
+            self.release.cancel()
+            self.release = None
+
+    def _start(self):
+        cause, self.held, self.release = self.held, None, None
+        self.board.request_reset(cause)
+
+    def configure(self, key, value):
+        if key == "supply_mv":
+            self.supply_mv = int(value)
+            self._detect()
+            self._monitor()
+        elif key == "column":
+            self.column = COLUMNS[value]
+        else:
+            super().configure(key, value)

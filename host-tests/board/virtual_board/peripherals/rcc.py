@@ -1,0 +1,489 @@
+"""Reset and clock control (RM0090 section 7): oscillators, PLL, prescalers, clock gates and reset flags.
+
+Every frequency of the board follows from these registers and from the environment: the crystal that is fitted, or none, the error
+of the HSI oscillator and the frequency of the LSI. Times are those of DS8626 (tables 33 to 43).
+
+Left out: the I2S PLL, spread spectrum, HSI trimming, the clock outputs MCO1 and MCO2, gates in Sleep mode (the LPENR registers keep
+their values and gate nothing), and the LSE crystal unless a test fits one.
+
+Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (True stops it; False lets it start again, though a core
+that it stopped stays so until a reset), `lsi_hz`,
+`lse_hz`, `hse_startup_us`, `pll_lock_us`, `strict` (False records a broken limit as `limit` and carries on).
+"""
+
+from ..peripheral import Peripheral
+from ..violation import Violation
+from . import registers
+from .clock_names import ENABLE, RESET, RESET_VALUES
+
+PS = 1_000_000_000_000
+HSI_NOMINAL = 16_000_000
+
+HSION, HSIRDY, HSEON, HSERDY, HSEBYP, CSSON = 1 << 0, 1 << 1, 1 << 16, 1 << 17, 1 << 18, 1 << 19
+PLLON, PLLRDY, PLLI2SON = 1 << 24, 1 << 25, 1 << 26
+PLLSRC_HSE = 1 << 22
+CSSF, CSSC = 1 << 7, 1 << 23
+LSI_READY, LSE_READY, HSI_READY, HSE_READY, PLL_READY = 0, 1, 2, 3, 4
+LSION, LSIRDY, RMVF = 1 << 0, 1 << 1, 1 << 24
+#: Flags of RCC_CSR (section 7.3.21) for each cause; NRST is pulled low by every internal reset (section 7.1.1).
+RESET_FLAGS = {"por": 0x0E00_0000, "bor": 0x0600_0000, "pin": 0x0400_0000, "software": 0x1400_0000,
+               "iwdg": 0x2400_0000, "wwdg": 0x4400_0000, "lowpower": 0x8400_0000}
+CFGR_WRITABLE = 0xFFFF_FCF3
+AHB_SHIFT = {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}
+APB_SHIFT = {4: 1, 5: 2, 6: 3, 7: 4}
+BUS_OF_ENABLE = {0x30: "HCLK", 0x34: "HCLK", 0x38: "HCLK", 0x40: "PCLK1", 0x44: "PCLK2"}
+OSCILLATOR_SWITCH_PS = 200_000
+
+
+class Rcc(Peripheral):
+    """The clock tree of section 7.2 with the gates and flags that hang on it."""
+
+    name, base = "RCC", 0x4002_3800
+
+    def __init__(self, board):
+        super().__init__(board)
+        self.hsi_error_percent = 0.0
+        self.crystal_hz = 25_000_000
+        self.crystal_stopped = False
+        self.lsi_hz = 32_000
+        self.lse_hz = None
+        self.hse_startup_us = 2_000
+        self.pll_lock_us = 300
+        self.strict = True
+        self.pending = {}
+        self.flags = 0
+        self.bdcr = 0
+        self._power_on()
+
+    # -- what other parts of the board ask ---------------------------------------------------------------------------
+
+    def enabled(self, name):
+        """The gate's state for an access made now; an access within two bus cycles of the enabling write is recorded (ES0182)."""
+        if self.settle_until:
+            now = self.board.now
+            until = self.settling.get(name, 0)
+            if now < until:
+                self.board.record("early_access", peripheral=name, ps_left=until - now)
+            elif now >= self.settle_until:
+                self.settle_until = 0
+        return name in self.gates
+
+    def is_on(self, name):
+        """The gate's state, without counting as an access."""
+        return name in self.gates
+
+    def clock_hz(self, name):
+        """A bus or timer clock in hertz: HCLK, PCLK1, PCLK2, TIM_APB1 or TIM_APB2."""
+        return self.hz[name]
+
+    @property
+    def nmi_line(self):
+        """The clock security system holds the NMI line as long as CSSF is set (section 7.2.7)."""
+        return bool(self.cir & CSSF)
+
+    @property
+    def hse_hz(self):
+        """The oscillator's frequency while it swings, otherwise 0."""
+        swings = self.crystal_hz and not self.crystal_stopped and self.cr & HSERDY
+        return self.crystal_hz if swings else 0
+
+    def hse_rtc_hz(self):
+        """HSE divided by RTCPRE in hertz as (numerator, denominator); (0, 1) where nothing comes (section 7.3.3)."""
+        divider = (self.cfgr >> 16) & 0x1F
+        return (self.hse_hz, divider) if divider >= 2 else (0, 1)
+
+    @property
+    def lsi_runs(self):
+        """The LSI runs where LSION asks for it or the independent watchdog has been started (section 7.2.5)."""
+        return bool(self.csr & LSION) or self.lsi_forced
+
+    # -- resets ------------------------------------------------------------------------------------------------------
+
+    def _power_on(self):
+        self.cr, self.pllcfgr, self.cfgr, self.cir, self.csr = 0x83, 0x2400_3010, 0, 0, 0
+        self.sscgr, self.plli2scfgr = 0, 0x2000_3000
+        self.words = dict(RESET_VALUES)
+        self.gates = set()
+        self.settling, self.settle_until = {}, 0
+        self.lsi_forced = False
+        self.source = "HSI"
+        self._open_gates()
+        self._compute()
+
+    def reset(self, cause):
+        for handle in self.pending.values():
+            handle.cancel()
+        self.pending = {}
+        before = dict(self.hz)
+        if cause == "por":
+            self.flags, self.bdcr = 0, 0
+        self.flags |= RESET_FLAGS.get(cause, 0)
+        self._power_on()
+        if before != self.hz:
+            self._announce()
+        self.board.irq(5, False)
+
+    def _open_gates(self):
+        self.gates = {name for offset, names in ENABLE.items() for bit, name in names.items()
+                      if self.words[offset] >> bit & 1}
+        for offset, names in RESET.items():
+            for bit, held in names.items():
+                if self.words[offset] >> bit & 1:
+                    self.gates.difference_update(held)
+
+    # -- frequencies -------------------------------------------------------------------------------------------------
+
+    def _pll_hz(self):
+        """The PLL's output in hertz from its nominal input (section 7.3.2)."""
+        source = self.crystal_hz if self.pllcfgr & PLLSRC_HSE else HSI_NOMINAL
+        m, n, p = self.pllcfgr & 0x3F, (self.pllcfgr >> 6) & 0x1FF, 2 * ((self.pllcfgr >> 16 & 3) + 1)
+        return (source or 0) * n // (m * p)
+
+    def _compute(self):
+        """All clocks follow from the source and the prescalers; the limits are held against nominal frequencies."""
+        if self.source == "PLL":
+            nominal, of_hsi = self._pll_hz(), not self.pllcfgr & PLLSRC_HSE
+        elif self.source == "HSE":
+            nominal, of_hsi = self.crystal_hz or 0, False
+        else:
+            nominal, of_hsi = HSI_NOMINAL, True
+        hclk = nominal >> AHB_SHIFT.get(self.cfgr >> 4 & 15, 0)
+        shift1, shift2 = APB_SHIFT.get(self.cfgr >> 10 & 7, 0), APB_SHIFT.get(self.cfgr >> 13 & 7, 0)
+        tree = {"SYSCLK": nominal, "HCLK": hclk, "PCLK1": hclk >> shift1, "PCLK2": hclk >> shift2,
+                "TIM_APB1": hclk >> max(shift1 - 1, 0), "TIM_APB2": hclk >> max(shift2 - 1, 0)}
+        self.nominal = tree
+        ratio = 1 + self.hsi_error_percent / 100 if of_hsi else 1
+        self.hz = tree if ratio == 1 else {name: round(hz * ratio) for name, hz in tree.items()}
+        self.core_hz = self.hz["HCLK"]
+        self.systick_external_hz = self.core_hz // 8
+
+    def check_limits(self):
+        """The clocks are held against DS8626 table 14 and the flash latency against RM0090 table 10 (2.7 to 3.6 V)."""
+        flash, power = self.board.peripherals.get("FLASH"), self.board.peripherals.get("PWR")
+        top = 168_000_000 if power is None or power.scale_1 else 144_000_000
+        for name, most in (("HCLK", top), ("PCLK1", 42_000_000), ("PCLK2", 84_000_000)):
+            if self.nominal[name] > most:
+                self._limit(f"{name} at {self.nominal[name]} Hz is above {most} Hz")
+        if flash is not None and self.nominal["HCLK"] > 30_000_000 * (flash.latency + 1):
+            self._limit(f"HCLK at {self.nominal['HCLK']} Hz with {flash.latency} flash wait states")
+
+    def _limit(self, text):
+        if self.strict:
+            raise Violation(f"RCC: {text}")
+        self.board.record("limit", text=text)
+
+    def _announce(self):
+        for peripheral in self.board.peripherals.values():
+            changed = getattr(peripheral, "clocks_changed", None)
+            if changed:
+                changed()
+        self.board.clocks_changed()
+
+    def _update(self):
+        """The tree is computed again after a change of source or prescaler, and everyone who counts is called."""
+        before = self.hz
+        self._compute()
+        self.check_limits()
+        if before != self.hz:
+            self._announce()
+
+    # -- oscillators -------------------------------------------------------------------------------------------------
+
+    def _later(self, key, delay_ps, callback):
+        self._drop(key)
+        self.pending[key] = self.board.schedule(delay_ps, callback)
+
+    def _drop(self, key):
+        handle = self.pending.pop(key, None)
+        if handle:
+            handle.cancel()
+
+    def _ready(self, bit):
+        self.cir |= 1 << bit
+        self._interrupt()
+
+    def _interrupt(self):
+        self.board.irq(5, bool(self.cir & self.cir >> 8 & 0x3F))
+
+    def _hsi_ready(self):
+        self.pending.pop("hsi", None)
+        self.cr |= HSIRDY
+        self._ready(HSI_READY)
+        self._start_pll()
+        self._try_switch()
+
+    def _start_hse(self):
+        if self.cr & HSEON and self.crystal_hz and not self.crystal_stopped and not self.cr & HSERDY:
+            self._later("hse", self.hse_startup_us * 1_000_000, self._hse_ready)
+
+    def _hse_ready(self):
+        self.pending.pop("hse", None)
+        self.cr |= HSERDY
+        self._ready(HSE_READY)
+        self._start_pll()
+        self._try_switch()
+
+    def _start_pll(self):
+        source_ready = self.cr & (HSERDY if self.pllcfgr & PLLSRC_HSE else HSIRDY)
+        if not self.cr & PLLON or self.cr & PLLRDY or not source_ready:
+            return
+        source = self.crystal_hz if self.pllcfgr & PLLSRC_HSE else HSI_NOMINAL
+        m, n, q = self.pllcfgr & 0x3F, self.pllcfgr >> 6 & 0x1FF, self.pllcfgr >> 24 & 15
+        if m < 2 or not 50 <= n <= 432 or q < 2:
+            raise Violation(f"RCC: PLLM {m}, PLLN {n} or PLLQ {q} is a wrong configuration (section 7.3.2)")
+        if not 950_000 <= source / m <= 2_100_000:
+            self._limit(f"PLL input of {source / m:.0f} Hz is outside 0.95 to 2.1 MHz")
+        if not 100_000_000 <= source * n / m <= 432_000_000:
+            self._limit(f"PLL oscillator at {source * n / m:.0f} Hz is outside 100 to 432 MHz")
+        self._later("pll", self.pll_lock_us * 1_000_000, self._pll_ready)
+
+    def _pll_ready(self):
+        self.pending.pop("pll", None)
+        self.cr |= PLLRDY
+        self._ready(PLL_READY)
+        self._try_switch()
+
+    def _uses(self, oscillator):
+        """The oscillator is the system clock, directly or through the PLL."""
+        through = "HSE" if self.pllcfgr & PLLSRC_HSE else "HSI"
+        return self.source == oscillator or (self.source == "PLL" and through == oscillator)
+
+    def _try_switch(self):
+        wanted = ("HSI", "HSE", "PLL")[self.cfgr & 3]
+        ready = self.cr & {"HSI": HSIRDY, "HSE": HSERDY, "PLL": PLLRDY}[wanted]
+        if wanted != self.source and ready and "switch" not in self.pending:
+            self._later("switch", OSCILLATOR_SWITCH_PS, self._switch)
+
+    def _switch(self):
+        self.pending.pop("switch", None)
+        wanted = ("HSI", "HSE", "PLL")[self.cfgr & 3]
+        if self.cr & {"HSI": HSIRDY, "HSE": HSERDY, "PLL": PLLRDY}[wanted]:
+            self.source = wanted
+            self._update()
+
+    def _crystal_lost(self):
+        """The crystal stops: with CSS the part falls back to HSI (section 7.2.7), without it what HSE feeds stands still."""
+        self._drop("hse")
+        was_ready = self.cr & HSERDY
+        self.cr &= ~HSERDY
+        if not was_ready:
+            return
+        if not self.cr & CSSON:
+            if self._uses("HSE"):
+                self.board.record("clock_dead", source=self.source)
+                self.board.stall(self.board.now + 1_000_000 * PS)
+            return
+        used = self._uses("HSE")
+        self.cr &= ~HSEON
+        if used:
+            self.cr |= HSION | HSIRDY
+            if self.source == "PLL":
+                self.cr &= ~(PLLON | PLLRDY)
+            self.cfgr &= ~3
+            self._drop("switch")
+            self.source = "HSI"
+            self._update()
+        self.cir |= CSSF
+        self.board.nmi()
+
+    # -- registers ---------------------------------------------------------------------------------------------------
+
+    def read(self, offset, size):
+        word = offset & ~3
+        if word == 0x00:
+            value = self.cr
+        elif word == 0x04:
+            value = self.pllcfgr
+        elif word == 0x08:
+            value = self.cfgr & ~0xC | {"HSI": 0, "HSE": 4, "PLL": 8}[self.source]
+        elif word == 0x0C:
+            value = self.cir
+        elif word in self.words:
+            value = self.words[word]
+        elif word == 0x70:
+            value = self.bdcr
+        elif word == 0x74:
+            value = self.csr | self.flags
+        elif word == 0x80:
+            value = self.sscgr
+        elif word == 0x84:
+            value = self.plli2scfgr
+        else:
+            raise registers.unmodelled(self, offset, "read")
+        return registers.cut(value, offset, size)
+
+    def write(self, offset, value, size):
+        word = offset & ~3
+        if size != 4:
+            value = registers.merge(0 if word == 0x0C else self.read(word, 4), value, offset, size)
+        if word == 0x00:
+            self._write_cr(value)
+        elif word == 0x04:
+            self._write_pllcfgr(value)
+        elif word == 0x08:
+            self._write_cfgr(value)
+        elif word == 0x0C:
+            self._write_cir(value)
+        elif word in self.words:
+            self._write_gate(word, value)
+        elif word == 0x70:
+            self._write_bdcr(value)
+        elif word == 0x74:
+            self._write_csr(value)
+        elif word == 0x84:
+            self.plli2scfgr = value & 0x7000_7FC0
+        else:
+            raise registers.unmodelled(self, offset, "write")
+
+    def _write_cr(self, value):
+        if value & PLLI2SON:
+            raise Violation("RCC: the I2S PLL is not modelled")
+        if value & 0xF8 != 0x80:
+            raise Violation("RCC: HSI trimming is not modelled")
+        old = self.cr
+        new = old & (HSIRDY | HSERDY | PLLRDY) | value & (0xF8 | HSION | HSEON | CSSON | PLLON)
+        new |= (old if old & HSEON else value) & HSEBYP
+        if self._uses("HSI"):
+            new |= HSION
+        if self._uses("HSE"):
+            new |= old & HSEON
+        if self.source == "PLL":
+            new |= old & PLLON
+        if not new & HSION:
+            self._drop("hsi")
+            new &= ~HSIRDY
+        if not new & HSEON:
+            self._drop("hse")
+            new &= ~HSERDY
+        if not new & PLLON:
+            self._drop("pll")
+            new &= ~PLLRDY
+        self.cr = new
+        if new & HSION and not old & HSION:
+            self._later("hsi", 2_200_000, self._hsi_ready)
+        if new & HSEON and not old & HSEON:
+            self._start_hse()
+        if new & PLLON and not old & PLLON:
+            self._start_pll()
+
+    def _write_pllcfgr(self, value):
+        if self.cr & PLLON:
+            self.board.record("ignored_write", register="RCC_PLLCFGR", value=value)
+            return
+        self.pllcfgr = value & 0x0F43_7FFF | 0x2000_0000
+
+    def _write_cfgr(self, value):
+        if value & 3 == 3:
+            raise Violation("RCC: SW = 11 is not allowed (section 7.3.3)")
+        self.cfgr = value & CFGR_WRITABLE
+        self._update()
+        self._try_switch()
+
+    def _write_cir(self, value):
+        self.cir &= ~(value >> 16 & 0x3F)
+        if value & CSSC:
+            self.cir &= ~CSSF
+        self.cir = self.cir & ~0x3F00 | value & 0x3F00
+        self._interrupt()
+
+    def _write_gate(self, word, value):
+        if word in ENABLE:
+            mask = sum(1 << bit for bit in ENABLE[word])
+            risen = value & mask & ~self.words[word]
+            self.words[word] = value & mask
+            self._open_gates()
+            if risen:
+                until = self.board.now + 2 * PS // max(self.hz[BUS_OF_ENABLE[word]], 1)
+                self.settling = {name: end for name, end in self.settling.items() if end > self.board.now}
+                self.settling.update({name: until for bit, name in ENABLE[word].items() if risen >> bit & 1})
+                self.settle_until = max(self.settle_until, until)
+        elif word in RESET:
+            risen = value & ~self.words[word]
+            self.words[word] = value
+            self._open_gates()
+            for bit, names in RESET[word].items():
+                if risen >> bit & 1:
+                    for name in names:
+                        if name in self.board.peripherals:
+                            self.board.peripherals[name].reset("rcc")
+        else:
+            self.words[word] = value
+
+    def _write_bdcr(self, value):
+        power = self.board.peripherals.get("PWR")
+        if power is not None and not power.backup_writable:
+            self.board.record("ignored_write", register="RCC_BDCR", value=value)
+            return
+        if value & 1 << 16:
+            self.bdcr = 1 << 16
+            rtc = self.board.peripherals.get("RTC")
+            if rtc:
+                rtc.backup_reset()
+            return
+        selected = self.bdcr & 0x300 or value & 0x300
+        self.bdcr = value & 0x8005 | selected | self.bdcr & 2
+        if not value & 1:
+            self._drop("lse")
+            self.bdcr &= ~2
+        elif self.lse_hz and not self.bdcr & 2:
+            self._later("lse", 2 * PS, self._lse_ready)
+
+    def _lse_ready(self):
+        self.bdcr |= 2
+        self._ready(LSE_READY)
+
+    def _write_csr(self, value):
+        if value & RMVF:
+            self.flags = 0
+        self.csr = self.csr & ~LSION | value & LSION
+        self._lsi_changed()
+
+    def force_lsi(self):
+        """The independent watchdog has been started and keeps the LSI on (section 21.3)."""
+        self.lsi_forced = True
+        self._lsi_changed()
+
+    def _lsi_changed(self):
+        if not self.lsi_runs:
+            self._drop("lsi")
+            self.csr &= ~LSIRDY
+        elif not self.csr & LSIRDY and "lsi" not in self.pending:
+            self._later("lsi", 40_000_000, self._lsi_ready)
+
+    def _lsi_ready(self):
+        self.pending.pop("lsi", None)
+        self.csr |= LSIRDY
+        self._ready(LSI_READY)
+        watchdog = self.board.peripherals.get("IWDG")
+        if watchdog:
+            watchdog.lsi_ready()
+
+    # -- environment -------------------------------------------------------------------------------------------------
+
+    def configure(self, key, value):
+        if key == "hsi_error_percent":
+            self.hsi_error_percent = float(value)
+            self._update()
+        elif key == "crystal_hz":
+            self.crystal_hz = value
+            if value is None:
+                self._crystal_lost()
+            else:
+                self._start_hse()
+        elif key == "crystal_stop":
+            self.crystal_stopped = bool(value)
+            if value:
+                self._crystal_lost()
+            else:
+                self._start_hse()
+        elif key == "lsi_hz":
+            if not 17_000 <= value <= 47_000:
+                raise ValueError(f"LSI of {value} Hz; DS8626 table 42 gives 17 to 47 kHz")
+            self.lsi_hz = int(value)
+            watchdog = self.board.peripherals.get("IWDG")
+            if watchdog:
+                watchdog.clocks_changed()
+        elif key in ("lse_hz", "hse_startup_us", "pll_lock_us", "strict"):
+            setattr(self, key, value)
+        else:
+            super().configure(key, value)

@@ -1,0 +1,330 @@
+"""General-purpose timers as up-counters with compare and capture (RM0090 sections 18 and 19).
+
+The counter is computed from the board's time; an event is kept only while DIER lets something interrupt. TIM11 channel 1 captures HSE
+divided by RTCPRE and TIM5 channel 4 the LSI (sections 19.5.11 and 18.4.20), which is how software measures an oscillator.
+Left out: counting down, PWM outputs and the preload of CCR, slave mode, encoder, DMA requests, captures of a pin.
+"""
+
+from ..peripheral import Peripheral
+from ..violation import Violation
+from . import registers
+
+PS = 1_000_000_000_000
+CEN, UDIS, URS, OPM, ARPE = 1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 7
+UIF = 1
+CR1_WRITABLE = CEN | UDIS | URS | OPM | ARPE | 0x300
+
+
+class Timer(Peripheral):
+    """One timer of 16 or 32 bits with up to four channels."""
+
+    def __init__(self, board, name, base, interrupt, bus, bits, channels, remap=None):
+        super().__init__(board)
+        self.name = self.clock = name
+        self.base, self.interrupt, self.bus = base, interrupt, bus
+        self.mask, self.channels = (1 << bits) - 1, channels
+        self.remap = remap
+        self.event = None
+        self._registers()
+
+    def _registers(self):
+        self.cr1 = self.cr2 = self.dier = self.sr = self.ccer = self.option = 0
+        self.ccmr = [0, 0]
+        self.ccr = [0, 0, 0, 0]
+        self.prescaler = self.prescaler_written = 0
+        self.arr = self.arr_written = self.mask
+        self.counter, self.since = 0, self.board.now
+        self.hz = 0
+        self.capture_source, self.captured = (0, 1), [0, 0, 0, 0]
+        self.irq_level = False
+
+    def reset(self, cause):
+        if self.event:
+            self.event.cancel()
+            self.event = None
+        self._registers()
+        self.board.irq(self.interrupt, False)
+
+    # -- counting ----------------------------------------------------------------------------------------------------
+
+    def _steps(self, now):
+        """Steps of the counter since `since`; a blocked counter (ARR = 0) makes none (section 18.3.1)."""
+        if not self.cr1 & CEN or not self.arr or not self.hz:
+            return 0
+        return (now - self.since) * self.hz // (PS * (self.prescaler + 1))
+
+    def _to_overflow(self):
+        return (self.arr if self.counter <= self.arr else self.mask) - self.counter + 1
+
+    def _after(self, steps):
+        """The counter's value `steps` after `since`."""
+        first = self._to_overflow()
+        return self.counter + steps if steps < first else (steps - first) % (self.arr + 1)
+
+    def _sync(self):
+        """Everything that has happened up to now enters the flags and the counter."""
+        now = self.board.now
+        self._capture(now)
+        steps = self._steps(now)
+        if not steps:
+            return
+        first = self._to_overflow()
+        while steps >= first:
+            whole = steps if self._steady() else first
+            self._matches(whole)
+            self._advance(whole)
+            if not self.cr1 & UDIS:
+                self.sr |= UIF
+                self.prescaler, self.arr = self.prescaler_written, self.arr_written
+                if self.cr1 & OPM:
+                    self.cr1 &= ~CEN
+            steps, first = self._steps(now), self._to_overflow()
+        if steps:
+            self._matches(steps)
+            self._advance(steps)
+
+    def _steady(self):
+        """No overflow changes how the counter goes on, so its value follows from the time alone."""
+        return self.prescaler_written == self.prescaler and self.arr_written == self.arr and not self.cr1 & OPM
+
+    def _counted(self):
+        self._sync()
+        return self.counter
+
+    def _advance(self, steps):
+        value = self._after(steps)
+        self.since += -(-steps * PS * (self.prescaler + 1) // self.hz)
+        self.counter = value
+
+    def _matches(self, steps):
+        """A compare channel whose value the counter passes sets its flag (section 18.3.7)."""
+        for channel in range(self.channels):
+            if self._selection(channel):
+                continue
+            if self._distance(self.ccr[channel]) <= steps:
+                self.sr |= 2 << channel
+
+    def _distance(self, value):
+        """Steps until the counter next takes a value; more than any count where it never does."""
+        first = self._to_overflow()
+        if self.counter < value < self.counter + first:
+            return value - self.counter
+        return first + value if value <= self.arr else 1 << 70
+
+    def _selection(self, channel):
+        return self.ccmr[channel >> 1] >> 8 * (channel & 1) & 3
+
+    def _capture(self, now):
+        """Edges of the internal source since the last look leave the last one's time in CCR."""
+        if self.remap is None:
+            return
+        channel, _, selector = self.remap
+        source = selector(self)
+        if source != self.capture_source:
+            self.capture_source = source
+            self.captured[channel] = self._edges(now)
+            return
+        if not source[0] or not self.ccer >> 4 * channel & 1 or self._selection(channel) != 1 or not self.cr1 & CEN:
+            self.captured[channel] = self._edges(now)
+            return
+        divider = 1 << (self.ccmr[channel >> 1] >> 8 * (channel & 1) + 2 & 3)
+        fresh = (self._edges(now) - self.captured[channel]) // divider
+        if fresh <= 0:
+            return
+        self.captured[channel] += fresh * divider
+        numerator, denominator = source
+        edge = -(-self.captured[channel] * denominator * PS // numerator)
+        self.ccr[channel] = self._after(self._steps(max(edge, self.since)))
+        flag = 2 << channel
+        if self.sr & flag or fresh > 1:
+            self.sr |= flag << 8
+        self.sr |= flag
+
+    def _edges(self, now):
+        numerator, denominator = self.capture_source
+        return now * numerator // (denominator * PS)
+
+    def clocks_changed(self):
+        """The timer's clock has changed; what it has counted at the old one is kept."""
+        hz = self.board.rcc.clock_hz(self.bus)
+        if hz != self.hz:
+            self._sync()
+            self.hz = hz
+            self.since = self.board.now
+            self._arm()
+
+    # -- interrupts --------------------------------------------------------------------------------------------------
+
+    def _interrupt(self):
+        level = bool(self.sr & self.dier & 0x1F)
+        if level != self.irq_level:
+            self.irq_level = level
+            self.board.irq(self.interrupt, level)
+
+    def _arm(self):
+        """One event is kept for the next flag that may interrupt."""
+        if self.event:
+            self.event.cancel()
+            self.event = None
+        self._interrupt()
+        if not self.dier & 0x1F or not self.cr1 & CEN or not self.hz:
+            return
+        delays = []
+        if self.dier & UIF and not self.sr & UIF:
+            delays.append(self._delay(self._to_overflow()))
+        for channel in range(self.channels):
+            flag = 2 << channel
+            if not self.dier & flag or self.sr & flag:
+                continue
+            if not self._selection(channel):
+                steps = self._distance(self.ccr[channel])
+                if steps < 1 << 69:
+                    delays.append(self._delay(steps))
+            elif self.remap and self.capture_source[0]:
+                numerator, denominator = self.capture_source
+                divider = 1 << (self.ccmr[channel >> 1] >> 8 * (channel & 1) + 2 & 3)
+                edge = self.captured[channel] + divider
+                delays.append(-(-edge * denominator * PS // numerator) - self.board.now)
+        if delays:
+            self.event = self.board.schedule(max(min(delays), 0), self._happens)
+
+    def _delay(self, steps):
+        return -(-steps * PS * (self.prescaler + 1) // self.hz) - (self.board.now - self.since)
+
+    def _happens(self):
+        self.event = None
+        self._sync()
+        self._arm()
+
+    # -- registers ---------------------------------------------------------------------------------------------------
+
+    def read(self, offset, size):
+        if offset == 0x24:
+            if self.cr1 & CEN:
+                value = self._after(self._steps(self.board.now)) if self._steady() else self._counted()
+            else:
+                value = self.counter
+            return value if size == 4 else registers.cut(value, offset, size)
+        word = offset & ~3
+        registers.check(self, offset, size, registers.HALF_WORD)
+        if word == 0x10:
+            self._sync()
+            value = self.sr
+        elif 0x34 <= word < 0x34 + 4 * self.channels:
+            self._sync()
+            channel = (word - 0x34) // 4
+            value = self.ccr[channel]
+            if self._selection(channel):
+                self.sr &= ~(2 << channel)
+                self._arm()
+        elif word == 0x00:
+            self._sync()
+            value = self.cr1
+        elif word == 0x04:
+            value = self.cr2
+        elif word == 0x08 or word == 0x14:
+            value = 0
+        elif word == 0x0C:
+            value = self.dier
+        elif word in (0x18, 0x1C) and (word - 0x18) // 2 < self.channels:
+            value = self.ccmr[(word - 0x18) // 4]
+        elif word == 0x20:
+            value = self.ccer
+        elif word == 0x28:
+            value = self.prescaler_written
+        elif word == 0x2C:
+            value = self.arr_written
+        elif word == 0x50 and self.remap:
+            value = self.option
+        else:
+            raise registers.unmodelled(self, offset, "read")
+        return registers.cut(value, offset, size)
+
+    def write(self, offset, value, size):
+        registers.check(self, offset, size, registers.HALF_WORD)
+        word = offset & ~3
+        self._sync()
+        if size != 4 and word not in (0x10, 0x14):
+            value = registers.merge(self._stored(word), value, offset, size)
+        if word == 0x00:
+            if value & 0x70:
+                raise Violation(f"{self.name}: counting down and centre-aligned modes are not modelled")
+            if value & CEN and not self.cr1 & CEN:
+                self.hz = self.board.rcc.clock_hz(self.bus)
+                self.since = self.board.now
+            self.cr1 = value & CR1_WRITABLE
+        elif word == 0x04:
+            self.cr2 = value & 0xF8
+        elif word == 0x0C:
+            if value & 0x5F00:
+                raise Violation(f"{self.name}: DMA requests of timers are not modelled")
+            self.dier = value & 0x5F
+        elif word == 0x10:
+            self.sr &= value
+        elif word == 0x14:
+            self._generate(value)
+        elif word in (0x18, 0x1C) and (word - 0x18) // 2 < self.channels:
+            self._write_ccmr((word - 0x18) // 4, value)
+        elif word == 0x20:
+            self.ccer = value & 0xBBBB
+        elif word == 0x24:
+            self.counter, self.since = value & self.mask, self.board.now
+        elif word == 0x28:
+            self.prescaler_written = value & 0xFFFF
+        elif word == 0x2C:
+            self.arr_written = value & self.mask
+            if not self.cr1 & ARPE:
+                self.arr = self.arr_written
+        elif 0x34 <= word < 0x34 + 4 * self.channels:
+            self.ccr[(word - 0x34) // 4] = value & self.mask
+        elif word == 0x50 and self.remap:
+            self.option = value & self.remap[1]
+        elif word != 0x08 or value:
+            raise registers.unmodelled(self, offset, "write")
+        self._capture(self.board.now)
+        self._arm()
+
+    def _stored(self, word):
+        """The word that a half-word store is merged into, without the effects of a read."""
+        return {0x24: self.counter, 0x2C: self.arr_written, 0x34: self.ccr[0], 0x38: self.ccr[1], 0x3C: self.ccr[2],
+                0x40: self.ccr[3]}.get(word, 0)
+
+    def _generate(self, value):
+        """UG starts the counter and the prescaler again and takes over the preloaded values (section 18.4.6)."""
+        if value & UIF:
+            self.counter, self.since = 0, self.board.now
+            if not self.cr1 & UDIS:
+                self.prescaler, self.arr = self.prescaler_written, self.arr_written
+                if not self.cr1 & URS:
+                    self.sr |= UIF
+        self.sr |= value & 0x1E
+
+    def _write_ccmr(self, index, value):
+        for half in range(2):
+            setting = value >> 8 * half & 0xFF
+            if not setting & 3 and setting & 8:
+                raise Violation(f"{self.name}: the preload of CCR is not modelled")
+            if setting & 3 and (self.remap is None or self.remap[0] != 2 * index + half or setting & 3 != 1):
+                raise Violation(f"{self.name}: captures of a pin are not modelled")
+        self.ccmr[index] = value & 0xFFFF
+
+
+def _hse_rtc(timer):
+    """TI1_RMP = 10 connects HSE divided by RTCPRE to channel 1 of TIM11 (section 19.5.11)."""
+    return timer.board.rcc.hse_rtc_hz() if timer.option & 3 == 2 else (0, 1)
+
+
+def _lsi(timer):
+    """TI4_RMP = 01 connects the LSI to channel 4 of TIM5 (section 18.4.20)."""
+    rcc = timer.board.rcc
+    return (rcc.lsi_hz, 1) if timer.option >> 6 & 3 == 1 and rcc.csr & 2 else (0, 1)
+
+
+def timers(board):
+    """The timers that are modelled."""
+    return [Timer(board, "TIM2", 0x4000_0000, 28, "TIM_APB1", 32, 4),
+            Timer(board, "TIM3", 0x4000_0400, 29, "TIM_APB1", 16, 4),
+            Timer(board, "TIM4", 0x4000_0800, 30, "TIM_APB1", 16, 4),
+            Timer(board, "TIM5", 0x4000_0C00, 50, "TIM_APB1", 32, 4, (3, 0xC0, _lsi)),
+            Timer(board, "TIM10", 0x4001_4400, 25, "TIM_APB2", 16, 1),
+            Timer(board, "TIM11", 0x4001_4800, 26, "TIM_APB2", 16, 1, (0, 0x3, _hse_rtc))]

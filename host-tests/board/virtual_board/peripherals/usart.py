@@ -1,0 +1,356 @@
+"""USARTs in asynchronous mode (RM0090 section 30) with a line to the outside that has a baud rate of its own.
+
+A byte takes the time that BRR and the peripheral clock give it. The outside sends and listens at `baud`; where the two differ by more
+than 3.5 % the receiver samples wrong bits and reports a framing error, and the outside gets wrong bytes (table 140: receiver tolerance).
+A byte reaches a pin only if one of the port pins of the USART has the alternate function (DS8626 table 9).
+Left out: synchronous, LIN, IrDA, smartcard and half-duplex modes, flow control, multiprocessor mute, the break character, noise.
+Rests on the manual's silence: a frame that had begun before RE was set is lost whole.
+
+Settings: `baud` (of the outside), `outside_stop_bits`. Calls of a test: `inject`, `take_sent`.
+"""
+
+from collections import deque
+
+from ..peripheral import Peripheral
+from ..violation import Violation
+from . import registers
+from .gpio import connected
+
+PS = 1_000_000_000_000
+PE, FE, NF, ORE, IDLE, RXNE, TC, TXE = (1 << bit for bit in range(8))
+ERRORS = PE | FE | NF | ORE | IDLE
+CLEARED_BY_ZERO = RXNE | TC
+SBK, RWU, RE, TE, IDLEIE, RXNEIE, PEIE, PS_ODD, PCE, M, UE, OVER8 = (
+    1 << bit for bit in (0, 1, 2, 3, 4, 5, 8, 9, 10, 12, 13, 15))
+EIE, DMAR, DMAT = 1 << 0, 1 << 6, 1 << 7
+TOLERANCE = 0.035
+STOP_HALVES = (2, 1, 4, 3)
+
+
+class Usart(Peripheral):
+    """One USART or UART with its interrupt, bus clock and candidate pins."""
+
+    def __init__(self, board, name, base, interrupt, bus, function, tx_pins, rx_pins):
+        super().__init__(board)
+        self.name = self.clock = name
+        self.base, self.interrupt, self.bus = base, interrupt, bus
+        self.dma = "DMA1" if bus == "PCLK1" else "DMA2"
+        self.function, self.tx_pins, self.rx_pins = function, tx_pins, rx_pins
+        self.baud = 115_200
+        self.outside_stop_bits = 1
+        self.sent = []
+        self.line = deque()
+        self.line_free = 0
+        self.arrival = self.departure = self.idle_event = None
+        self.lost = 0
+        self.noted = {}
+        self.irq_level = False
+        self._registers()
+
+    def _registers(self):
+        self.sr, self.cr1, self.cr2, self.cr3, self.brr, self.gtpr = TC | TXE, 0, 0, 0, 0, 0
+        self.rdr, self.tdr, self.shift = 0, None, None
+        self.seen, self.seen_tc = 0, False
+        self.preamble_until = 0
+        self.listening_since = None
+        self.last_end, self.idle_armed = 0, False
+        self.bit_ps = self.frame_ps = 0
+
+    def reset(self, cause):
+        for handle in (self.departure, self.idle_event):
+            if handle:
+                handle.cancel()
+        self.departure = self.idle_event = None
+        self._registers()
+        self.irq_level = False
+        self.board.irq(self.interrupt, False)
+        if self.arrival is None and self.line:
+            while self.line and self.line[0][0] < self.board.now:
+                self.line.popleft()
+            self._await()
+
+    def power_off(self):
+        """The board's events are gone with its power; bytes that come meanwhile go past it."""
+        self.arrival = self.departure = self.idle_event = None
+
+    # -- timing ------------------------------------------------------------------------------------------------------
+
+    def clocks_changed(self):
+        """Bit and frame times follow from BRR and the bus clock (section 30.3.4)."""
+        if self.cr1 & OVER8:
+            divider = (self.brr >> 4) * 8 + (self.brr & 7)
+        else:
+            divider = self.brr
+        hz = self.board.rcc.clock_hz(self.bus)
+        self.bit_ps = divider * PS // hz if divider and hz else 0
+        halves = 2 * (1 + (9 if self.cr1 & M else 8)) + STOP_HALVES[self.cr2 >> 12 & 3]
+        self.frame_ps = halves * self.bit_ps // 2
+
+    def _mismatch(self):
+        """The relative difference between the USART's bit time and the outside's."""
+        return self.bit_ps * self.baud / PS - 1
+
+    def _note_mismatch(self, direction, error):
+        """The first byte at each pair of rates is recorded."""
+        if self.noted.get(direction) != error:
+            self.noted[direction] = error
+            self.board.record("baud_mismatch", usart=self.name, direction=direction, error=error)
+
+    # -- transmitter -------------------------------------------------------------------------------------------------
+
+    def _load(self):
+        """The data register's byte moves into the shift register, which sets TXE (section 30.3.2)."""
+        self.shift, self.tdr = self.tdr, None
+        self.sr |= TXE
+        start = max(self.board.now, self.preamble_until)
+        self.departure = self.board.schedule(start + self.frame_ps - self.board.now, self._departed)
+
+    def _departed(self):
+        self.departure = None
+        value = self.shift
+        self.shift = None
+        mismatch = self._mismatch()
+        if connected(self.board, self.tx_pins, self.function):
+            if abs(mismatch) > TOLERANCE:
+                self._note_mismatch("tx", mismatch)
+                value = _sampled(value & 0xFF, PS / self.baud, self.bit_ps)[0]
+            self.sent.append((self.board.now, value & 0xFF))
+        if self.tdr is not None:
+            self._load()
+        else:
+            self.sr |= TC
+        self._interrupt()
+        if self.cr3 & DMAT:
+            self.serve_dma()
+
+    def take_sent(self):
+        """The bytes that left the TX pin since the last call: (end of the stop bit in picoseconds, byte)."""
+        sent, self.sent = self.sent, []
+        return sent
+
+    # -- receiver ----------------------------------------------------------------------------------------------------
+
+    def inject(self, data, at_ps=None):
+        """The outside sends bytes back to back, not before `at_ps` and after all it was given earlier."""
+        start = max(self.line_free, self.board.now if at_ps is None else at_ps)
+        frame = (9 + self.outside_stop_bits) * PS // self.baud
+        for byte in data:
+            self.line.append((start, byte))
+            start += frame
+        self.line_free = start
+        if self.arrival is None:
+            self._await()
+
+    def _await(self):
+        if self.line:
+            start = self.line[0][0]
+            bit = self.bit_ps or PS // self.baud
+            end = start + (10 if self.cr1 & M else 9) * bit + bit // 2
+            self.arrival = self.board.schedule(max(end - self.board.now, 0), self._arrived)
+        else:
+            self.arrival = None
+
+    def _arrived(self):
+        """The receiver samples the middle of the stop bit."""
+        start, byte = self.line.popleft()
+        since = self.listening_since
+        if since is None or since > start or not connected(self.board, self.rx_pins, self.function):
+            self.lost += 1
+        else:
+            self._receive(start, byte)
+        self._await()
+        if self.idle_armed and self.cr1 & IDLEIE:
+            self._watch_idle()
+
+    def _receive(self, start, byte):
+        self._detect_idle(start)
+        value, framing = byte, False
+        mismatch = self._mismatch()
+        if self.cr1 & M or self.cr1 & PCE or abs(mismatch) > 0.02:
+            value, framing = self._sample(byte, mismatch)
+        if self.sr & RXNE:
+            self.sr |= ORE
+            self.board.record("overrun", usart=self.name, byte=byte)
+        else:
+            self.rdr = value
+            self.sr |= RXNE | FE if framing else RXNE
+        self.last_end, self.idle_armed = self.board.now, True
+        self._interrupt()
+        if self.cr3 & DMAR:
+            self.serve_dma()
+
+    def _sample(self, byte, mismatch):
+        if self.cr1 & M and not self.cr1 & PCE:
+            raise Violation(f"{self.name}: nine data bits without parity are not modelled against an outside of eight")
+        value, framing = _sampled(byte, self.bit_ps, PS / self.baud)
+        if abs(mismatch) > TOLERANCE:
+            self._note_mismatch("rx", mismatch)
+            value, framing = (value if value != byte else value ^ 0x80), True
+        if self.cr1 & PCE:
+            self.sr |= PE if value.bit_count() % 2 != bool(self.cr1 & PS_ODD) else 0
+        return value, framing
+
+    def _detect_idle(self, now):
+        """A whole frame of ones after the last byte sets IDLE once (section 30.3.3)."""
+        if self.idle_armed and now >= self.last_end + self.frame_ps:
+            self.idle_armed = False
+            self.sr |= IDLE
+
+    def _watch_idle(self):
+        end = self.last_end + self.frame_ps
+        if self.line and self.line[0][0] < end:
+            return
+        if self.idle_event:
+            self.idle_event.cancel()
+        self.idle_event = self.board.schedule(max(end - self.board.now, 0), self._idle)
+
+    def _idle(self):
+        self.idle_event = None
+        self._detect_idle(self.board.now)
+        self._interrupt()
+
+    # -- registers ---------------------------------------------------------------------------------------------------
+
+    def _interrupt(self):
+        sr, cr1 = self.sr, self.cr1
+        level = bool(sr & cr1 & (TC | TXE | IDLE) or cr1 & RXNEIE and sr & (RXNE | ORE) or cr1 & PEIE and sr & PE
+                     or self.cr3 & EIE and self.cr3 & DMAR and sr & (FE | ORE | NF))
+        if level != self.irq_level:
+            self.irq_level = level
+            self.board.irq(self.interrupt, level)
+
+    def serve_dma(self):
+        """The stream that is wired to this USART moves bytes as long as RXNE or TXE asks for it."""
+        if not self.cr3 & (DMAR | DMAT):
+            return
+        dma = self.board.peripherals[self.dma]
+        if self.cr3 & DMAR and self.sr & RXNE:
+            dma.request(self.name + "_RX")
+        while self.cr3 & DMAT and self.sr & TXE and self.cr1 & TE and dma.request(self.name + "_TX"):
+            pass
+
+    def read(self, offset, size):
+        if size == 1:
+            registers.check(self, offset, size, registers.HALF_WORD)
+        if offset == 0x00:
+            self._detect_idle(self.board.now)
+            self.seen, self.seen_tc = self.sr & ERRORS, True
+            return self.sr
+        if offset == 0x04:
+            self.sr &= ~(RXNE | self.seen)
+            self.seen = 0
+            self._interrupt()
+            return self.rdr
+        if offset == 0x08:
+            return self.brr
+        if offset == 0x0C:
+            return self.cr1
+        if offset == 0x10:
+            return self.cr2
+        if offset == 0x14:
+            return self.cr3
+        if offset == 0x18:
+            return self.gtpr
+        raise registers.unmodelled(self, offset, "read")
+
+    def write(self, offset, value, size):
+        registers.check(self, offset, size, registers.HALF_WORD)
+        if offset == 0x04:
+            self._write_dr(value)
+            return
+        if offset == 0x00:
+            self.sr &= value | ~CLEARED_BY_ZERO
+        elif offset == 0x08:
+            self.brr = value & 0xFFFF
+            self.clocks_changed()
+        elif offset == 0x0C:
+            self._write_cr1(value)
+        elif offset == 0x10:
+            if value & 0x4800:
+                raise Violation(f"{self.name}: LIN and synchronous mode are not modelled")
+            self.cr2 = value & 0x7F6F
+            self.clocks_changed()
+        elif offset == 0x14:
+            self._write_cr3(value)
+        elif offset == 0x18:
+            self.gtpr = value & 0xFFFF
+        else:
+            raise registers.unmodelled(self, offset, "write")
+        self._interrupt()
+
+    def _write_dr(self, value):
+        if not self.cr1 & UE or not self.cr1 & TE:
+            self.board.record("ignored_write", register=self.name + "_DR", value=value)
+            return
+        if not self.frame_ps:
+            raise Violation(f"{self.name}: a byte is sent with BRR = 0")
+        if self.seen_tc:
+            self.sr &= ~TC
+            self.seen_tc = False
+        if self.tdr is not None:
+            self.board.record("transmit_overwritten", usart=self.name, byte=self.tdr)
+        self.tdr = value & 0x1FF
+        self.sr &= ~TXE
+        if self.shift is None:
+            if self.board.now >= self.preamble_until:
+                self._load()
+            else:
+                self.board.schedule(self.preamble_until - self.board.now, self._preamble_over)
+        self._interrupt()
+
+    def _preamble_over(self):
+        if self.tdr is not None and self.shift is None and self.board.now >= self.preamble_until:
+            self._load()
+            self._interrupt()
+
+    def _write_cr1(self, value):
+        if value & (SBK | RWU):
+            raise Violation(f"{self.name}: break and mute are not modelled")
+        old, self.cr1 = self.cr1, value & 0xBFFF
+        self.clocks_changed()
+        if value & UE and value & TE and not (old & UE and old & TE):
+            self.preamble_until = self.board.now + self.frame_ps
+        listening = value & UE and value & RE
+        if not listening:
+            self.listening_since = None
+        elif self.listening_since is None:
+            self.listening_since = self.board.now
+        if self.idle_armed and value & IDLEIE and not old & IDLEIE:
+            self._watch_idle()
+
+    def _write_cr3(self, value):
+        if value & 0x33E:
+            raise Violation(f"{self.name}: IrDA, smartcard, half-duplex and flow control are not modelled")
+        self.cr3 = value & 0xCC1
+        self.serve_dma()
+
+    def configure(self, key, value):
+        if key in ("baud", "outside_stop_bits"):
+            setattr(self, key, value)
+        else:
+            super().configure(key, value)
+
+
+def _sampled(byte, sampler_bit_ps, sender_bit_ps):
+    """The byte and the framing error that a receiver sees which samples the middle of its own bits."""
+    levels = [0, *(byte >> bit & 1 for bit in range(8)), 1]
+    value, stop = 0, 1
+    for bit in range(1, 10):
+        index = int((bit + 0.5) * sampler_bit_ps / sender_bit_ps)
+        level = levels[index] if index < len(levels) else 1
+        if bit == 9:
+            stop = level
+        else:
+            value |= level << (bit - 1)
+    return value, not stop
+
+
+def usarts(board):
+    """The six USARTs and UARTs of the STM32F405 with their candidate pins."""
+    table = (("USART1", 0x4001_1000, 37, "PCLK2", 7, (("A", 9), ("B", 6)), (("A", 10), ("B", 7))),
+             ("USART2", 0x4000_4400, 38, "PCLK1", 7, (("A", 2), ("D", 5)), (("A", 3), ("D", 6))),
+             ("USART3", 0x4000_4800, 39, "PCLK1", 7, (("B", 10), ("C", 10), ("D", 8)), (("B", 11), ("C", 11), ("D", 9))),
+             ("UART4", 0x4000_4C00, 52, "PCLK1", 8, (("A", 0), ("C", 10)), (("A", 1), ("C", 11))),
+             ("UART5", 0x4000_5000, 53, "PCLK1", 8, (("C", 12),), (("D", 2),)),
+             ("USART6", 0x4001_1400, 71, "PCLK2", 8, (("C", 6), ("G", 14)), (("C", 7), ("G", 9))))
+    return [Usart(board, *row) for row in table]

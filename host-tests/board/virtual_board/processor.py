@@ -1,0 +1,340 @@
+"""The instruction set: a Cortex-M4 core of `unicorn` without interrupts, run in slices of a known number of instructions.
+
+Unicorn executes Thumb code and knows the special registers and both stack pointers. It has no NVIC, takes no exception
+and keeps no time; `Exceptions` and `Board` add these. What is used of it here was found in its 2.1.4 sources:
+
+- An instruction count is kept by a call per instruction, which also sets the program counter. The count and its limit lie
+  side by side in unicorn's own structure. Their place is found at the start with known counts. Reading the count gives
+  the time of a register access to one instruction; lowering the limit ends the slice after the current instruction.
+  (`uc_emu_stop` in a register access would execute the instruction twice.)
+- With its virtual TLB unicorn asks for the permissions of each page once. An access that they refuse stops precisely at
+  the instruction; one that unicorn's own map refuses would go on with a wrong value. RAM is handed out without execution
+  until it is executed, since stores to a page that holds code take a slow path.
+- WFI ends the slice before the limit, without an error.
+"""
+
+import ctypes
+import struct
+import traceback
+
+import unicorn
+from unicorn import arm_const, unicorn_const as const
+from unicorn.unicorn_py3.unicorn import uclib
+
+from . import memory as map_
+from .registers import Batch
+from .violation import Violation
+
+PERIPHERALS = 0x4000_0000
+PERIPHERALS_SIZE = 0x2000_0000
+PRIVATE = 0xE000_0000
+PRIVATE_SIZE = 0x10_0000
+
+#: Bytes of a page of the virtual TLB, at most.
+PAGE = 4096
+#: Bytes of unicorn's structure that are looked at. It ends with jump buffers of more than 10,000 bytes.
+STRUCTURE = 6_000
+
+#: The bits of xPSR that hold the state of an IT block (DDI0403 B1.4.2).
+IT_STATE = 0x0600_FC00
+
+#: Reasons for the end of a slice.
+COUNT, SLEEP, FAULT, UNDEFINED, STATE = range(5)
+
+READ = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_void_p)
+WRITE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64, ctypes.c_void_p)
+INTERRUPT = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p)
+INVALID = ctypes.CFUNCTYPE(
+    ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_uint64, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p
+)
+
+
+class TlbEntry(ctypes.Structure):
+    """Unicorn's `uc_tlb_entry`."""
+
+    _fields_ = [("address", ctypes.c_uint64), ("permissions", ctypes.c_int)]
+
+
+TLB = ctypes.CFUNCTYPE(
+    ctypes.c_bool, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_int, ctypes.POINTER(TlbEntry), ctypes.c_void_p
+)
+BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_void_p)
+
+
+def pointer(callback) -> ctypes.c_void_p:
+    """Returns a callback as `unicorn`'s prototypes want it. The callback itself must be kept."""
+    return ctypes.cast(callback, ctypes.c_void_p)
+
+
+#: The registers of a program, in the order in which they are shown.
+GENERAL = "r0 r1 r2 r3 r4 r5 r6 r7 r8 r9 r10 r11 r12 sp lr xpsr"
+
+
+class Processor:
+    """Executes instructions, and hands register accesses, faults and exception returns to the board."""
+
+    def __init__(self, board):
+        self.board = board
+        self.uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
+        self.uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
+        self.handle = self.uc._uch
+        self._start = uclib.uc_emu_start
+        self._callbacks: list = []
+        self._find_fields()
+        self._map(board.memory)
+        self._hook(const.UC_HOOK_INTR, INTERRUPT(self._on_interrupt))
+        self._hook(const.UC_HOOK_TLB_FILL, TLB(self._on_tlb))
+        flash_end = map_.FLASH + map_.FLASH_SIZE - 1
+        self._hook(const.UC_HOOK_MEM_WRITE_PROT, INVALID(self._on_flash_write), map_.FLASH, flash_end)
+        self.uc.ctl_set_tlb_mode(const.UC_TLB_VIRTUAL)
+        self.general = Batch(self.handle, GENERAL)
+        self.pc = Batch(self.handle, "pc")
+        self.masks = Batch(self.handle, "primask basepri faultmask xpsr")
+        #: The kind of the access that was refused in this slice; its address is in `refused`.
+        self.fault: int | None = None
+        #: The program counter, where an exception has just been entered and unicorn need not be asked.
+        self.start_at: int | None = None
+        self._singles: dict[str, Batch] = {}
+        self._block_hook = None
+        self._block_callback = BLOCK(self._on_block)
+        #: A block with FPU instructions was reached while the FPU is off.
+        self.fpu_ahead = False
+        self._stale_code: list[tuple[int, int]] = []
+        #: Pages of SRAM that were executed.
+        self._code_pages: set[int] = set()
+        self._fpu_blocks: dict[tuple[int, int], bool] = {}
+        board.memory.on_code_change = self._on_code_change
+
+    def _find_fields(self) -> None:
+        """Finds the instruction count and its limit, and the address of the last refused access, in unicorn's structure."""
+        scratch = 0x1000
+        # 0x7FE times NOP, a branch to itself; at the end LDR r0, [r1].
+        self.uc.mem_map(scratch, 0x2000)
+        self.uc.mem_write(scratch, b"\x00\xbf" * 0x7FF + b"\xfe\xe7" + b"\x08\x68")
+
+        def count(limit: int) -> bytes:
+            self.uc.emu_start(scratch | 1, 0, count=limit)
+            return struct.pack("<QQ", limit + 1, limit)
+
+        def refused(address: int) -> bytes:
+            self.uc.reg_write(arm_const.UC_ARM_REG_R1, address)
+            try:
+                self.uc.emu_start(scratch + 0x1000 | 1, 0, count=1)
+            except unicorn.UcError:
+                pass
+            return struct.pack("<Q", address)
+
+        at = self._find_field(count, (54_321, 7_919, 31_337))
+        self.executed = ctypes.c_uint64.from_address(at)
+        self.limit = ctypes.c_uint64.from_address(at + 8)
+        self.refused = ctypes.c_uint64.from_address(self._find_field(refused, (0x1234_5678, 0x2345_6788, 0x3456_789C)))
+        self.executed.value = 0
+        self.uc.mem_unmap(scratch, 0x2000)
+
+    def _find_field(self, provoke, values) -> int:
+        places = None
+        for value in values:
+            wanted = provoke(value)
+            content = ctypes.string_at(self.handle, STRUCTURE)
+            found = {at for at in range(0, len(content) - 16, 8) if content.startswith(wanted, at)}
+            places = found if places is None else places & found
+        if len(places) != 1:
+            raise RuntimeError(f"unicorn {unicorn.__version__}: {provoke.__name__} was found at {len(places)} places")
+        return self.handle.value + places.pop()
+
+    def _map(self, memory) -> None:
+        every, fixed = const.UC_PROT_ALL, const.UC_PROT_READ | const.UC_PROT_EXEC
+        for base, region, access in (
+            (0, memory.flash, fixed),
+            (map_.FLASH, memory.flash, fixed),
+            (map_.SRAM, memory.sram, every),
+            (map_.CCM, memory.ccm, every),
+            (map_.SYSTEM, memory.system, fixed),
+        ):
+            self.uc.mem_map_ptr(base, region.size, every, ctypes.addressof(region.buffer))
+            # Only a change of the protection makes unicorn discard writes to memory that it was given.
+            self.uc.mem_protect(base, region.size, access)
+        for base, size in ((PERIPHERALS, PERIPHERALS_SIZE), (PRIVATE, PRIVATE_SIZE)):
+            read, write = READ(self._reader(base)), WRITE(self._writer(base))
+            self._callbacks += [read, write]
+            code = uclib.uc_mmio_map(self.handle, base, size, pointer(read), None, pointer(write), None)
+            if code:
+                raise unicorn.UcError(code)
+
+    def _hook(self, kind: int, callback, begin: int = 1, end: int = 0) -> ctypes.c_size_t:
+        self._callbacks.append(callback)
+        hook = ctypes.c_size_t()
+        code = uclib.uc_hook_add(self.handle, ctypes.byref(hook), kind, pointer(callback), None, begin, end)
+        if code:
+            raise unicorn.UcError(code)
+        return hook
+
+    def _reader(self, base: int):
+        def read(_, offset, size, __, call=self.board.bus.read):
+            try:
+                return call(base + offset, size) or 0
+            except BaseException as error:
+                return self._failed(error)
+
+        return read
+
+    def _writer(self, base: int):
+        def write(_, offset, size, value, __, call=self.board.bus.write):
+            try:
+                call(base + offset, value, size)
+            except BaseException as error:
+                self._failed(error)
+
+        return write
+
+    def _guard(self, call, *arguments) -> None:
+        """Calls the model from a callback."""
+        try:
+            call(*arguments)
+        except BaseException as error:
+            self._failed(error)
+
+    def _failed(self, error: BaseException) -> int:
+        """Ends the slice after an error in a callback, which cannot cross unicorn's frames."""
+        if not isinstance(error, Violation):
+            error = Violation("the model failed: " + traceback.format_exc())
+        self.board.violate(error)
+        return 0
+
+    def _on_interrupt(self, _, number, __) -> None:
+        self._guard(self.board.exceptions.processor_event, number)
+
+    def _on_tlb(self, _, address, kind, entry, __) -> bool:
+        permissions = self._permissions(address, kind)
+        if permissions is None:
+            self.fault = kind
+            return False
+        if kind != const.UC_MEM_FETCH:
+            self._forget_condition()
+        entry[0].address = address
+        entry[0].permissions = permissions
+        return True
+
+    def _forget_condition(self) -> None:
+        """Clears the state of an IT block. Unicorn writes it when it fills its TLB, or asks for a write to protected memory,
+        within a block, and never clears it: the instructions behind the block would be conditional, too."""
+        xpsr = self.get("xpsr")
+        if xpsr & IT_STATE:
+            self.set("all_xpsr", xpsr & ~IT_STATE)
+
+    def _permissions(self, address: int, kind: int) -> int | None:
+        """Returns what a page allows, or `None` when it refuses this access."""
+        read, write, execute = const.UC_PROT_READ, const.UC_PROT_WRITE, const.UC_PROT_EXEC
+        if map_.SRAM <= address < map_.SRAM + map_.SRAM_SIZE:
+            if kind != const.UC_MEM_FETCH:
+                return read | write
+            self._code_pages.add(address)
+            return read | write | execute
+        if map_.FLASH <= address < map_.FLASH + map_.FLASH_SIZE:
+            return read | write | execute  # A write goes to the flash controller.
+        if PERIPHERALS <= address < PERIPHERALS + PERIPHERALS_SIZE or PRIVATE <= address < PRIVATE + PRIVATE_SIZE:
+            allowed = read | write
+        elif address < map_.FLASH_SIZE:
+            allowed = read | execute
+        elif map_.CCM <= address < map_.CCM + map_.CCM_SIZE:
+            allowed = read | write
+        elif map_.SYSTEM <= address < map_.SYSTEM + map_.SYSTEM_SIZE:
+            allowed = read
+        else:
+            return None
+        needed = {const.UC_MEM_READ: read, const.UC_MEM_WRITE: write, const.UC_MEM_FETCH: execute}[kind]
+        return allowed if allowed & needed else None
+
+    def _on_flash_write(self, _, kind, address, size, value, __) -> bool:
+        self._forget_condition()
+        self._guard(self.board.bus.write_memory, address, value & (1 << 8 * size) - 1, size)
+        return True
+
+    def _on_code_change(self, address: int, size: int) -> None:
+        if address < map_.SRAM or any(address < page + PAGE and page < address + size for page in self._code_pages):
+            self._stale_code.append((address, size))
+
+    def forget_code(self) -> None:
+        """Drops all translated code."""
+        self.uc.ctl_flush_tb()
+        self._stale_code.clear()
+
+    def _on_block(self, _, address, size, __) -> None:
+        block = address, size
+        found = self._fpu_blocks.get(block)
+        if found is None:
+            found = self._fpu_blocks[block] = self.board.scb.block_has_fpu_instruction(address, size)
+        if found and not self.fpu_ahead:
+            self.fpu_ahead = True
+            self.end_slice()
+
+    def watch_blocks(self, on: bool) -> None:
+        """Reports each block of instructions before it runs. Needed only while the FPU is off."""
+        if on == (self._block_hook is not None):
+            return
+        if on:
+            self._block_hook = self._hook(const.UC_HOOK_BLOCK, self._block_callback)
+        else:
+            uclib.uc_hook_del(self.handle, self._block_hook)
+            self._block_hook = None
+        self.fpu_ahead = False
+        self._fpu_blocks.clear()
+        self.uc.ctl_flush_tb()
+
+    def end_slice(self) -> None:
+        """Ends the slice after the current instruction."""
+        if self.limit.value > self.executed.value:
+            self.limit.value = self.executed.value
+
+    def shorten(self, instructions: int) -> None:
+        """Lets at most so many more instructions run in this slice."""
+        end = self.executed.value + max(instructions, 0)
+        if self.limit.value > end:
+            self.limit.value = end
+
+    def run(self, count: int) -> int:
+        """Runs a slice and returns why it ended. `executed` then holds the instructions, corrected for the last one."""
+        if self._stale_code:
+            for address, size in self._stale_code:
+                self.uc.ctl_remove_cache(address, address + size)
+            self._stale_code.clear()
+        self.fault = None
+        start = self.pc.read()[0] if self.start_at is None else self.start_at
+        code = self._start(self.handle, start | 1, 0, 0, count)
+        self.start_at = None
+        executed, limit = self.executed.value, self.limit.value
+        if executed > limit:
+            self.executed.value = executed - 1
+        if self.fault is not None:
+            return FAULT
+        if code == const.UC_ERR_OK:
+            return COUNT if executed > limit else SLEEP
+        if code in (const.UC_ERR_INSN_INVALID, const.UC_ERR_EXCEPTION):
+            return UNDEFINED if self.general.read()[15] & 1 << 24 else STATE
+        raise Violation(f"unicorn stopped with {unicorn.UcError(code)}")
+
+    def get(self, name: str) -> int:
+        """Reads one register."""
+        return self._single(name).read()[0]
+
+    def set(self, name: str, value: int) -> None:
+        """Writes one register."""
+        self.start_at = None
+        self._single(name).write(value)
+
+    def _single(self, name: str) -> Batch:
+        if name not in self._singles:
+            self._singles[name] = Batch(self.handle, name)
+        return self._singles[name]
+
+    def reset(self, sp: int, pc: int) -> None:
+        """Sets the registers as after a reset (DDI0403 B1.5.5). The general registers are left alone."""
+        for name in ("primask", "basepri", "faultmask", "fpscr"):
+            self.set(name, 0)
+        # Thread mode and the main stack pointer come first, so that `sp` is the main one.
+        self.set("all_xpsr", 1 << 24)
+        self.set("control", 0)
+        self.set("apsr_nzcv", 0)
+        self.set("sp", sp & ~3)
+        self.set("lr", 0xFFFF_FFFF)
+        self.set("pc", pc)

@@ -1,0 +1,103 @@
+"""SysTick (DDI0403 B3.3): a 24-bit counter that is never stepped, only worked out from the board time.
+
+The counter takes the value RELOAD one clock after it stood at 0, so that a period is RELOAD + 1 clocks. It sets COUNTFLAG
+and, with TICKINT, makes the exception pending when it goes from 1 to 0. CALIB on the STM32F405 is fixed at 18750, which is
+1 ms at HCLK/8 with 150 MHz (PM0214 section 4.5.4 and RM0090 section 12.1.3).
+"""
+
+from .nvic import SYSTICK
+from .violation import Violation
+
+ENABLE, TICKINT, CLKSOURCE, COUNTFLAG = 1, 2, 4, 1 << 16
+CALIBRATION = 0x4000_0000 | 18_750
+
+
+class SysTick:
+    """The counter. `start` is the board time at which it stood at `value`."""
+
+    base, size = 0xE000E010, 0x10
+
+    def __init__(self, board):
+        self.board = board
+        self.event = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Stops the counter."""
+        self.control = 0
+        self.reload = 0
+        self.value = 0
+        self.start = 0
+        self.period_ps = 1
+        self.flag = False
+        self._cancel()
+
+    def _cancel(self) -> None:
+        if self.event:
+            self.event.cancel()
+        self.event = None
+
+    def hold(self) -> None:
+        """Stores the counter's value, so that a change of the clock counts from here."""
+        if self.control & ENABLE:
+            self.value = self.current()
+        self.start = self.board.now
+        rcc = self.board.rcc
+        #: The duration of one clock, in picoseconds. It holds until the next call.
+        self.period_ps = round(1e12 / (rcc.core_hz if self.control & CLKSOURCE else rcc.systick_external_hz))
+
+    def current(self) -> int:
+        """Returns the counter's value now."""
+        if not self.control & ENABLE:
+            return self.value
+        clocks = (self.board.now - self.start) // self.period_ps
+        if clocks <= self.value:
+            return self.value - clocks
+        if not self.reload:
+            return 0
+        return (self.reload - (clocks - self.value - 1)) % (self.reload + 1)
+
+    def plan(self) -> None:
+        """Schedules the next step to 0."""
+        self._cancel()
+        if self.control & ENABLE and (self.value or self.reload):
+            clocks = self.value or self.reload + 1
+            due = self.start + clocks * self.period_ps
+            self.event = self.board.schedule(due - self.board.now, self._reached_zero)
+
+    def _reached_zero(self) -> None:
+        self.start += (self.value or self.reload + 1) * self.period_ps
+        self.value = 0
+        self.flag = True
+        if self.control & TICKINT:
+            self.board.nvic.pend(SYSTICK)
+        self.plan()
+
+    def read(self, offset: int, size: int) -> int:
+        """Reads CSR (which clears COUNTFLAG), RVR, CVR or CALIB."""
+        if size != 4:
+            raise Violation(f"SysTick: {size}-byte read")
+        if offset == 0:
+            value = self.control | (COUNTFLAG if self.flag else 0)
+            self.flag = False
+            return value
+        if offset == 4:
+            return self.reload
+        if offset == 8:
+            return self.current()
+        return CALIBRATION
+
+    def write(self, offset: int, value: int, size: int) -> None:
+        """Writes CSR, RVR, or CVR, where any value clears the counter and COUNTFLAG."""
+        if size != 4:
+            raise Violation(f"SysTick: {size}-byte write")
+        self.hold()
+        if offset == 0:
+            self.control = value & 7
+            self.hold()
+        elif offset == 4:
+            self.reload = value & 0xFF_FFFF
+        elif offset == 8:
+            self.value = 0
+            self.flag = False
+        self.plan()
