@@ -10,15 +10,16 @@
 //! That is for one stream that comes at 100 Hz by itself, by the part's own clock. Streams of
 //! other rates, and two or more parts with a clock each, go through [`streams`] first: it takes
 //! the parts' clocks to the board's ([`clock`]), interpolates ([`resample`]) and sums
-//! ([`increments`]), and its samples lie on the grid.
+//! ([`increments`]), and its samples lie on the grid. How fast a single stream's clock runs, against
+//! the board's, [`clock_ratio`] finds out.
 
 pub mod clock;
+pub mod clock_ratio;
 pub mod increments;
 pub mod resample;
 pub mod streams;
 
 use crate::sample::{Frame, ImuSample, PERIOD_US};
-use crate::seal::seal;
 use crate::units::Micros;
 
 /// How far from its grid step a sample may be, microseconds.
@@ -84,10 +85,9 @@ impl core::error::Error for AlignError {}
 /// The last sample that has a place on the grid, or that the grid was laid anew from.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
-    time: Micros,
     tick: u32,
-    /// Of the whole sample: that of a clock which was set back may carry the same time.
-    seal: u32,
+    /// The whole sample: another one of a clock that was set back may carry the same time.
+    sample: ImuSample,
 }
 
 /// Puts samples on the 100 Hz grid by their own time stamps; holds where the grid stands.
@@ -103,34 +103,34 @@ impl Aligner {
     /// [`AlignError`]; the sample is not used. After [`AlignError::Jump`] the grid continues
     /// from that sample's time stamp, at the following tick.
     pub fn process(&mut self, sample: ImuSample) -> Result<Frame, AlignError> {
-        let (at, seal) = (sample.time, seal(&sample));
+        let at = sample.time;
         let Some(placed) = &mut self.last else {
-            self.last = Some(Placed { time: at, tick: 0, seal });
+            self.last = Some(Placed { tick: 0, sample });
             return Ok(Frame { tick: 0, missing: 0, sample });
         };
-        let last = placed.time;
+        let last = placed.sample.time;
         let elapsed = at.0.abs_diff(last.0);
         if at < last {
             if elapsed > u64::from(MAX_GAP) * PERIOD_US {
-                (placed.time, placed.seal) = (at, seal);
+                placed.sample = sample;
                 return Err(AlignError::Jump { last, at });
             }
             return Err(AlignError::Backwards { last, at });
         }
         if elapsed >= (u64::from(MAX_GAP) + 1) * PERIOD_US + PERIOD_US / 2 {
-            (placed.time, placed.seal) = (at, seal);
+            placed.sample = sample;
             return Err(AlignError::Jump { last, at });
         }
         let steps = (elapsed + PERIOD_US / 2) / PERIOD_US;
         if steps == 0 || elapsed.abs_diff(steps * PERIOD_US) > TOLERANCE_US {
-            return Err(if elapsed == 0 && seal == placed.seal {
+            return Err(if sample == placed.sample {
                 AlignError::Duplicate { at }
             } else {
                 AlignError::OffGrid { last, at }
             });
         }
         let tick = placed.tick.wrapping_add(steps as u32);
-        *placed = Placed { time: at, tick, seal };
+        *placed = Placed { tick, sample };
         Ok(Frame { tick, missing: steps as u32 - 1, sample })
     }
 }

@@ -19,14 +19,16 @@
 //! Taking differences of overlapping windows instead (what the newest window has and the one
 //! before it had not) makes 60 interleaved sums of single estimates, each with its own error.
 
-pub mod lane;
+mod pipeline;
 mod rate;
+pub mod seconds;
 
+pub use pipeline::{FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
 pub use rate::{IncrementRate, PseudoFog};
 
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
-use crate::seconds::{FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow};
 use crate::units::Angle;
+use seconds::{FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow};
 
 /// Frames that a window's correction is spread over.
 const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;
@@ -107,10 +109,10 @@ impl FogCorrector {
         }
     }
 
-    /// Takes one frame.
+    /// Takes one frame of 10 ms and corrects its turn.
     #[inline(never)]
-    pub fn process(&mut self, frame: &FogFrame) -> FogOutput {
-        let correction = frame.turn.map_or(Angle::ZERO, |turn| self.correction(turn));
+    pub fn correct(&mut self, frame: &FogFrame) -> FogOutput {
+        let correction = frame.turn.map_or(Angle::ZERO, |turn| self.correction_of(turn));
         let mut output = FogOutput {
             turn: frame.turn.map(|turn| Angle(turn.0.saturating_sub(correction.0))),
             correction,
@@ -146,12 +148,14 @@ impl FogCorrector {
     }
 
     /// Takes the estimate of a window that [`FogOutput::due`] announced. It is used when the next
-    /// second is over; one that comes later than that is not used.
-    pub fn deliver(&mut self, number: u32, estimate: FogEstimate) {
-        if let Some((due, slot @ None)) = &mut self.out
-            && *due == number
-        {
-            *slot = Some(estimate);
+    /// second is over. Returns false for one that comes later or belongs to no window: it is not used.
+    pub fn deliver(&mut self, number: u32, estimate: FogEstimate) -> bool {
+        match &mut self.out {
+            Some((due, slot @ None)) if *due == number => {
+                *slot = Some(estimate);
+                true
+            }
+            _ => false,
         }
     }
 
@@ -164,7 +168,7 @@ impl FogCorrector {
     }
 
     /// What to take off one frame's increment.
-    fn correction(&mut self, turn: Angle) -> Angle {
+    fn correction_of(&mut self, turn: Angle) -> Angle {
         let Some(FogEstimate { correction, linear, gain, .. }) = self.estimate else { return Angle::ZERO };
         let linear_part = self.linear_rest + i128::from(turn.0) * i128::from(gain);
         self.linear_rest = linear_part & ((1 << GAIN_FRACTION_BITS) - 1);

@@ -1,5 +1,6 @@
 //! What the board thinks of itself: status, source and one counter for each kind of event.
 
+use crate::sample::Validity;
 use serde::{Deserialize, Serialize};
 
 #[cfg(target_has_atomic = "8")]
@@ -16,9 +17,9 @@ pub mod supervisor;
 /// | init | `Init` | start; the clock jumped before the bias was known | raw gyro, marked initialising | 3 s at rest | `moving` |
 /// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is believed | `missing`, `late`, `implausible` |
 /// | ready | `Ready` | a believable window covers the recent samples | gyro less bias and correction | as above | `windows` |
-/// | fault | `Clipped` | the part says that it is saturated | none, `CLIPPED` | 50 ms after the last such sample | `clipped`, `held` |
-/// | fault | `Clipped` | a reading that no vehicle can have ([`crate::guard`]) | none, `IMPLAUSIBLE` | a reading near the last good one, or the fourth in a row | `wrong` |
-/// | fault | `Stuck` | samples equal to the one before, as [`crate::guard`] counts them | none, `STUCK` | a sample that differs | `stuck` |
+/// | fault | `Clipped` | the part says that it is saturated | none, `CLIPPED` | 50 ms after the last such sample | `invalid`, `held` |
+/// | fault | `Clipped` | a reading that no vehicle can have ([`crate::monitor`]) | none, `IMPLAUSIBLE` | a reading near the last good one, or the fourth in a row | `wrong` |
+/// | fault | `Stuck` | samples equal to the one before, as [`crate::monitor`] counts them | none, `STUCK` | a sample that differs | `stuck` |
 /// | fault | `Silent` | 29 ms without a sample, by the board's clock; 2 s after the start without the first | none, every 10 ms, `GAP` | the next sample | `silences` |
 ///
 /// From a fault it goes back to init where no bias is known, else to degraded.
@@ -99,8 +100,8 @@ impl Faults {
     pub const CLIPPED: Self = Self(1 << 1);
     /// The part's readings stand still.
     pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate is not believed, a reading of the part is not, or the rates owe more
-    /// than a window's revision.
+    /// The network's estimate is not believed, a reading of the part or its clock is not, or the rates
+    /// owe more than a window's revision.
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
@@ -111,10 +112,27 @@ impl Faults {
     /// Frames were dropped because the bus did not take them, or came and found no room.
     pub const BUS: Self = Self(1 << 7);
 
-    /// These less others.
+    /// Returns the fault that a reading of this validity stands for.
     #[must_use]
-    pub const fn without(self, other: Self) -> Self {
-        Self(self.0 & !other.0)
+    pub const fn of(validity: Validity) -> Self {
+        match validity {
+            Validity::Good => Self::NONE,
+            Validity::Saturated | Validity::Recovering => Self::CLIPPED,
+            Validity::Stuck => Self::STUCK,
+            Validity::Implausible => Self::IMPLAUSIBLE,
+        }
+    }
+
+    /// Returns this fault if it is present, else none.
+    #[must_use]
+    pub const fn when(self, present: bool) -> Self {
+        if present { self } else { Self::NONE }
+    }
+
+    /// Whether all of `other` is in this one.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
     }
 
     /// Both together.
@@ -124,7 +142,39 @@ impl Faults {
     }
 }
 
-/// Source and quality that a status stands for.
+/// What the board reports beside the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BoardFaults {
+    /// Frames were lost on the bus, or the controller is off it.
+    pub bus: bool,
+    /// The clock of the inertial sensor is too far off the board's.
+    pub clock: bool,
+    /// Weights, configuration or calibration are damaged.
+    pub stored: bool,
+    /// The configuration of this vehicle is lost: the built-in one stands in for it, so no rate is
+    /// better than degraded.
+    pub configuration_lost: bool,
+}
+
+impl BoardFaults {
+    /// The bits that are sent.
+    #[must_use]
+    pub const fn faults(self) -> Faults {
+        Faults::BUS
+            .when(self.bus)
+            .with(Faults::STORED.when(self.stored))
+            .with(Faults::IMPLAUSIBLE.when(self.clock))
+    }
+
+    /// Caps a quality at degraded where the configuration is lost.
+    #[must_use]
+    pub const fn cap_quality(self, quality: Quality) -> Quality {
+        if self.configuration_lost && matches!(quality, Quality::Good) { Quality::Degraded } else { quality }
+    }
+}
+
+/// Returns the source and the quality that a status stands for.
 #[must_use]
 pub const fn judge(status: Status) -> (Source, Quality) {
     match status {
@@ -147,15 +197,15 @@ pub struct Counters {
     pub misplaced: u32,
     /// The clock jumped by more than a second.
     pub clock_jumps: u32,
-    /// Samples that the part marked as clipped.
-    pub clipped: u32,
+    /// Samples that could not be used: saturated, recovering, stuck or implausible.
+    pub invalid: u32,
     /// Static initialisations refused because the vehicle moved.
     pub moving: u32,
     /// Windows that the network has run.
     pub windows: u32,
     /// Network inputs clamped to its range.
     pub clamped_inputs: u32,
-    /// Windows not believed, and bias, levelling and rates that wait whose memory has changed.
+    /// Windows not believed.
     pub implausible: u32,
     /// Windows whose estimate came too late or not at all.
     pub late: u32,
@@ -165,7 +215,7 @@ pub struct Counters {
     pub contradicted: u32,
 }
 
-/// How often the sensor was found at fault ([`crate::guard`]).
+/// How often the sensor was found at fault ([`crate::monitor`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WatchCounters {
@@ -175,9 +225,32 @@ pub struct WatchCounters {
     pub stuck: u32,
     /// Samples not trusted because it had just been saturated.
     pub held: u32,
-    /// Readings further from the last one than a vehicle goes in 10 ms, and steps of the
-    /// accumulated yaw that are not its rate.
+    /// Readings further from the last one than a vehicle goes in 10 ms.
     pub wrong: u32,
+    /// Times that its clock was found too far off the board's ([`crate::align::clock_ratio`]).
+    pub clock_off: u32,
+}
+
+/// The numbers of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct InputCounters {
+    /// Messages of the inertial sensor that were no sample.
+    pub imu_errors: u32,
+    /// Messages of the fibre-optic gyro that were no sample.
+    pub fog_errors: u32,
+    /// Wheel frames that were damaged, or said that a speed is not valid.
+    pub wheel_errors: u32,
+    /// Inputs with a time before the newest one.
+    pub clock_back: u32,
+    /// Estimates that no window waited for.
+    pub unclaimed_estimates: u32,
+    /// Windows that nobody had taken when the next one was due.
+    pub replaced_windows: u32,
+    /// Frames that nobody had taken when their place was needed.
+    pub replaced_frames: u32,
+    /// Messages that reported "failed" because a value does not fit its signal.
+    pub out_of_range: u32,
 }
 
 /// Adds to a counter without wrapping.

@@ -5,27 +5,29 @@
 //! are bytes in flash that are checked once, state is a value that the caller owns. What runs here
 //! gives the same bits on a Cortex-M and on a desk; the README of the repository has the numbers.
 //!
-//! | on the way | module | what |
+//! | stage | module | what it does |
 //! |---|---|---|
+//! | the product | [`coprocessor`] | [`Coprocessor`]: samples, CAN frames and time in; frames, windows, observations out |
 //! | bytes to samples | [`sensor`] | Xsens MTi, KVH DSP-1760 and DSP-3000, ICM-42688, ADIS16465 |
-//! | samples | [`sample`], [`units`] | fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds |
+//! | samples | [`sample`], [`units`] | fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds; the validity of each |
+//! | the sensor watched | [`monitor`] | silence, saturation, stuck and implausible readings |
 //! | one clock | [`align`] | the 100 Hz grid; gaps, duplicates, jumps |
 //! | the sensor in the car | [`mounting`], [`bias`] | rotation, levelling, static bias, zero-rate updates |
-//! | network | [`window`], [`nn`], [`model`] | ten samples in, the gyro's error out |
-//! | estimates to rates | [`compensate`], [`uncertainty`] | overlap, lag, carry; the expected error |
-//! | all of that | [`pipeline`], [`guard`] | sample in, [`vehicle::VehicleSample`] out; the watch over the sensor |
+//! | networks | [`window`], [`nn`], [`model`] | ten samples in, the gyro's error out |
+//! | rates | [`compensate`], [`uncertainty`], [`estimate`] | overlap, lag, carry; the expected error |
+//! | the order of these | [`pipeline`] | a sample in, [`estimate::VehicleSample`] out |
+//! | a fibre-optic gyro | [`fog`] | FoGNet: a minute in, a corrected turn out |
 //! | the bus | [`can`], [`wheels`] | Bosch MM5.10, own messages, J1939, E2E, SLCAN; wheel speeds in |
-//! | a fibre-optic gyro | [`seconds`], [`fog`] | FoGNet: a minute in, a corrected turn out |
-//! | where it goes | [`odometry`] | dead reckoning with wheel speeds |
-//! | a product | [`health`], [`store`], [`service`] | states and counters, flash records, the service line |
+//! | the way driven | [`odometry`] | dead reckoning with wheel speeds |
+//! | around it | [`health`], [`store`], [`service`] | states and counters, flash records, the service line |
 //!
 //! # On a board of your own
 //!
-//! Everything but the board itself (`src/examples/own_board.rs`); `src/examples/cortex_m.rs` is the
+//! Everything but the board itself (`examples/own_board.rs`); `examples/cortex_m.rs` is the
 //! same as an image for a Cortex-M.
 //!
 //! ```
-#![doc = include_str!("examples/own_board.rs")]
+#![doc = include_str!("../examples/own_board.rs")]
 //! # // A port that holds four seconds of a parked car's samples, and a controller that counts.
 //! # use embedded_can::{Frame, nb};
 //! # struct Port(std::collections::VecDeque<u8>);
@@ -60,22 +62,24 @@
 //! let (uart, can) = (/* your port and your controller */
 //! #     Port(messages.collect()), Controller::default());
 //! # let frames = can.0.clone();
-//! let mut coprocessor = Coprocessor::new(uart, can)?;
-//! coprocessor.poll(Micros(0));
-//! # assert_eq!((frames.borrow().len(), coprocessor.refused), (6 * 400, 0));
+//! let mut board = Board::new(uart, can)?;
+//! board.poll(Micros(0));
+//! # let errors = board.coprocessor.input_counters().imu_errors;
+//! # assert_eq!((frames.borrow().len(), errors), (6 * 400, 0));
 //! # let last = gyronet::can::bosch::Tx1::parse(frames.borrow()[6 * 399].data())?;
 //! # assert_eq!(last.yaw_rate_status, gyronet::can::bosch::SignalStatus::OK);
 //! # assert!(last.yaw_rate_deg_per_sec().abs() < 0.05, "the bias is off: {}", last.yaw_rate_deg_per_sec());
-//! # coprocessor.poll(Micros(1_000_000));
-//! # assert_eq!(frames.borrow().len(), 6 * 401, "silence is told");
+//! # board.poll(Micros(1_000_000));
+//! # assert_eq!(frames.borrow().len(), 6 * 401, "silence is reported");
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! # Features, unsafe code, panics
 //!
-//! No feature is on by default. `defmt`: `defmt::Format` on the public types. `image`, `firmware`,
-//! `stm32h743`, `rtt`: what the images of the repository need, nothing for a user of the library.
+//! No feature is on by default. `defmt`: `defmt::Format` on the public types. `stm32f405`,
+//! `netduino-plus-2`, `olimex-stm32-h405` and `rtt` build the images of the repository; a user of the
+//! library needs none of them.
 //!
 //! Unsafe code is denied but for one kernel file for Cortex-M with the DSP extension
 //! (`src/nn/simd`), whose results equal those of portable code to the last bit.
@@ -88,25 +92,26 @@ pub mod align;
 pub mod bias;
 pub mod can;
 pub mod compensate;
+pub mod coprocessor;
+pub mod estimate;
 pub mod fog;
-pub mod guard;
 pub mod health;
 pub mod model;
+pub mod monitor;
 pub mod mounting;
 pub mod nn;
 pub mod odometry;
 pub mod pipeline;
 pub mod sample;
-mod seal;
-pub mod seconds;
 pub mod sensor;
 pub mod service;
 pub mod store;
 pub mod uncertainty;
 pub mod units;
-pub mod vehicle;
 pub mod wheels;
 pub mod window;
+
+pub use coprocessor::{Config, Coprocessor};
 
 /// The README's examples run as tests, too.
 #[cfg(doctest)]

@@ -77,7 +77,7 @@ impl core::fmt::Display for LevelError {
 impl core::error::Error for LevelError {}
 
 /// A rotation of the sensor's axes into the vehicle's (x forward, y left, z up).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotation([[i32; 3]; 3]);
 

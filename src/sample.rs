@@ -8,7 +8,7 @@ pub const RATE_HZ: u32 = 100;
 pub const PERIOD_US: u64 = 1_000_000 / RATE_HZ as u64;
 
 /// One reading of an inertial measurement unit: x forward, y left, z up (FLU).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImuSample {
     /// When the part took it, by the part's own clock, unwrapped.
@@ -19,8 +19,40 @@ pub struct ImuSample {
     pub angular_rate: [AngularRate; 3],
     /// Temperature of the part, where it gives one.
     pub temperature: Option<CentiCelsius>,
-    /// The part says that one of its axes clipped.
-    pub clipped: bool,
+    /// Whether the reading can be used. A parser reports [`Validity::Saturated`] where the part does;
+    /// [`crate::monitor`] finds the rest.
+    pub validity: Validity,
+}
+
+/// Whether a reading can be used, and why not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Validity {
+    /// The reading can be used.
+    #[default]
+    Good,
+    /// The part reports that one of its axes is saturated.
+    Saturated,
+    /// The part was saturated less than 50 ms ago: its filter recovers.
+    Recovering,
+    /// The readings repeat themselves: the part is stuck.
+    Stuck,
+    /// The reading is further from the last good one than a vehicle moves in 10 ms.
+    Implausible,
+}
+
+impl Validity {
+    /// Returns what a part reports of its own reading.
+    #[must_use]
+    pub const fn reported(saturated: bool) -> Self {
+        if saturated { Self::Saturated } else { Self::Good }
+    }
+
+    /// Whether the reading can be used.
+    #[must_use]
+    pub const fn is_good(self) -> bool {
+        matches!(self, Self::Good)
+    }
 }
 
 /// What a fibre-optic gyro has turned since its message before: x forward, y left, z up (FLU).

@@ -89,7 +89,7 @@ impl SpecificForce {
 ///
 /// So fine that the rounding of 1000 increments a second, all the same way, stays below
 /// 6e-6 deg/h.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Hash, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Angle(pub i64);
 
@@ -124,7 +124,8 @@ impl Angle {
     }
 }
 
-/// Accumulated yaw, signed 64 bit, LSB 2^-27 rad/s x 10 ms: the plain sum of emitted rates.
+/// Accumulated yaw, signed 64 bit, LSB 2^-27 rad/s x 10 ms: the sum of emitted rates, where a step of the
+/// sensor's clock is 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Yaw(pub i64);

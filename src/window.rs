@@ -27,6 +27,12 @@ pub struct Window {
     filled: usize,
 }
 
+impl Default for Window {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Window {
     /// No sample yet.
     pub const EMPTY: Self = Self { ring: [[0; FEATURES]; WINDOW], next: 0, filled: 0 };

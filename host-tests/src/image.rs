@@ -4,21 +4,42 @@ use crate::qemu;
 use crate::recordings::workspace;
 use crate::require::{self, Need};
 use gyronet_tools::target_bench;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
-/// The ELF file of an image (`coprocessor`, `selftest`, `bench`), for a test that is skipped
-/// (aloud) where the target's standard library is not installed.
+/// The ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for the emulated board, for a test that is
+/// skipped (aloud) where the target's standard library is not installed.
 ///
-/// Built under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the build folder of
-/// `cargo test` itself may be locked.
+/// Each image is built once in a process, under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the
+/// build folder of `cargo test` itself may be locked.
 ///
 /// # Panics
 /// When the build fails: that is an error, not a missing tool.
 #[must_use]
 pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
+    firmware_for("netduino-plus-2", test, scratch, image)
+}
+
+/// The same for another board, named by its feature.
+///
+/// # Panics
+/// As [`firmware`].
+#[must_use]
+pub fn firmware_for(board: &str, test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
     require::wants(test, Need::Qemu, target_bench::target_installed())?;
-    let folder = Path::new(scratch).join("fw");
-    Some(target_bench::build(workspace(), image, &folder).unwrap_or_else(|error| panic!("{error}")))
+    static BUILT: Mutex<BTreeMap<String, PathBuf>> = Mutex::new(BTreeMap::new());
+    // A test that panicked here has left the map as it was.
+    let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
+    let name = format!("{board}/{image}");
+    if let Some(elf) = built.get(&name) {
+        return Some(elf.clone());
+    }
+    let folder = Path::new(scratch).join(format!("fw-{board}"));
+    let elf = target_bench::build_for(board, workspace(), image, &folder);
+    let elf = elf.unwrap_or_else(|error| panic!("{error}"));
+    built.insert(name, elf.clone());
+    Some(elf)
 }
 
 /// The image that is flashed, for a test that is skipped (aloud) where it cannot be built or run.

@@ -1,6 +1,7 @@
 //! What the host tests share: how a test gets QEMU or the recordings or says that it is skipped,
 //! the emulated board and its image, bytes, samples, streams and weights made for the purpose.
 
+pub mod board;
 pub mod connected;
 pub mod entrance;
 pub mod flash;
@@ -16,5 +17,4 @@ pub mod require;
 pub mod stored;
 pub mod stream;
 pub mod synthetic;
-pub mod upset;
 pub mod wire;

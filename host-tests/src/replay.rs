@@ -1,24 +1,20 @@
-//! The board's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames in,
-//! SLCAN lines out.
+//! The image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames in,
+//! SLCAN lines out. It is the input and output around the library's [`Coprocessor`], as the image is.
 
 use crate::recordings::Row;
 use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
-use gyronet::can::fog_feed::FogFeed;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
-use gyronet::fog::FogConfig;
-use gyronet::fog::lane::{FogCounters, FogLane};
-use gyronet::guard::{Guard, START_US, TIMEOUT_US};
-use gyronet::health::Faults;
+use gyronet::coprocessor::{self, Clock, Coprocessor, StorageFaults, TimedFrame};
+use gyronet::fog::FogCounters;
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
-use gyronet::sample::{PERIOD_US, WheelSample};
+use gyronet::monitor::{START_US, TIMEOUT_US};
+use gyronet::sample::PERIOD_US;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::store::{Calibration, Configuration};
 use gyronet::units::Micros;
-use gyronet::vehicle::VehicleSample;
 
 /// What the image sends.
 pub const CONFIG: Config = Config::DEFAULT;
@@ -64,19 +60,14 @@ pub fn lines(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 /// The board's output task on the host.
 pub struct Board {
+    config: coprocessor::Config,
+    coprocessor: Coprocessor,
     network: GyroNet<'static>,
-    mti: Mti,
-    guard: Guard,
-    feeds: Feeds,
-    wheels: WheelReceiver,
-    wheels_known: Option<WheelSample>,
-    dsp1760: Dsp1760,
-    lane: FogLane,
     fog_network: FogNet<'static, 'static>,
-    fog_feed: FogFeed,
-    sample_time: Micros,
-    stored_damaged: bool,
-    configuration_lost: bool,
+    mti: Mti,
+    dsp1760: Dsp1760,
+    /// Board time: it passes while the sensor is silent, since bytes come at the host's pace.
+    now: Micros,
     /// What an emulated board has sent: see [`Board::following`].
     heard: Vec<Vec<u8>>,
     /// Silent for so many message sets.
@@ -110,26 +101,21 @@ impl Board {
     /// When the configuration, or FoGNet's own weights, are refused.
     #[must_use]
     pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
-        let config = Config::new(configuration.can).expect("a configuration that can be stored");
         let fog_blob = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
-        let mut lane = FogLane::new(FogConfig::DEFAULT, true);
-        if configuration.fog.is_some() {
-            lane.expect(Micros(0));
-        }
+        let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
+        let config = coprocessor::Config {
+            wheels: Some(wheels),
+            clock: Clock::Sensor,
+            ..configuration.coprocessor(&Calibration::NONE)
+        };
         Self {
+            coprocessor: Coprocessor::new(config),
+            config,
             network: GyroNet::new(blob),
-            mti: Mti::new(),
-            guard: Guard::new(configuration.pipeline(&Calibration::NONE)),
-            feeds: Feeds::new(config),
-            wheels: WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"),
-            wheels_known: None,
-            dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
-            lane,
             fog_network: FogNet::new(fog_blob, Box::leak(Box::new(FogNetState::ZERO))),
-            fog_feed: FogFeed::new(configuration.fog_ids),
-            sample_time: Micros(0),
-            stored_damaged: false,
-            configuration_lost: false,
+            mti: Mti::new(),
+            dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
+            now: Micros(0),
             heard: Vec::new(),
             silent: 0,
             followed: 0,
@@ -154,26 +140,36 @@ impl Board {
     /// Found something damaged at its start, perhaps the configuration itself.
     #[must_use]
     pub fn damaged(self, configuration_lost: bool) -> Self {
-        Self { stored_damaged: true, configuration_lost, ..self }
+        let storage = StorageFaults { damaged: true, configuration_lost };
+        let config = coprocessor::Config { storage, ..self.config };
+        Self { coprocessor: Coprocessor::new(config), config, ..self }
     }
 
     /// Says what the emulated board has said before anything else came.
     fn follow(&mut self) {
         loop {
-            let (mut guard, mut feeds) = (self.guard.clone(), self.feeds);
-            let Some(vehicle) = guard.poll(Micros(TIMEOUT_US + self.silent * PERIOD_US)) else {
+            let mut coprocessor = self.coprocessor.clone();
+            let now = self.next_silence();
+            if !matches!(coprocessor.poll(now), Ok(Some(_))) {
                 return;
-            };
-            let set = lines_of(&mut feeds, &self.told(vehicle));
+            }
+            let set: Vec<Vec<u8>> =
+                std::iter::from_fn(|| coprocessor.next_frame()).map(|sent| line(&sent)).collect();
             let at = self.lines.len();
             if self.heard.get(at..at + set.len()) != Some(&set[..]) {
                 return;
             }
-            (self.guard, self.feeds) = (guard, feeds);
+            (self.coprocessor, self.now) = (coprocessor, now);
             self.lines.extend(set);
             self.silent += 1;
             self.followed += 1;
         }
+    }
+
+    /// When the next message set without a sample is due.
+    fn next_silence(&self) -> Micros {
+        let first = if self.lines.is_empty() { START_US } else { TIMEOUT_US };
+        Micros(self.now.0 + if self.silent == 0 { first } else { PERIOD_US })
     }
 
     /// The sensor sends.
@@ -183,18 +179,10 @@ impl Board {
             while let Some(sample) = self.mti.next_sample() {
                 let Ok(sample) = sample else { continue };
                 self.follow();
-                self.sample_time = sample.time;
-                self.wheels_known = self.wheels.poll(sample.time);
-                if let Some(known) = self.wheels_known {
-                    self.guard.wheels(known);
+                if self.coprocessor.imu(sample, self.now).is_ok() {
+                    self.silent = 0;
                 }
-                let Ok(output) = self.guard.process(sample, Micros(0)) else { continue };
-                self.silent = 0;
-                if let Some(due) = output.window {
-                    self.guard.pipeline().deliver(due.end, self.network.estimate(&due.features));
-                }
-                self.send(output.vehicle);
-                self.fog_out();
+                self.send();
             }
         }
     }
@@ -202,7 +190,7 @@ impl Board {
     /// A wheel frame comes.
     pub fn wheel(&mut self, frame: &DataFrame) {
         // What is wrong with one, the wheels' silence tells.
-        let _ = self.wheels.process(frame, self.sample_time);
+        let _ = self.coprocessor.can(frame, self.now);
     }
 
     /// The fibre-optic gyro sends.
@@ -211,8 +199,10 @@ impl Board {
             self.dsp1760.push(*byte);
             while let Some(sample) = self.dsp1760.next_sample() {
                 if let Ok(sample) = sample {
-                    self.lane.push(self.sample_time, sample);
-                    self.fog_out();
+                    // What has no place in time is counted.
+                    let _ = self.coprocessor.fog(sample, self.now);
+                    self.follow();
+                    self.send();
                 }
             }
         }
@@ -221,60 +211,40 @@ impl Board {
     /// What became of the fibre-optic gyro.
     #[must_use]
     pub fn fog(&self) -> &FogCounters {
-        self.lane.counters()
-    }
-
-    fn fog_out(&mut self) {
-        let inertial = self.guard.pipeline().inertial();
-        self.follow();
-        while let Some(yaw) = self.lane.next_step(self.sample_time, inertial, self.wheels_known.as_ref()) {
-            for frame in self.fog_feed.process::<DataFrame>(&yaw) {
-                self.lines.push(line(&frame));
-            }
-            if let Some((number, window)) = self.lane.window() {
-                let estimate = self.fog_network.estimate(&window);
-                self.lane.deliver(number, estimate);
-            }
-        }
+        self.coprocessor.fog_counters()
     }
 
     /// The sensor is silent for so many message sets; from the start, where it has sent nothing yet.
     ///
     /// # Panics
-    /// When the guard does not say so.
+    /// When the coprocessor does not say so.
     pub fn silence(&mut self, sets: u64) {
-        let begin = if self.lines.is_empty() { START_US } else { TIMEOUT_US };
-        for set in self.silent..self.silent + sets {
-            let now = Micros(begin + set * PERIOD_US);
-            let vehicle = self.guard.poll(now).expect("the sensor is silent");
-            self.send(vehicle);
+        for _ in 0..sets {
+            self.now = self.next_silence();
+            let observation = self.coprocessor.poll(self.now).expect("time goes on");
+            assert!(observation.is_some(), "the sensor is silent");
+            self.silent += 1;
+            self.send();
         }
-        self.silent += sets;
     }
 
-    /// As the image tells it.
-    fn told(&self, mut vehicle: VehicleSample) -> VehicleSample {
-        if self.stored_damaged {
-            vehicle.yaw.faults = vehicle.yaw.faults.with(Faults::STORED);
+    /// Sends the frames that there are, and runs the windows that are due.
+    fn send(&mut self) {
+        while let Some(sent) = self.coprocessor.next_frame() {
+            self.lines.push(line(&sent));
+            if let Some((number, window)) = self.coprocessor.fog_window() {
+                let estimate = self.fog_network.estimate(&window);
+                self.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
+            }
         }
-        if self.configuration_lost {
-            vehicle.doubt();
+        if let Some(due) = self.coprocessor.window() {
+            let estimate = self.network.estimate(&due.features);
+            self.coprocessor.deliver(due.end, estimate).expect("the window that is due");
         }
-        vehicle
-    }
-
-    fn send(&mut self, vehicle: VehicleSample) {
-        let vehicle = self.told(vehicle);
-        let lines = lines_of(&mut self.feeds, &vehicle);
-        self.lines.extend(lines);
     }
 }
 
-fn lines_of(feeds: &mut Feeds, vehicle: &VehicleSample) -> Vec<Vec<u8>> {
-    feeds.process::<DataFrame>(vehicle).iter().map(line).collect()
-}
-
-fn line(frame: &DataFrame) -> Vec<u8> {
-    let line = slcan::emit(frame).expect("a data frame");
+fn line(sent: &TimedFrame) -> Vec<u8> {
+    let line = slcan::emit(&sent.frame).expect("a data frame");
     line.strip_suffix(b"\r").expect("a CR").to_vec()
 }

@@ -18,7 +18,7 @@ use std::rc::Rc;
 /// # Errors
 /// [`StoreError`].
 pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, StoreError> {
-    Store::open(Region::new(flash, layout::STORE), 0)
+    Store::open(Region::new(flash, layout::STORE), 0, false)
 }
 
 /// Both weight slots of a flash.
@@ -88,6 +88,15 @@ impl Stored {
     pub fn damaged(self, offset: u32, bits: u8) -> Self {
         self.0.borrow_mut().damage(offset as usize, bits);
         self
+    }
+
+    /// Lays it into a virtual board's flash.
+    pub fn lay(&self, board: &mut crate::board::Board) {
+        let flash = self.0.borrow();
+        for range in [layout::STORE, layout::SLOTS] {
+            let bytes = &flash.bytes()[range.start as usize..range.end as usize];
+            board.patch(crate::board::At::Address(FLASH_BASE + range.start), bytes);
+        }
     }
 
     /// Starts an emulated board with it in its memory; the files for that go to `folder`.

@@ -52,14 +52,14 @@ pub fn run(
 #[must_use]
 pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
     outputs
-        .chunk_by(|a, b| a.prompt.status == b.prompt.status)
-        .map(|run| (run[0].prompt.status, run.len()))
+        .chunk_by(|a, b| a.vehicle.prompt.status == b.vehicle.prompt.status)
+        .map(|run| (run[0].vehicle.prompt.status, run.len()))
         .collect()
 }
 
 /// Runs of equal faults: which, and how many samples.
 #[must_use]
 pub fn faults(outputs: &[Output]) -> Vec<(Faults, usize)> {
-    let faults = |output: &Output| output.vehicle.yaw.faults;
+    let faults = |output: &Output| output.vehicle.navigation.faults;
     outputs.chunk_by(|a, b| faults(a) == faults(b)).map(|run| (faults(&run[0]), run.len())).collect()
 }

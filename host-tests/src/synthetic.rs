@@ -1,10 +1,10 @@
 //! Samples of a vehicle that stands, turns or shakes, in the codes of the pipeline.
 
 use crate::noise::Noise;
+use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::health::{Quality, Source};
-use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
+use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
-use gyronet::vehicle::{PromptSample, VehicleSample, YawSample};
 
 /// rad/s to a code.
 ///
@@ -32,7 +32,7 @@ pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
         specific_force: [SpecificForce(0), SpecificForce(0), force(9.81)],
         angular_rate: [AngularRate(0), AngularRate(0), yaw_rate],
         temperature: None,
-        clipped: false,
+        validity: Validity::Good,
     }
 }
 
@@ -52,16 +52,19 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
     sample
 }
 
+/// A good rate, and the yaw turned by then.
+#[must_use]
+pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {
+    YawEstimate { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawEstimate::default() }
+}
+
 /// A vehicle that turns at `rate`, has turned by `yaw`, and is well.
 #[must_use]
 pub fn vehicle(tick: u32, rate: AngularRate, yaw: Yaw) -> VehicleSample {
     VehicleSample {
-        prompt: PromptSample { rate, quality: Quality::Good },
-        yaw: YawSample { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawSample::default() },
-        roll_rate: AngularRate::ZERO,
-        pitch_rate: AngularRate::ZERO,
-        specific_force: [SpecificForce(0); 3],
-        temperature: None,
+        prompt: YawEstimate { rate, quality: Quality::Good, ..YawEstimate::default() },
+        navigation: estimate(rate, yaw),
         tick,
+        ..VehicleSample::default()
     }
 }

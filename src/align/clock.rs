@@ -140,7 +140,7 @@ impl PartClock {
             return Err(ClockError::OutOfOrder { last, at: stamp });
         }
         count(&mut self.counters.late, u32::from(late > JITTER_US as i64));
-        let creep = ((stamp.0 - last.0) * CREEP_PPM).div_ceil(1_000_000) as i64;
+        let creep = (stamp.0 - last.0).saturating_mul(CREEP_PPM).div_ceil(1_000_000) as i64;
         let offset = offset.wrapping_add(late.min(creep));
         let time = Micros(stamp.0.wrapping_add_signed(offset).max(board.0 + 1));
         Ok(self.take(stamp, time, offset, false))

@@ -183,9 +183,12 @@ impl Increments {
 impl Piece {
     /// The parts before and after `time`, which lies in the piece.
     fn split(self, time: u64) -> (Self, Self) {
-        let whole = i128::from(self.end - self.begin).max(1);
-        let part = i128::from(time.saturating_sub(self.begin));
-        let first = self.angle.map(|angle| angle.map(|a| Angle((i128::from(a.0) * part / whole) as i64)));
+        // One and a half grid steps at most, as `push` has seen to: products of the two fit 64 bits.
+        let whole = ((self.end - self.begin) as i64).max(1);
+        let part = (time.saturating_sub(self.begin) as i64).min(whole);
+        // The same as angle * part / whole, which wants 128 bits and thousands of cycles on a Cortex-M.
+        let share = |angle: i64| angle / whole * part + angle % whole * part / whole;
+        let first = self.angle.map(|angle| angle.map(|a| Angle(share(a.0))));
         let pairs = self.angle.iter().zip(first);
         let mut second = [None; 3];
         for (to, (all, first)) in second.iter_mut().zip(pairs) {

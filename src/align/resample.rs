@@ -105,7 +105,7 @@ impl Resampler {
     }
 }
 
-/// On the straight line from one sample to the next, rounded to nearest; clipped if either is.
+/// On the straight line from one sample to the next, rounded to nearest; valid if both are.
 fn between(before: &ImuSample, after: &ImuSample, time: Micros) -> ImuSample {
     let span = (after.time.0 - before.time.0) as i64;
     let part = (time.0 - before.time.0) as i64;
@@ -120,6 +120,6 @@ fn between(before: &ImuSample, after: &ImuSample, time: Micros) -> ImuSample {
         specific_force: core::array::from_fn(|n| SpecificForce(line(f[n].0, after.specific_force[n].0))),
         angular_rate: core::array::from_fn(|n| AngularRate(line(w[n].0, after.angular_rate[n].0))),
         temperature: after.temperature.or(before.temperature),
-        clipped: before.clipped || after.clipped,
+        validity: if before.validity.is_good() { after.validity } else { before.validity },
     }
 }

@@ -56,7 +56,6 @@ pub struct Fitted {
 #[derive(Debug, Clone)]
 pub struct Streams {
     fitted: Fitted,
-    max_delay: u64,
     imu_clock: PartClock,
     fog_clock: PartClock,
     imu: Resampler,
@@ -74,7 +73,6 @@ impl Streams {
     pub fn new(fitted: Fitted) -> Self {
         Self {
             fitted,
-            max_delay: MAX_DELAY_US,
             imu_clock: PartClock::default(),
             fog_clock: PartClock::default(),
             imu: Resampler::default(),
@@ -83,12 +81,6 @@ impl Streams {
             restarts: 0,
             told: Events::default(),
         }
-    }
-
-    /// Waits longer (or less long) than [`MAX_DELAY_US`]: for a replay of a slow recording.
-    #[must_use]
-    pub fn with_max_delay(self, max_delay: Micros) -> Self {
-        Self { max_delay: max_delay.0, ..self }
     }
 
     /// Takes a sample of the inertial sensor that has arrived at `now`.
@@ -127,7 +119,7 @@ impl Streams {
         let imu = !self.fitted.imu || self.imu.has_reached(Micros(next));
         let fog = !self.fitted.fog || self.fog.has_reached(Micros(next));
         let waited = now.0.saturating_sub(next);
-        if waited > MAX_SILENCE_US.max(self.max_delay) {
+        if waited > MAX_SILENCE_US {
             // Nobody has asked for a second: these steps are of no use to anyone.
             self.restarts = self.restarts.saturating_add(1);
             self.next = Some(now.0.next_multiple_of(PERIOD_US));
@@ -135,7 +127,7 @@ impl Streams {
             self.fog.clear();
             return None;
         }
-        if !(imu && fog) && waited < self.max_delay {
+        if !(imu && fog) && waited < MAX_DELAY_US {
             return None;
         }
         self.next = Some(next + PERIOD_US);

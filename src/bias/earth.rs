@@ -60,7 +60,7 @@ impl EarthRate {
 }
 
 /// What a gyro whose z axis is vertical reads at rest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ZeroPoint {
     bias: [AngularRate; 3],

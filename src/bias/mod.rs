@@ -16,4 +16,4 @@ pub mod zero_rate;
 pub use earth::{EarthRate, Latitude, ZeroPoint};
 pub use quiet::{QuietConfig, QuietDetector};
 pub use static_init::{Rest, STATIC_SAMPLES, StaticConfig, StaticError, StaticInit};
-pub use zero_rate::{Proof, Second, ZeroRate, ZeroRateConfig};
+pub use zero_rate::{StandstillSource, ZeroRate, ZeroRateConfig, ZeroRateOutcome};

@@ -76,7 +76,7 @@ impl QuietDetector {
         for (spread, force) in accel.iter_mut().zip(sample.specific_force) {
             spread.push(force.0, force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
-        if sample.clipped {
+        if !sample.validity.is_good() {
             self.restart();
         } else if count == RATE_HZ {
             self.judge();

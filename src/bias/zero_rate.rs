@@ -14,7 +14,6 @@
 //! second after it was still too, for wheel sensors show a car that pulls away late.
 
 use super::spread::Spread;
-use crate::compensate::Settled;
 use crate::sample::RATE_HZ;
 use crate::units::{AngularRate, CentiCelsius};
 
@@ -59,28 +58,28 @@ impl ZeroRateConfig {
 /// Bits of a rate that the watch over a standing vehicle leaves out.
 const TURNED_SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
 
-/// Why the vehicle is taken to stand.
+/// What says that the vehicle stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Proof {
-    /// It is not.
+pub enum StandstillSource {
+    /// Nothing does.
     #[default]
     None,
-    /// All wheels stand. Enough by itself: a gate on the gyro would lock a true bias out.
+    /// All wheels stand. That is enough by itself: a gate on the gyro would lock a true bias out.
     Wheels,
     /// The inertial sensors are quiet. The mean must also be one that the bias can have.
     Inertial,
 }
 
-/// What a whole second of standing led to.
+/// The outcome of a whole second of standing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Second {
+pub enum ZeroRateOutcome {
     /// The second before it was used.
     Used,
-    /// There was none before it: it waits.
+    /// The second waits for the next one, because there was none before it.
     Waits,
-    /// The gyro contradicts the proof: nothing was used.
+    /// The gyro contradicts the source: nothing was used.
     Refused,
 }
 
@@ -104,11 +103,9 @@ struct Covariance {
 pub struct ZeroRate {
     config: ZeroRateConfig,
     bias: f32,
-    /// It stays until the next standstill: a bit that flips in it shows.
-    copy: f32,
     offset: f32,
     covariance: Covariance,
-    proof: Proof,
+    source: StandstillSource,
     block: Spread,
     waiting: Option<Measurement>,
     refused: bool,
@@ -130,10 +127,9 @@ impl ZeroRate {
         Self {
             config,
             bias: 0.0,
-            copy: 0.0,
             offset: 0.0,
             covariance,
-            proof: Proof::None,
+            source: StandstillSource::None,
             block: Spread::default(),
             waiting: None,
             refused: false,
@@ -144,37 +140,31 @@ impl ZeroRate {
         }
     }
 
-    /// Whether the bias is what it was when it was last updated.
-    #[must_use]
-    pub fn is_whole(&self) -> bool {
-        self.bias.to_bits() == self.copy.to_bits()
-    }
-
-    /// Takes a settled sample, and why the vehicle is taken to stand; says what became of a
-    /// second when one is over.
+    /// Takes the rate that is left of a settled sample (gyro less static bias less the network's estimate;
+    /// `None` where that is not good) and the source that says that the vehicle stands. Returns what a second
+    /// of standing led to when one is over.
     pub fn process(
         &mut self,
-        settled: &Settled,
-        proof: Proof,
+        left: Option<AngularRate>,
+        source: StandstillSource,
         temperature: Option<CentiCelsius>,
-    ) -> Option<Second> {
+    ) -> Option<ZeroRateOutcome> {
         self.since_walk += 1;
         if self.since_walk == RATE_HZ {
             self.since_walk = 0;
             self.walk(temperature);
         }
-        if proof != self.proof {
-            self.stop_begins(proof);
+        if source != self.source {
+            self.stop_begins(source);
         }
-        if proof == Proof::None {
+        if source == StandstillSource::None {
             return None;
         }
-        if !settled.good {
+        let Some(AngularRate(left)) = left else {
             // Not a whole second any more; a gap ends the waiting too.
             self.restart();
             return None;
-        }
-        let left = settled.rate.0.saturating_sub(settled.correction.0);
+        };
         self.block.push(left, left as f32 / AngularRate::PER_RAD_PER_SEC);
         if self.block.count() < RATE_HZ {
             return None;
@@ -183,14 +173,14 @@ impl ZeroRate {
         Some(self.second(&block))
     }
 
-    /// Takes the newest sample's rate, less static bias, before it is settled; says once when it
-    /// contradicts the wheels.
+    /// Takes the newest sample's rate, less static bias, before it is settled. Returns true once when the
+    /// rate contradicts the wheels.
     ///
     /// A vehicle may slide with its wheels locked. What a second of standing may turn at most must
     /// not be exceeded by a part of it either: the navigation rate, which is zero while the
     /// vehicle stands, has not gone out yet for the sample that tells.
-    pub fn watch(&mut self, rate: AngularRate) -> bool {
-        if self.proof != Proof::Wheels {
+    pub fn contradicts_wheels(&mut self, rate: AngularRate) -> bool {
+        if self.source != StandstillSource::Wheels {
             self.turned = [0; 5];
             return false;
         }
@@ -216,10 +206,10 @@ impl ZeroRate {
         true
     }
 
-    /// The wheels say that the vehicle stands, and the gyro says that it turns.
+    /// Whether the wheels stand while the gyro shows a turn.
     #[must_use]
     pub fn contradicted(&self) -> bool {
-        self.proof == Proof::Wheels && self.refused
+        self.source == StandstillSource::Wheels && self.refused
     }
 
     /// The most that a second of standing may turn, rad.
@@ -236,7 +226,7 @@ impl ZeroRate {
     /// The bias to take off; while the vehicle stands, the offset of this standstill with it.
     #[must_use]
     pub fn bias(&self) -> AngularRate {
-        let stands = self.proof != Proof::None && !self.refused;
+        let stands = self.source != StandstillSource::None && !self.refused;
         let bias = if stands { self.bias + self.offset } else { self.bias };
         let bias = within(bias, 2.0 * self.config.max_bias);
         AngularRate(libm::roundf(bias * AngularRate::PER_RAD_PER_SEC) as i32)
@@ -248,14 +238,14 @@ impl ZeroRate {
         libm::sqrtf(self.covariance.bias)
     }
 
-    /// The wheels prove that the vehicle stands, and the gyro does not contradict them.
+    /// Whether the wheels stand and the gyro does not contradict them.
     #[must_use]
     pub fn stands(&self) -> bool {
-        self.proof == Proof::Wheels && !self.refused
+        self.source == StandstillSource::Wheels && !self.refused
     }
 
-    fn stop_begins(&mut self, proof: Proof) {
-        self.proof = proof;
+    fn stop_begins(&mut self, source: StandstillSource) {
+        self.source = source;
         self.refused = false;
         self.restart();
         self.offset = 0.0;
@@ -276,7 +266,7 @@ impl ZeroRate {
             (self.covariance.bias + walk * walk + thermal * thermal).min(max_bias * max_bias);
     }
 
-    fn second(&mut self, block: &Spread) -> Second {
+    fn second(&mut self, block: &Spread) -> ZeroRateOutcome {
         let noise = self.config.noise;
         let measured = Measurement {
             mean: block.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC,
@@ -284,20 +274,20 @@ impl ZeroRate {
         };
         let step = measured.mean - self.bias - self.offset;
         let Covariance { bias, both, offset } = self.covariance;
-        let gate = match self.proof {
-            Proof::Wheels => self.wheels_gate(),
-            Proof::Inertial => 3.0 * libm::sqrtf(bias + 2.0 * both + offset + measured.variance),
-            Proof::None => 0.0,
+        let gate = match self.source {
+            StandstillSource::Wheels => self.wheels_gate(),
+            StandstillSource::Inertial => 3.0 * libm::sqrtf(bias + 2.0 * both + offset + measured.variance),
+            StandstillSource::None => 0.0,
         };
         if libm::fabsf(step) > gate {
             self.waiting = None;
             self.refused = true;
-            return Second::Refused;
+            return ZeroRateOutcome::Refused;
         }
         self.refused = false;
-        let Some(before) = self.waiting.replace(measured) else { return Second::Waits };
+        let Some(before) = self.waiting.replace(measured) else { return ZeroRateOutcome::Waits };
         self.update(before);
-        Second::Used
+        ZeroRateOutcome::Used
     }
 
     /// The Kalman filter's measurement update.
@@ -309,7 +299,6 @@ impl ZeroRate {
         let (bias_gain, offset_gain) = (with_bias * per_variance, with_offset * per_variance);
         let largest = self.config.max_bias;
         self.bias = within(self.bias + bias_gain * innovation, largest);
-        self.copy = self.bias;
         self.offset = within(self.offset + offset_gain * innovation, largest);
         self.covariance = Covariance {
             bias: (bias - bias_gain * with_bias).max(0.0),

@@ -36,9 +36,9 @@ mod firmware {
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};
     use gyronet::nn::dense::Dense;
-    use gyronet::nn::lstm::{self, Scratch};
+    use gyronet::nn::lstm::{self, Direction, Scratch};
     use gyronet::pipeline::{Pipeline, PipelineConfig};
-    use gyronet::sample::{ImuSample, PERIOD_US, Standstill, WHEELS, WheelSample};
+    use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
     use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
     use gyronet::window::{FEATURES, Features, WINDOW};
     use panic_semihosting as _;
@@ -74,7 +74,9 @@ mod firmware {
             hprintln!("FAILED: the weight file is refused");
             return;
         };
-        let mut network = GyroNet::new(blob);
+        // Too large for the stack.
+        let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return };
+        let mut network = GyroNet::with_state(blob, state);
         let mut numbers = Numbers::new(9);
         let mut window: [Features; WINDOW] = [[0; FEATURES]; WINDOW];
         // The same work for any input: ten random windows, zeros, the ends of the range.
@@ -130,7 +132,7 @@ mod firmware {
                     ],
                     angular_rate: [AngularRate(0), AngularRate(0), AngularRate(numbers.within(1 << 18))],
                     temperature: None,
-                    clipped: false,
+                    validity: Validity::Good,
                 };
                 if let Ok(output) = black_box(pipeline.process(black_box(sample)))
                     && let Some(due) = output.window
@@ -150,14 +152,24 @@ mod firmware {
     }
 
     fn kernels(meter: &mut Meter) {
-        let mut scratch = Scratch::<60, 30>::ZERO;
-        let x = [0x0123_4567; 120];
+        // Too large for the stack.
+        let scratch = cortex_m::singleton!(: Scratch<60, 30, 5> = Scratch::ZERO);
+        let room = cortex_m::singleton!(: [u32; Direction::recurrent_words(60)] = [0; _]);
+        let Some((scratch, room)) = scratch.zip(room) else { return };
+        let x = [0x0123_4567; 5 * 120];
         let (narrow, wide) = (GYRO_1.direction(60, 6), FOG_2_2.direction(60, 120));
-        meter.run("kernel/project_6x60", || lstm::project(&narrow, &x[..6], &mut scratch.projection));
-        meter.run("kernel/project_120x60", || lstm::project(&wide, &x, &mut scratch.projection));
-        let Scratch { cell_state, hidden: [a, b], projection: [projection, _] } = &mut scratch;
+        let pair = &mut scratch.projection[..1];
+        meter.run("kernel/project_6x60", || lstm::project(&narrow, &x[..6], pair));
+        meter.run("kernel/project_120x60", || lstm::project(&wide, &x[..120], pair));
+        meter.run("kernel/project_120x60x5", || lstm::project(&wide, &x, &mut scratch.projection));
+        meter.run("kernel/copy_60", || {
+            black_box(wide.through(room, true));
+        });
+        let Scratch { cell_state, hidden: [a, b], projection: [[projection, _], ..] } = scratch;
         meter.run("kernel/step_60_first", || lstm::step(&wide, projection, None, cell_state, a));
         meter.run("kernel/step_60", || lstm::step(&wide, projection, Some(a), cell_state, b));
+        let near = wide.through(room, false);
+        meter.run("kernel/step_60_from_ram", || lstm::step(&near, projection, Some(a), cell_state, b));
         meter.run("kernel/dense_60", || {
             black_box(Dense::partial(black_box(&[3; 60]), b));
         });

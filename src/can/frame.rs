@@ -10,6 +10,14 @@ pub struct DataFrame {
     len: u8,
 }
 
+impl DataFrame {
+    /// Converts it to a driver's own type; `None` where the driver refuses it.
+    #[must_use]
+    pub fn convert<F: Frame>(&self) -> Option<F> {
+        F::new(self.id(), self.data())
+    }
+}
+
 impl Frame for DataFrame {
     fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
         let mut bytes = [0; 8];

@@ -4,8 +4,8 @@ pub mod bosch;
 pub mod carry;
 pub mod config;
 pub mod e2e;
-pub mod feeds;
-pub mod fog_feed;
+pub mod encoder;
+pub mod fog_encoder;
 pub mod frame;
 pub mod j1939;
 pub mod load;
@@ -14,6 +14,6 @@ pub mod signal;
 pub mod slcan;
 pub mod wheel;
 pub mod yaw;
-pub mod yaw_feed;
+pub mod yaw_encoder;
 
 pub use frame::DataFrame;

@@ -40,6 +40,19 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         let _ = self.frames.push_back(frame);
     }
 
+    /// The oldest frame.
+    #[must_use]
+    pub fn front(&self) -> Option<&F> {
+        self.frames.front()
+    }
+
+    /// Drops the oldest frame and counts it.
+    pub fn drop_front(&mut self) {
+        if self.frames.pop_front().is_some() {
+            self.dropped = self.dropped.saturating_add(1);
+        }
+    }
+
     /// Takes the oldest frame, for a transport that always takes it.
     pub fn pop(&mut self) -> Option<F> {
         self.frames.pop_front()

@@ -17,7 +17,9 @@
 //!
 //! The accumulated yaw wraps where an angle does, so the difference of two readings, taken in 32
 //! bits, is the angle turned between them, and a receiver that missed messages misses no angle.
-//! The rate carries its rounding residual: summed up, it is the accumulated yaw to half an LSB.
+//! The rate carries its rounding residual: summed up over the sensor's true periods, it is the
+//! accumulated yaw to half an LSB. Such a period is 10 ms unless the sensor's clock is found off the
+//! board's ([`crate::align::clock_ratio`]).
 
 pub use crate::health::{Faults, Quality, Source};
 

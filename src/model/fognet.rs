@@ -17,10 +17,10 @@
 
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
 use super::input::load_step;
+use crate::fog::seconds::{STEPS, SecondsWindow};
 use crate::nn::bilstm::{self, Layer, Pass, Run, Way};
 use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};
-use crate::seconds::{STEPS, SecondsWindow};
 use crate::units::{Angle, AngularRate};
 
 /// Column of the gyro's increment.
@@ -140,7 +140,7 @@ impl<'w, 's> FogNet<'w, 's> {
         match stage {
             Stage::Idle => None,
             Stage::First(run, first) => {
-                let more = run.advance(&blob.lstm1, input, between, first, |way, step, hidden| {
+                let more = run.advance(&blob.lstm1, input, between, first, &mut [], |way, step, hidden| {
                     if let Some(f1) = f1.get_mut(step) {
                         *f1 = f1.wrapping_add(half(blob.fc1.weights, way, hidden));
                     }
@@ -153,7 +153,7 @@ impl<'w, 's> FogNet<'w, 's> {
             Stage::Second(run, second) => {
                 let mut last = false;
                 let (input, between) = (&input[..STEPS], &mut between[..STEPS * HIDDEN2]);
-                run.advance(&blob.lstm2, input, between, second, |way, step, hidden| {
+                run.advance(&blob.lstm2, input, between, second, &mut [], |way, step, hidden| {
                     if step == STEPS - 1 {
                         *f2 = f2.wrapping_add(half(blob.fc2.weights, way, hidden));
                         last = true;

@@ -2,8 +2,8 @@
 
 use super::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
 use super::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
+use crate::fog::seconds::{STEPS, SecondsWindow};
 use crate::nn::reference::{LstmWeights, dense, lstm};
-use crate::seconds::{STEPS, SecondsWindow};
 use crate::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 
 /// FoGNet's tensors, with the names and layouts of the checkpoint.

@@ -5,51 +5,73 @@ use super::blob::{Blob, HIDDEN};
 use super::input::load_step;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::nn::bilstm::{self, Pass, Run, Way};
-use crate::nn::lstm::Scratch;
+use crate::nn::lstm::{Direction, Scratch};
 use crate::nn::{dense::Dense, exp2::times_exp2};
 use crate::units::AngularRate;
 use crate::window::{FEATURES, Features, WINDOW};
+use core::borrow::BorrowMut;
 
 /// Words of the hidden state of one direction.
 const HIDDEN_WORDS: usize = HIDDEN / 2;
+
+/// Words of the recurrent weights of one direction.
+const RECURRENT_WORDS: usize = Direction::recurrent_words(HIDDEN);
 
 /// Working memory of one window.
 #[derive(Debug, Clone)]
 pub struct GyroNetState {
     input: [u32; WINDOW * FEATURES / 2],
     layer1: [u32; WINDOW * HIDDEN],
-    scratch: Scratch<HIDDEN, HIDDEN_WORDS>,
+    /// All steps of a direction at once, so that each weight of its input is read once a window.
+    scratch: Scratch<HIDDEN, HIDDEN_WORDS, { WINDOW / 2 }>,
+    /// The recurrent weights of the direction at work, which each step reads.
+    recurrent: [u32; RECURRENT_WORDS],
     /// Of the gyro error's row, then of the log scale's row.
     sums: [[i32; 2]; WINDOW],
     clamped_inputs: u16,
-    run: Option<Run>,
+    /// A window that is not done.
+    run: Run,
+    under_way: bool,
 }
 
 impl GyroNetState {
-    /// Nothing in it yet; a window leaves nothing for the next one either.
+    /// Nothing in it yet; a window leaves nothing for the next one either. All of it is zero, so that it
+    /// needs no place in flash.
     pub const ZERO: Self = Self {
         input: [0; _],
         layer1: [0; _],
         scratch: Scratch::ZERO,
+        recurrent: [0; _],
         sums: [[0; _]; _],
         clamped_inputs: 0,
-        run: None,
+        run: Run::new(),
+        under_way: false,
     };
 }
 
-/// The integer network: weights in place, state owned.
+/// The integer network: weights in place, state owned or (`S` a reference) the caller's, where it is too
+/// large to be moved about on a small stack.
 #[derive(Debug, Clone)]
-pub struct GyroNet<'w> {
+pub struct GyroNet<'w, S = GyroNetState> {
     blob: Blob<'w>,
-    state: GyroNetState,
+    state: S,
 }
 
 impl<'w> GyroNet<'w> {
     /// A network over checked weights.
     #[must_use]
-    #[inline]
     pub fn new(blob: Blob<'w>) -> Self {
-        Self { blob, state: GyroNetState::ZERO }
+        Self::with_state(blob, GyroNetState::ZERO)
+    }
+}
+
+impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
+    /// A network over checked weights, in a state of the caller's. A window that it was at work on is
+    /// dropped.
+    #[must_use]
+    pub fn with_state(blob: Blob<'w>, mut state: S) -> Self {
+        state.borrow_mut().under_way = false;
+        Self { blob, state }
     }
 
     /// The weights that it runs on.
@@ -61,18 +83,24 @@ impl<'w> GyroNet<'w> {
     /// Loads a window; [`GyroNet::advance`] then runs it piece by piece. One that was under way
     /// is dropped.
     pub fn start(&mut self, window: &[Features; WINDOW]) {
-        self.state.clamped_inputs = self.load(window);
-        self.state.sums = [[self.blob.gyro_error.bias, self.blob.log_scale.bias]; WINDOW];
-        self.state.run = Some(Run::new());
+        let clamped_inputs = self.load(window);
+        let state = self.state.borrow_mut();
+        state.clamped_inputs = clamped_inputs;
+        state.sums = [[self.blob.gyro_error.bias, self.blob.log_scale.bias]; WINDOW];
+        state.run = Run::new();
+        state.under_way = true;
     }
 
-    /// Does a bounded piece of the window (two steps of one direction, a twentieth of it or
-    /// less); returns the estimate with the last one, `None` before that and when none is
-    /// under way.
+    /// Does a bounded piece of the window (one direction of one layer, a third of it or less); returns
+    /// the estimate with the last one, `None` before that and when none is under way.
     pub fn advance(&mut self) -> Option<Estimate> {
         let Self { blob, state } = self;
-        let GyroNetState { input, layer1, scratch, sums, clamped_inputs, run } = state;
-        let more = run.as_mut()?.advance(&blob.layers, input, layer1, scratch, |way, step, hidden| {
+        let GyroNetState { input, layer1, scratch, recurrent, sums, clamped_inputs, run, under_way } =
+            state.borrow_mut();
+        if !*under_way {
+            return None;
+        }
+        let more = run.advance(&blob.layers, input, layer1, scratch, recurrent, |way, step, hidden| {
             let Some(sums) = sums.get_mut(step) else { return };
             for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
                 let (forward, backward) = row.weights.split_at_checked(HIDDEN).unwrap_or_default();
@@ -83,7 +111,7 @@ impl<'w> GyroNet<'w> {
         if more {
             return None;
         }
-        *run = None;
+        *under_way = false;
         let corrections = sums.map(|[error, _]| AngularRate(blob.gyro_error.scale(error)));
         let log_scale =
             sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
@@ -97,11 +125,11 @@ impl<'w> GyroNet<'w> {
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
         let clamped_inputs = self.load(window);
         let Self { blob: Blob { layers: [first, second], gyro_error: dense, .. }, state } = self;
-        let GyroNetState { input, layer1, scratch, .. } = state;
+        let GyroNetState { input, layer1, scratch, recurrent, .. } = state.borrow_mut();
         for (direction, way, offset) in
             [(&first.forward, Way::Forward, 0), (&first.backward, Way::Backward, HIDDEN)]
         {
-            Pass::new(way).finish(direction, input, scratch, |step, hidden| {
+            Pass::new(way).finish(direction, input, scratch, recurrent, |step, hidden| {
                 bilstm::store(layer1, step, offset, 2 * HIDDEN, HIDDEN, hidden);
             });
         }
@@ -113,7 +141,7 @@ impl<'w> GyroNet<'w> {
             }
         };
         Pass::new(Way::Forward)
-            .finish(&second.forward, layer1, scratch, |step, hidden| add(forward, step, hidden));
+            .finish(&second.forward, layer1, scratch, recurrent, |step, hidden| add(forward, step, hidden));
         Pass::first(Way::Backward, &second.backward, layer1, scratch, |step, hidden| {
             add(backward, step, hidden);
         });
@@ -123,22 +151,22 @@ impl<'w> GyroNet<'w> {
     /// Normalises the window into the first layer's input; counts what had to be clamped.
     fn load(&mut self, window: &[Features; WINDOW]) -> u16 {
         let clamp = i32::from(self.blob.input_clamp);
+        let input = &mut self.state.borrow_mut().input;
         let mut clamped = 0;
         for (step, features) in window.iter().enumerate() {
             let codes = features.iter().copied();
             let normalisation = &self.blob.normalisation;
-            clamped +=
-                load_step::<FEATURES, FEATURES>(&mut self.state.input, step, codes, normalisation, clamp);
+            clamped += load_step::<FEATURES, FEATURES>(input, step, codes, normalisation, clamp);
         }
         clamped
     }
 }
 
-impl WindowNetwork for GyroNet<'_> {
+impl<S: BorrowMut<GyroNetState>> WindowNetwork for GyroNet<'_, S> {
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
         self.start(window);
         loop {
-            // A run takes 20 pieces, whatever the window holds.
+            // A run takes four pieces, whatever the window holds.
             if let Some(estimate) = self.advance() {
                 return estimate;
             }

@@ -28,7 +28,7 @@ pub enum Way {
     Backward,
 }
 
-/// One direction's way through a sequence; [`Pass::advance`] takes it two steps further.
+/// One direction's way through a sequence; [`Pass::advance`] takes it some pairs of steps further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pass {
     way: Way,
@@ -42,15 +42,17 @@ impl Pass {
         Self { way, done: 0 }
     }
 
-    /// Takes the next pair of steps and hands each step's number and hidden state (Q10) to
-    /// `emit`; returns whether there are more.
+    /// Takes the next pairs of steps, as many as `scratch` has projections for, and hands each step's
+    /// number and hidden state (Q10) to `emit`; returns whether there are more.
     ///
-    /// `input` is the whole sequence.
-    pub fn advance<const U: usize, const W: usize>(
+    /// `input` is the whole sequence. `room` takes the direction's recurrent records for the length of
+    /// the pass, if it has their size ([`Direction::through`]).
+    pub fn advance<const U: usize, const W: usize, const P: usize>(
         &mut self,
         direction: &Direction<'_>,
         input: &[u32],
-        scratch: &mut Scratch<U, W>,
+        scratch: &mut Scratch<U, W, P>,
+        room: &mut [u32],
         mut emit: impl FnMut(usize, &[u32; W]),
     ) -> bool {
         let words = direction.inputs();
@@ -59,33 +61,43 @@ impl Pass {
         if self.done >= pairs || direction.units() != U {
             return false;
         }
-        let (pair, order) = match self.way {
-            Way::Forward => (self.done, [0, 1]),
-            Way::Backward => (pairs - 1 - self.done, [1, 0]),
-        };
-        let Some(columns) = input.get(pair * words..(pair + 1) * words) else { return false };
+        let direction = &direction.through(room, self.done == 0);
         let Scratch { cell_state, hidden: [even, odd], projection } = scratch;
+        let count = (pairs - self.done).min(P);
+        let from = match self.way {
+            Way::Forward => self.done,
+            Way::Backward => pairs - self.done - count,
+        };
+        let columns = input.get(from * words..(from + count) * words);
+        let Some((columns, projection)) = columns.zip(projection.get_mut(..count)) else { return false };
         lstm::project(direction, columns, projection);
         if self.done == 0 {
             *cell_state = [0; U];
         }
-        let [first, second] = order;
-        let previous = (self.done > 0).then_some(&*odd);
-        lstm::step(direction, &projection[first], previous, cell_state, even);
-        emit(2 * pair + first, even);
-        lstm::step(direction, &projection[second], Some(even), cell_state, odd);
-        emit(2 * pair + second, odd);
-        self.done += 1;
+        for k in 0..count {
+            let (pair, [first, second]) = match self.way {
+                Way::Forward => (k, [0, 1]),
+                Way::Backward => (count - 1 - k, [1, 0]),
+            };
+            let Some(projection) = projection.get(pair) else { break };
+            let pair = from + pair;
+            let previous = (self.done > 0).then_some(&*odd);
+            lstm::step(direction, &projection[first], previous, cell_state, even);
+            emit(2 * pair + first, even);
+            lstm::step(direction, &projection[second], Some(even), cell_state, odd);
+            emit(2 * pair + second, odd);
+            self.done += 1;
+        }
         self.done < pairs
     }
 
     /// The first step of a pass alone, for whoever needs no other: half a pair. Hands its number
     /// and hidden state to `emit`.
-    pub fn first<const U: usize, const W: usize>(
+    pub fn first<const U: usize, const W: usize, const P: usize>(
         way: Way,
         direction: &Direction<'_>,
         input: &[u32],
-        scratch: &mut Scratch<U, W>,
+        scratch: &mut Scratch<U, W, P>,
         emit: impl FnOnce(usize, &[u32; W]),
     ) {
         let words = direction.inputs();
@@ -93,23 +105,25 @@ impl Pass {
             Way::Forward => (0, 0),
             Way::Backward => (input.len().checked_div(words).unwrap_or(0).saturating_sub(1), 1),
         };
-        let Some(columns) = input.get(pair * words..(pair + 1) * words) else { return };
         let Scratch { cell_state, hidden: [hidden, _], projection } = scratch;
-        lstm::project(direction, columns, projection);
+        let columns = input.get(pair * words..(pair + 1) * words);
+        let Some((columns, projection)) = columns.zip(projection.first_mut()) else { return };
+        lstm::project(direction, columns, core::slice::from_mut(projection));
         *cell_state = [0; U];
         lstm::step(direction, &projection[first], None, cell_state, hidden);
         emit(2 * pair + first, hidden);
     }
 
     /// All steps that are left.
-    pub fn finish<const U: usize, const W: usize>(
+    pub fn finish<const U: usize, const W: usize, const P: usize>(
         mut self,
         direction: &Direction<'_>,
         input: &[u32],
-        scratch: &mut Scratch<U, W>,
+        scratch: &mut Scratch<U, W, P>,
+        room: &mut [u32],
         mut emit: impl FnMut(usize, &[u32; W]),
     ) {
-        while self.advance(direction, input, scratch, &mut emit) {}
+        while self.advance(direction, input, scratch, room, &mut emit) {}
     }
 }
 
@@ -130,7 +144,7 @@ pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, u
 }
 
 /// A network of two bidirectional layers at work on one sequence; [`Run::advance`] takes it one
-/// bounded piece further: a pair of steps in one direction of one layer.
+/// bounded piece further: pairs of steps in one direction of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
     /// 0, 1: layer 1 forward, backward; 2, 3: layer 2.
@@ -147,14 +161,15 @@ impl Run {
 
     /// Does the next piece; returns whether there are more.
     ///
-    /// `input` is the first layer's sequence, `between` takes the second one's. `emit` gets layer
-    /// 2's hidden states: which way, step, state.
-    pub fn advance<const U: usize, const W: usize>(
+    /// `input` is the first layer's sequence, `between` takes the second one's; `room` is as in
+    /// [`Pass::advance`]. `emit` gets layer 2's hidden states: which way, step, state.
+    pub fn advance<const U: usize, const W: usize, const P: usize>(
         &mut self,
         layers: &[Layer<'_>; 2],
         input: &[u32],
         between: &mut [u32],
-        scratch: &mut Scratch<U, W>,
+        scratch: &mut Scratch<U, W, P>,
+        room: &mut [u32],
         mut emit: impl FnMut(Way, usize, &[u32; W]),
     ) -> bool {
         let (way, offset) = if self.stage.is_multiple_of(2) { (Way::Forward, 0) } else { (Way::Backward, U) };
@@ -163,10 +178,12 @@ impl Run {
             Way::Backward => &layer.backward,
         });
         let more = match self.stage {
-            0 | 1 => self.pass.advance(first, input, scratch, |step, hidden| {
+            0 | 1 => self.pass.advance(first, input, scratch, room, |step, hidden| {
                 store(between, step, offset, 2 * U, U, hidden);
             }),
-            2 | 3 => self.pass.advance(second, between, scratch, |step, hidden| emit(way, step, hidden)),
+            2 | 3 => {
+                self.pass.advance(second, between, scratch, room, |step, hidden| emit(way, step, hidden))
+            }
             _ => return false,
         };
         if !more {

@@ -1,4 +1,4 @@
-//! One LSTM direction in integers: the input projection of two steps, and one recurrent step.
+//! One LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
 //!
 //! The portable code here is the definition of the result (formats and packing: [`crate::nn`]).
 //! Where the processor has a faster way (`nn/simd/`), [`project`] and [`step`] take it; the
@@ -18,7 +18,9 @@ use super::{GATES, HIDDEN_FRACTION_BITS, activation, simd, unpack};
 pub type Accumulators = [i32; GATES];
 
 /// Words of an input record before its columns.
-const BIAS_WORDS: usize = GATES;
+pub(super) const BIAS_WORDS: usize = GATES;
+/// Most inputs of a direction: a kernel may hold one unit's record on the stack.
+pub const MAX_INPUTS: usize = 192;
 /// Words of a recurrent record after its columns.
 const MULTIPLIER_WORDS: usize = GATES / 2;
 
@@ -52,11 +54,12 @@ impl<'w> Direction<'w> {
     }
 
     /// Takes records as they lie in a weight file; `None` unless `units` and `inputs` are even
-    /// and not zero, and the lengths fit them.
+    /// and not zero, `inputs` at most [`MAX_INPUTS`], and the lengths fit them.
     #[must_use]
     pub const fn new(units: usize, inputs: usize, input: &'w [u32], recurrent: &'w [u32]) -> Option<Self> {
         let even = units.is_multiple_of(2) && inputs.is_multiple_of(2) && units > 0 && inputs > 0;
         if even
+            && inputs <= MAX_INPUTS
             && input.len() == Self::input_words(units, inputs)
             && recurrent.len() == Self::recurrent_words(units)
         {
@@ -90,6 +93,24 @@ impl<'w> Direction<'w> {
         self.recurrent
     }
 
+    /// The same direction with its recurrent records in `room`: copied there if `load`, else there since
+    /// an earlier call. Where they do not fit exactly, they are read where they lie.
+    ///
+    /// A step reads every record once. Memory without wait states pays for the copy in two or three steps.
+    #[must_use]
+    pub fn through<'a>(&self, room: &'a mut [u32], load: bool) -> Direction<'a>
+    where
+        'w: 'a,
+    {
+        if room.len() != self.recurrent.len() {
+            return *self;
+        }
+        if load {
+            simd::copy(self.recurrent, room);
+        }
+        Direction { recurrent: room, ..*self }
+    }
+
     fn input_records(&self) -> impl Iterator<Item = (&'w [u32], &'w [u32])> {
         let words = (BIAS_WORDS + self.inputs).max(1);
         self.input.chunks_exact(words).filter_map(|record| record.split_at_checked(BIAS_WORDS))
@@ -102,37 +123,38 @@ impl<'w> Direction<'w> {
     }
 }
 
-/// State and scratch of one direction with `U` units, in `W` words of hidden state.
+/// State and scratch of one direction with `U` units, in `W` words of hidden state, with room for the
+/// projections of `P` pairs of steps.
 #[derive(Debug, Clone)]
-pub struct Scratch<const U: usize, const W: usize> {
+pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     /// Cell state, Q20.
     pub cell_state: [i32; U],
     /// Hidden state before and after a step, Q10, two units a word; which is which alternates.
     pub hidden: [[u32; W]; 2],
-    /// Input projections of two consecutive steps.
-    pub projection: [[Accumulators; U]; 2],
+    /// Input projections of consecutive steps.
+    pub projection: [Projection<U>; P],
 }
 
-impl<const U: usize, const W: usize> Scratch<U, W> {
+/// Input projections of two consecutive steps.
+pub type Projection<const U: usize> = [[Accumulators; U]; 2];
+
+impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
     /// All zero.
     pub const ZERO: Self = {
         assert!(2 * W == Direction::padded(U), "W is half of U, U rounded up to a multiple of four");
-        Self { cell_state: [0; U], hidden: [[0; W]; 2], projection: [[[0; GATES]; U]; 2] }
+        Self { cell_state: [0; U], hidden: [[0; W]; 2], projection: [[[[0; GATES]; U]; 2]; P] }
     };
 }
 
-/// Bias and input products of all units for two consecutive steps.
+/// Bias and input products of all units, for a pair of consecutive steps each.
 ///
-/// `x`: the two steps' inputs, word by word in turn, as many words as the direction has inputs.
+/// `x`: the inputs of all pairs, the two steps of a pair word by word in turn, as many words a pair as the
+/// direction has inputs.
 ///
 /// Does nothing when `x` or `U` does not fit the direction: a defect of the caller, which debug builds
 /// stop at.
-pub fn project<const U: usize>(
-    direction: &Direction<'_>,
-    x: &[u32],
-    projection: &mut [[Accumulators; U]; 2],
-) {
-    let fits = x.len() == direction.inputs && U == direction.units;
+pub fn project<const U: usize>(direction: &Direction<'_>, x: &[u32], projection: &mut [Projection<U>]) {
+    let fits = x.len() == direction.inputs * projection.len() && U == direction.units;
     debug_assert!(fits);
     if fits {
         simd::project(direction, x, projection);
@@ -178,12 +200,14 @@ fn accumulate(acc: &mut Accumulators, rows: &[u32], x: impl Iterator<Item = u32>
 pub fn project_portable<const U: usize>(
     direction: &Direction<'_>,
     x: &[u32],
-    projection: &mut [[Accumulators; U]; 2],
+    projection: &mut [Projection<U>],
 ) {
-    for (step, projection) in projection.iter_mut().enumerate() {
-        for ((bias, rows), acc) in direction.input_records().zip(projection) {
-            *acc = core::array::from_fn(|k| bias[k] as i32);
-            accumulate(acc, rows, x.iter().skip(step).step_by(2).copied());
+    for (x, projection) in x.chunks_exact(direction.inputs.max(1)).zip(projection) {
+        for (step, projection) in projection.iter_mut().enumerate() {
+            for ((bias, rows), acc) in direction.input_records().zip(projection) {
+                *acc = core::array::from_fn(|k| bias[k] as i32);
+                accumulate(acc, rows, x.iter().skip(step).step_by(2).copied());
+            }
         }
     }
 }

@@ -76,7 +76,7 @@ impl Calibrator {
         mounting: &Mounting,
         calibration: &mut Calibration,
     ) -> Option<Result<(), CalibrationFault>> {
-        if sample.clipped {
+        if !sample.validity.is_good() {
             return Some(Err(CalibrationFault::Clipped));
         }
         let judged = self.still.process(sample)?;

@@ -1,6 +1,8 @@
 //! What has happened to the board, kept until it is overwritten.
 
 use super::calibrate::CalibrationFault;
+pub use super::crash::{Crash, CrashKind};
+pub use super::hardware::{CanFault, ClockFault};
 use crate::health::Status;
 use crate::store::{Slot, StoreError, slots::SlotError};
 use heapless::{Deque, Vec};
@@ -30,31 +32,6 @@ pub enum ResetCause {
     Watchdog,
     /// A forbidden low-power mode.
     LowPower,
-}
-
-/// What stopped the image before this start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum CrashKind {
-    /// A panic of the program.
-    Panic,
-    /// A hard fault: a bus, usage or memory fault, or a broken vector.
-    HardFault,
-    /// An exception or interrupt that nothing handles; its number (ICSR.VECTACTIVE).
-    Unhandled(u16),
-}
-
-/// A crash, kept over the reset that it led to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Crash {
-    /// What it was.
-    pub kind: CrashKind,
-    /// Where: the program counter of a fault, the line of a panic.
-    pub place: u32,
-    /// Crashes since power came on.
-    pub count: u32,
 }
 
 /// Why a part on SPI gives no samples.

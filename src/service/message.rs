@@ -1,16 +1,16 @@
 //! Requests and replies.
 
 use super::calibrate::{State, Task};
-use super::event::{Crash, LogPage, ResetCause, SensorFault};
-use crate::fog::lane::FogCounters;
-use crate::health::{Counters, Status, WatchCounters};
+use super::event::{CanFault, ClockFault, Crash, LogPage, ResetCause, SensorFault};
+use crate::fog::FogCounters;
+use crate::health::{Counters, InputCounters, Status, WatchCounters};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Calibration, Configuration, Slot, StoreError};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Of the messages; raised when one changes.
-pub const PROTOCOL: u8 = 3;
+pub const PROTOCOL: u8 = 5;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -61,6 +61,26 @@ pub enum Request {
 }
 
 impl Request {
+    /// Whether it interrupts the output: it writes the flash, or restarts the board.
+    #[must_use]
+    pub const fn interrupts(&self) -> bool {
+        match self {
+            Self::SetConfiguration { .. }
+            | Self::Calibrate(Calibrate::Store)
+            | Self::WeightsBegin { .. }
+            | Self::WeightsBlock { .. }
+            | Self::WeightsActivate
+            | Self::Restart => true,
+            Self::Info
+            | Self::GetConfiguration
+            | Self::GetCalibration
+            | Self::Calibrate(Calibrate::Start(_) | Calibrate::Cancel)
+            | Self::Log { .. }
+            | Self::Counters
+            | Self::WeightsVerify => false,
+        }
+    }
+
     /// Whether it brings a weight file, and is answered by how much of it is there.
     #[must_use]
     pub const fn uploads(&self) -> bool {
@@ -143,6 +163,8 @@ pub enum Refusal {
     Slot(SlotError),
     /// Nothing has been found that could be stored.
     NothingFound,
+    /// The vehicle is not proven to stand: writing the flash would interrupt the output.
+    Moving,
 }
 
 impl core::fmt::Display for Refusal {
@@ -154,6 +176,7 @@ impl core::fmt::Display for Refusal {
             }
             Self::Store(error) => error.fmt(f),
             Self::Slot(error) => error.fmt(f),
+            Self::Moving => f.write_str("the vehicle is not proven to stand still"),
             Self::NothingFound => f.write_str("no calibration has been found that could be stored"),
         }
     }
@@ -193,8 +216,10 @@ pub struct Identity {
     pub device_id: Option<u32>,
     /// Of the processor, Hz.
     pub clock_hz: u32,
-    /// Whether the CAN controller is up; else frames go out as SLCAN alone.
-    pub can: bool,
+    /// Why the clock is not the crystal's; `None`: it is.
+    pub clock_fault: Option<ClockFault>,
+    /// Why frames go out as SLCAN alone; `None`: they go out on CAN too.
+    pub can_fault: Option<CanFault>,
     /// Why it has started.
     pub reset: ResetCause,
     /// Its last crash since power came on.
@@ -207,7 +232,8 @@ impl Identity {
         firmware: [0; 3],
         device_id: None,
         clock_hz: 0,
-        can: false,
+        clock_fault: None,
+        can_fault: None,
         reset: ResetCause::Unknown,
         crash: None,
     };
@@ -260,19 +286,19 @@ pub struct Info {
 pub struct AllCounters {
     /// Of the pipeline.
     pub pipeline: Counters,
-    /// Of the watch over the sensor.
+    /// Of the sensor monitor.
     pub watch: WatchCounters,
     /// Of the lines.
     pub lines: LineCounters,
     /// Of the fibre-optic gyro.
     pub fog: FogCounters,
+    /// Of the coprocessor's inputs.
+    pub inputs: InputCounters,
 }
 
 /// What went wrong on the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LineCounters {
-    /// Samples or frames of the sensor that were refused.
-    pub sensor_errors: u32,
     /// Frames that the SLCAN line did not take.
     pub unsent: u32,
     /// Bytes of the sensor and SLCAN lines that came damaged, or too fast.
@@ -280,9 +306,7 @@ pub struct LineCounters {
     /// Bytes that had to wait because a line's queue was full: what comes meanwhile is lost, where
     /// the line cannot be made to wait.
     pub held: u32,
-    /// Samples or frames of the fibre-optic gyro that were refused.
-    pub fog_errors: u32,
-    /// Windows and notes for which a task of lower priority had no time.
+    /// Observations for which a task of lower priority had no time.
     pub overruns: u32,
     /// Service frames that were none.
     pub service_errors: u32,
@@ -292,14 +316,6 @@ pub struct LineCounters {
 
 impl LineCounters {
     /// Nothing yet.
-    pub const NONE: Self = Self {
-        sensor_errors: 0,
-        unsent: 0,
-        line_errors: 0,
-        held: 0,
-        fog_errors: 0,
-        overruns: 0,
-        service_errors: 0,
-        frames_lost: 0,
-    };
+    pub const NONE: Self =
+        Self { unsent: 0, line_errors: 0, held: 0, overruns: 0, service_errors: 0, frames_lost: 0 };
 }

@@ -33,10 +33,13 @@
 //! answered by the offset that comes next. Nothing here waits, and all buffers have one size.
 
 pub mod calibrate;
+pub mod crash;
 pub mod device;
 pub mod event;
 pub mod frame;
+pub mod hardware;
 pub mod message;
+pub mod standstill;
 mod text;
 
 pub use device::{Device, Drives, MappedSlots};

@@ -1,7 +1,7 @@
 //! What the board says of itself, in words: for the asking side, the image prints none of it.
 
 use super::calibrate::CalibrationFault;
-use super::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
+use super::event::{EventKind, ResetCause, SensorFault};
 use super::message::{FlashState, Origin};
 use core::fmt::{Display, Formatter, Result};
 
@@ -38,18 +38,6 @@ impl Display for ResetCause {
             Self::Watchdog => "watchdog",
             Self::LowPower => "forbidden low-power mode",
         })
-    }
-}
-
-impl Display for Crash {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let Self { kind, place, count } = self;
-        match kind {
-            CrashKind::Panic => write!(f, "panic in line {place}")?,
-            CrashKind::HardFault => write!(f, "hard fault at {place:#010x}")?,
-            CrashKind::Unhandled(number) => write!(f, "unhandled exception {number} at {place:#010x}")?,
-        }
-        write!(f, ", {count} since power came on")
     }
 }
 

@@ -7,6 +7,7 @@ use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
+use crate::coprocessor;
 use crate::mounting::{Levelling, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
@@ -109,6 +110,22 @@ impl Configuration {
                 .map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
             compensate: self.compensate,
             ..PipelineConfig::DEFAULT
+        }
+    }
+}
+
+impl Configuration {
+    /// Makes the configuration of a coprocessor; the wheels, the clock, the networks and damage found
+    /// at the start are the board's to add.
+    #[must_use]
+    pub fn coprocessor(&self, calibration: &Calibration) -> coprocessor::Config {
+        coprocessor::Config {
+            pipeline: self.pipeline(calibration),
+            // A stored configuration has been checked.
+            can: Config::new(self.can).unwrap_or(Config::DEFAULT),
+            fog_ids: self.fog_ids,
+            fog_expected: self.fog.is_some(),
+            ..coprocessor::Config::DEFAULT
         }
     }
 }

@@ -135,8 +135,6 @@ pub enum StoreError {
     Flash(FlashFault),
     /// No room is left.
     Full,
-    /// The sectors do not hold what they should, even after repair.
-    Corrupt,
     /// A record of another layout.
     Version {
         /// As stored.
@@ -156,7 +154,6 @@ impl core::fmt::Display for StoreError {
             Self::NoFlash => f.write_str("no flash controller answers: nothing can be stored"),
             Self::Flash(fault) => write!(f, "flash: {fault}"),
             Self::Full => f.write_str("no room is left for the record"),
-            Self::Corrupt => f.write_str("the record sectors are damaged"),
             Self::Version { found, expected } => {
                 write!(f, "the record has layout {found}, this firmware reads {expected}")
             }

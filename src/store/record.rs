@@ -126,6 +126,8 @@ enum Place {
 pub struct Store<F> {
     flash: F,
     start: u32,
+    /// Whether flash that reads as zeros was never written, which holds in an emulator without a flash controller.
+    zeros_are_blank: bool,
     /// Sector in use and its generation.
     current: Option<(u32, u32)>,
     /// Where the next record goes, while there is room.
@@ -136,14 +138,17 @@ pub struct Store<F> {
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Looks at two sectors from `start` on (an offset into `flash`). Writes nothing.
+    /// Looks at two sectors from `start` on (an offset into `flash`). Writes nothing. `zeros_are_blank` holds for
+    /// an emulator without a flash controller; a chip's erased flash reads as ones, and sectors of zeros are then
+    /// reported as damaged: a raw image of the flash has overwritten them.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
-    pub fn open(flash: F, start: u32) -> Result<Self, StoreError> {
+    pub fn open(flash: F, start: u32, zeros_are_blank: bool) -> Result<Self, StoreError> {
         const { assert!(F::READ_SIZE <= WORD && WORD.is_multiple_of(F::WRITE_SIZE)) };
+        let (damaged, header_damaged) = (false, false);
         let mut store =
-            Self { flash, start, current: None, free: None, damaged: false, header_damaged: false };
+            Self { flash, start, zeros_are_blank, current: None, free: None, damaged, header_damaged };
         for sector in [0, 1] {
             let generation = store.generation(sector)?;
             let newest = store.current.map(|(_, generation)| generation);
@@ -221,8 +226,7 @@ impl<F: NorFlash> Store<F> {
         let generation = u32::from_le_bytes(self.read(at)?);
         let crc = u32::from_le_bytes(self.read(at + WORD_U32)?);
         let whole = crc == header_crc(generation);
-        // Flash that was never written reads as ones, the emulator's as zeros.
-        let blank = generation == crc && [0, u32::MAX].contains(&crc);
+        let blank = generation == crc && (crc == u32::MAX || self.zeros_are_blank && crc == 0);
         self.header_damaged |= !whole && !blank;
         Ok(whole.then_some(generation))
     }

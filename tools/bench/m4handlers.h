@@ -1,7 +1,12 @@
-/* What exception handlers cost, activation by activation, and how long interrupts are kept off. */
+/* What exception handlers cost, activation by activation, and how long interrupts are kept off.
+ *
+ * With wait states, a handler and a time without interrupts begin with empty caches, as if what ran
+ * before them had left nothing that they use; what a handler preempts finds the caches as it left them.
+ * What it loses there is for the schedule to add: it knows from `fills` whether there is anything. */
 #ifndef M4HANDLERS_H
 #define M4HANDLERS_H
 
+#include "m4flash.h"
 #include "m4insn.h"
 #include <inttypes.h>
 #include <stdio.h>
@@ -22,6 +27,15 @@ struct activations {
     uint64_t runs;
     uint64_t most_insns;
     uint64_t most_cycles;
+    uint64_t most_waited; /* cycles with wait states */
+    uint64_t most_fills;  /* lines of both caches */
+};
+
+/* The cheapest activation; 0: none. */
+struct least {
+    uint64_t cycles;
+    uint64_t waited; /* cycles with wait states */
+    uint64_t fills;  /* of that one */
 };
 
 struct handler {
@@ -29,7 +43,8 @@ struct handler {
     uint32_t start;
     uint32_t end;
     uint32_t data; /* address, or 0: the watched instruction is looked for instead */
-    uint64_t least_cycles;
+    struct least least;
+    struct least least_looking; /* of those in which the second watched instruction ran, not the first */
     struct activations kinds[KINDS];
 };
 
@@ -37,9 +52,12 @@ struct handler {
 struct frame {
     int handler;
     int seen;
+    bool looked; /* the second watched instruction ran */
     uint64_t insns;
     uint64_t cycles;
+    uint64_t waits;
     const struct insn *previous; /* of this handler: what preempts it is left out */
+    struct memory preempted;     /* what it has preempted, as that left it */
 };
 
 /* A time for which interrupts are kept off. */
@@ -47,6 +65,9 @@ struct lock {
     bool held;
     uint64_t cycles;
     uint64_t most;
+    uint64_t waits;
+    uint64_t most_waited; /* cycles with wait states */
+    struct memory memory;
 };
 
 static void keep_most(uint64_t *most, uint64_t count)
@@ -56,9 +77,21 @@ static void keep_most(uint64_t *most, uint64_t count)
     }
 }
 
+static void keep_least(struct least *least, uint64_t cycles, uint64_t waited, uint64_t fills)
+{
+    if (least->cycles == 0 || cycles < least->cycles) {
+        least->cycles = cycles;
+    }
+    if (least->waited == 0 || waited < least->waited) {
+        least->waited = waited;
+        least->fills = fills;
+    }
+}
+
 static struct handler handlers[HANDLERS];
 static int handler_count;
 static uint32_t watched_pc;
+static uint32_t looking_pc;
 
 static struct frame frames[FRAMES];
 static int depth;
@@ -68,11 +101,13 @@ static uint32_t last_end;
 
 static struct lock all_off;
 static struct lock some_off;
+/* What runs now finds this. */
+static struct memory memory;
 static const struct insn *last_insn;
 /* A handler has run: before that the image starts, and may have interrupts off. */
 static bool started;
 
-/* handler=NAME:START:END:DATA or watch=ADDR; anything else is somebody else's. */
+/* handler=NAME:START:END:DATA, watch=ADDR or look=ADDR; anything else is somebody else's. */
 static void take_argument(const char *argument)
 {
     struct handler handler = {0};
@@ -82,6 +117,7 @@ static void take_argument(const char *argument)
         handlers[handler_count++] = handler;
     }
     sscanf(argument, "watch=%" SCNx32, &watched_pc);
+    sscanf(argument, "look=%" SCNx32, &looking_pc);
 }
 
 /* What a translated instruction means to the handlers. */
@@ -133,26 +169,41 @@ static void pop_frame(void)
     const struct frame *frame = &frames[--depth];
     struct handler *handler = &handlers[frame->handler];
     struct activations *kind = &handler->kinds[frame->seen < KINDS ? frame->seen : KINDS - 1];
+    uint64_t waited = frame->cycles + frame->waits;
+    uint64_t fills = memory.instructions.fills + memory.data.fills;
     kind->runs++;
     keep_most(&kind->most_insns, frame->insns);
     keep_most(&kind->most_cycles, frame->cycles);
-    if (handler->least_cycles == 0 || frame->cycles < handler->least_cycles) {
-        handler->least_cycles = frame->cycles;
+    keep_most(&kind->most_waited, waited);
+    keep_most(&kind->most_fills, fills);
+    keep_least(&handler->least, frame->cycles, waited, fills);
+    if (frame->looked && frame->seen == 0) {
+        keep_least(&handler->least_looking, frame->cycles, waited, fills);
     }
+    memory = frame->preempted;
 }
 
 /* An instruction runs that may begin or end a lock: both of them are part of it. */
-static void count_lock(struct lock *lock, unsigned cycles, bool begins, bool ends)
+static void count_lock(struct lock *lock, const struct insn *insn, unsigned cycles, bool begins, bool ends)
 {
-    if (lock->held) {
-        lock->cycles += cycles;
+    if (begins && !lock->held) {
+        *lock = (struct lock){
+            .held = true,
+            .most = lock->most,
+            .most_waited = lock->most_waited,
+            .memory = cold_memory(),
+        };
     }
-    if (ends && lock->held) {
+    if (!lock->held) {
+        return;
+    }
+    lock->cycles += cycles;
+    lock->waits += fetch(&lock->memory, insn->pc, insn->size, cycles) + insn->device_wait;
+    wait_for_device(&lock->memory, insn->device_wait);
+    if (ends) {
         keep_most(&lock->most, lock->cycles);
+        keep_most(&lock->most_waited, lock->cycles + lock->waits);
         lock->held = false;
-    } else if (begins && !lock->held) {
-        lock->held = true;
-        lock->cycles = cycles;
     }
 }
 
@@ -161,29 +212,47 @@ static void count_locks(const struct insn *insn)
     unsigned cycles = cycles_of(insn, last_insn);
     last_insn = insn;
     if (started) {
-        count_lock(&all_off, cycles, insn->lock_change == ALL_OFF, insn->lock_change == ALL_ON);
+        count_lock(&all_off, insn, cycles, insn->lock_change == ALL_OFF, insn->lock_change == ALL_ON);
     }
     /* Only thread mode's. */
     if (depth == 0) {
-        count_lock(&some_off, cycles, insn->lock_change == SOME_OFF, insn->lock_change == SOME_ON);
+        count_lock(&some_off, insn, cycles, insn->lock_change == SOME_OFF, insn->lock_change == SOME_ON);
     }
 }
 
-static void count_frame(const struct insn *insn)
+static void count_frame(const struct insn *insn, unsigned waits)
 {
     struct frame *frame = &frames[depth - 1];
     frame->insns++;
     frame->cycles += cycles_of(insn, frame->previous);
+    frame->waits += waits;
     frame->previous = insn;
     bool by_data = handlers[frame->handler].data != 0;
     if (by_data ? touches_data(insn->pc) : insn->watched) {
         frame->seen++;
     }
+    frame->looked |= looking_pc != 0 && insn->pc == looking_pc;
     leaving = insn->leaves == frame->handler;
 }
 
-/* An instruction runs. */
-static void count_for_handlers(const struct insn *insn)
+/* Data were waited for. */
+static void wait_in_handlers(unsigned waits)
+{
+    if (depth > 0) {
+        frames[depth - 1].waits += waits;
+    }
+}
+
+/* The same, if what is read lies in a cache that is empty when interrupts go off. */
+static void wait_in_lock(struct lock *lock, uint32_t address, unsigned bytes)
+{
+    if (lock->held) {
+        lock->waits += use_data(&lock->memory, address, bytes);
+    }
+}
+
+/* An instruction is to run: handlers that have ended, and one that begins. */
+static void follow_handlers(const struct insn *insn)
 {
     /* A return that is not taken falls through; handlers lie one behind the other, but none falls
      * into the next. */
@@ -192,30 +261,45 @@ static void count_for_handlers(const struct insn *insn)
     }
     leaving = false;
     if (insn->enters != NO_HANDLER && depth < FRAMES) {
-        frames[depth++] = (struct frame){.handler = insn->enters};
+        frames[depth++] = (struct frame){.handler = insn->enters, .preempted = memory};
+        memory = cold_memory();
         started = true;
     }
+}
+
+/* An instruction runs, after so many wait states. */
+static void count_for_handlers(const struct insn *insn, unsigned waits)
+{
     count_locks(insn);
     if (depth > 0) {
-        count_frame(insn);
+        count_frame(insn, waits);
     }
     last_end = insn->pc + insn->size;
 }
 
 static void report_handlers(void)
 {
-    fprintf(stderr, "LOCKED all=%" PRIu64 " some=%" PRIu64 "\n", all_off.most, some_off.most);
+    fprintf(stderr,
+            "LOCKED all=%" PRIu64 " some=%" PRIu64 " all_waited=%" PRIu64 " some_waited=%" PRIu64 "\n",
+            all_off.most, some_off.most, all_off.most_waited, some_off.most_waited);
     for (int k = 0; k < handler_count; k++) {
         const struct handler *handler = &handlers[k];
-        fprintf(stderr, "HANDLER %s least=%" PRIu64 "\n", handler->name, handler->least_cycles);
+        fprintf(stderr,
+                "HANDLER %s least=%" PRIu64 " least_waited=%" PRIu64 " least_fills=%" PRIu64
+                " looking=%" PRIu64 " looking_waited=%" PRIu64 " looking_fills=%" PRIu64 "\n",
+                handler->name, handler->least.cycles, handler->least.waited, handler->least.fills,
+                handler->least_looking.cycles, handler->least_looking.waited,
+                handler->least_looking.fills);
         for (int seen = 0; seen < KINDS; seen++) {
             const struct activations *kind = &handler->kinds[seen];
             if (kind->runs == 0) {
                 continue;
             }
             fprintf(stderr,
-                    "ACTIVATION %s seen=%d runs=%" PRIu64 " insns=%" PRIu64 " cycles=%" PRIu64 "\n",
-                    handler->name, seen, kind->runs, kind->most_insns, kind->most_cycles);
+                    "ACTIVATION %s seen=%d runs=%" PRIu64 " insns=%" PRIu64 " cycles=%" PRIu64
+                    " waited=%" PRIu64 " fills=%" PRIu64 "\n",
+                    handler->name, seen, kind->runs, kind->most_insns, kind->most_cycles,
+                    kind->most_waited, kind->most_fills);
         }
     }
 }

@@ -33,8 +33,10 @@ struct insn {
     bool watched;
     int enters; /* the handler that begins here, or NO_HANDLER */
     int leaves; /* the handler that ends here, or NO_HANDLER */
+    unsigned device_wait; /* once it was seen to access a register */
     const char *text;
     uint64_t executed; /* in the region */
+    uint64_t waited;   /* cycles, in the region */
 };
 
 static uint32_t halfword(const uint8_t *bytes)

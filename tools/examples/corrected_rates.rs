@@ -10,7 +10,7 @@ use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::recording::Recording;
-use gyronet_tools::wheel_rates::WheelRates;
+use gyronet_tools::wheel_frames::WheelFrames;
 use std::error::Error;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let recording = Recording::read(Path::new(&file))?;
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
     // The wheels, where the drive has them, say when it stands still.
-    let wheels = WheelRates::new(&recording);
+    let wheels = WheelFrames::new(&recording);
     let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, wheels, &mut network, || {})?;
 
     println!("t_s,gyro,prompt,navigation,sigma");
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "{:.2},{:.6},{:.6},{},{}",
             step.time.0 as f64 * 1e-6,
             gyro.rad_per_sec(),
-            step.prompt.rate.rad_per_sec(),
+            step.vehicle.prompt.rate.rad_per_sec(),
             navigation.unwrap_or_default(),
             sigma.map(|sigma| format!("{:.6}", sigma.rad_per_sec())).unwrap_or_default(),
         );

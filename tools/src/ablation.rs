@@ -5,10 +5,11 @@ use crate::drive::{Drive, DriveError};
 use crate::methods::with_mode;
 use crate::metrics::{WINDOW, YawError};
 use crate::recording::Recording;
-use crate::wheel_rates::WheelRates;
+use crate::wheel_frames::{self, WheelFrames};
 use gyronet::compensate::{CompensateConfig, Lag, Mode};
+use gyronet::estimate::YawEstimate;
 use gyronet::model::{Estimate, WindowNetwork};
-use gyronet::pipeline::{PipelineConfig, YawRate};
+use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::Standstill;
 use gyronet::units::AngularRate;
 use gyronet::window::Features;
@@ -120,7 +121,7 @@ pub fn run(
     variants
         .iter()
         .filter_map(|Variant { name, config, network: with_network, wheels }| {
-            let wheels = wheels.then(|| WheelRates::new(recording)).flatten();
+            let wheels = wheels.then(|| WheelFrames::new(recording)).flatten();
             let drive = if *with_network {
                 Drive::run(recording, config, wheels, network, &mut tick)
             } else {
@@ -161,12 +162,16 @@ pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
 /// The reference while the wheels stand; `None` without wheels, or where they never do.
 #[must_use]
 pub fn floor(recording: &Recording) -> Option<Floor> {
-    let mut wheels = WheelRates::new(recording)?;
-    let still: Vec<Option<f64>> = recording
-        .rows
-        .iter()
-        .map(|row| row.reference.filter(|_| wheels.at(row).standstill == Standstill::Still))
-        .collect();
+    let (mut frames, mut receiver) = (WheelFrames::new(recording)?, wheel_frames::receiver());
+    let still = recording.rows.iter().map(|row| {
+        let now = row.sample.time;
+        if let Some(frame) = frames.next(row) {
+            let _ = receiver.process(&frame, now);
+        }
+        let stands = receiver.poll(now).is_some_and(|wheels| wheels.standstill == Standstill::Still);
+        row.reference.filter(|_| stands)
+    });
+    let still: Vec<Option<f64>> = still.collect();
     let whole =
         still.chunks_exact(WINDOW).filter_map(|second| second.iter().copied().collect::<Option<Vec<_>>>());
     let means: Vec<f64> = whole.map(|second| second.iter().sum::<f64>() / WINDOW as f64).collect();
@@ -178,7 +183,7 @@ pub fn floor(recording: &Recording) -> Option<Floor> {
     })
 }
 
-fn score(name: &str, rates: &[YawRate], reference: &[f64]) -> Option<Score> {
+fn score(name: &str, rates: &[YawEstimate], reference: &[f64]) -> Option<Score> {
     let rate: Vec<f64> = rates.iter().map(|rate| rate.rate.rad_per_sec()).collect();
     let error = YawError::new(&rate, reference)?;
     let errors: Vec<f64> = rate.iter().zip(reference).map(|(rate, truth)| rate - truth).collect();

@@ -7,12 +7,12 @@
 //!
 //! | word | meaning |
 //! |---|---|
-//! | told | a receiver of our own messages learns of it: quality, fault bits, E2E, silence of 35 ms |
+//! | told | a receiver of our own messages learns of it: quality, fault bits, E2E, silence of 35 ms; with a fibre-optic gyro, of that one's messages |
 //! | marked good | a set of messages that arrives whole, quality good, no fault bit |
 //! | moved | yaw turned in a second, all of it marked good, less the same second of the same drive undamaged, by the accumulated yaw on the bus |
-//! | stated sigma | the expected error that is sent with the last set of that second |
-//! | undetected | yaw has moved by more than the stated sigma, and nothing had told of the fault |
-//! | harmless | nothing told of it, and yaw has not moved by more than the stated sigma |
+//! | limit | the expected error (1 sigma) that is sent with the last set of that second, but at most [`judge::Limits::moved`] |
+//! | undetected | yaw has moved by more than the limit, and nothing had told of the fault |
+//! | harmless | nothing told of it, and yaw has not moved by more than the limit |
 //! | error | yaw turned in a good second less the drive's reference: what is left of it without faults is the method's |
 //! | recovery | from the end of the fault to the last time that a receiver was told |
 //!
@@ -28,20 +28,22 @@ pub mod fault;
 pub mod input;
 pub mod judge;
 pub mod motion;
+pub mod networks;
 pub mod part;
 pub mod plot;
 pub mod receiver;
 pub mod report;
 pub mod scene;
-pub mod upsets;
+pub mod weight_upsets;
 pub mod wire;
 
 use draw::Draw;
 use drive::Drive;
 use exceptions::{Exception, excepted};
 use fault::{Fault, Kind, Span};
-use gyronet::model::{Blob, GyroNet};
+use gyronet::model::Blob;
 use judge::Outcome;
+use networks::Integer;
 use part::Part;
 use scene::{STATE_EVERY, Scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -81,8 +83,8 @@ pub struct Plan {
 pub struct Run {
     /// Its number.
     pub number: usize,
-    /// Number of the drive.
-    pub drive: usize,
+    /// The drive.
+    pub drive: String,
     /// The part.
     pub part: Part,
     /// Where.
@@ -127,10 +129,10 @@ pub fn scenes<'d>(
     on_threads(
         threads,
         of.len(),
-        || GyroNet::new(*blob),
-        |network, n| {
+        || Integer::new(*blob),
+        |networks, n| {
             let (drive, part) = of[n];
-            let scene = Scene::new(drive, part, network);
+            let scene = Scene::new(drive, part, networks);
             tick();
             scene
         },
@@ -143,16 +145,16 @@ pub fn run(plan: Plan, scenes: &[Scene<'_>], blob: &Blob<'_>, tick: impl Fn() + 
     on_threads(
         plan.threads,
         plan.runs,
-        || GyroNet::new(*blob),
-        |network, number| {
-            let run = one(plan.seed, number, scenes, network);
+        || Integer::new(*blob),
+        |networks, number| {
+            let run = one(plan.seed, number, scenes, networks);
             tick();
             run
         },
     )
 }
 
-fn one(seed: u64, number: usize, scenes: &[Scene<'_>], network: &mut GyroNet<'_>) -> Run {
+fn one(seed: u64, number: usize, scenes: &[Scene<'_>], networks: &mut Integer<'_>) -> Run {
     let mut draw = Draw::new(seed, number as u64);
     let at = draw.below(scenes.len());
     let scene = &scenes[at];
@@ -176,12 +178,12 @@ fn one(seed: u64, number: usize, scenes: &[Scene<'_>], network: &mut GyroNet<'_>
         };
         span.to = faults.iter().map(to).max().unwrap_or(span.to).min(span.to);
     }
-    let outcome = catch_unwind(AssertUnwindSafe(|| scene.run(span, &faults, network)));
+    let outcome = catch_unwind(AssertUnwindSafe(|| scene.run(span, &faults, networks)));
     let outcome = outcome.map_err(|panic| {
         let text = panic.downcast_ref::<String>().cloned();
         text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap_or_default()
     });
-    Run { number, drive: at / Part::ALL.len(), part: scene.part, span, faults, outcome }
+    Run { number, drive: scene.drive.name.clone(), part: scene.part, span, faults, outcome }
 }
 
 /// Does `count` things on some threads, each with a tool of its own; gives them in their order.

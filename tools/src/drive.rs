@@ -1,16 +1,15 @@
-//! A recording through the pipeline, as the board would run it.
+//! A recorded drive through the coprocessor, as the board would run it.
 
 use crate::candump::Log;
 use crate::recording::Recording;
-use crate::wheel_rates::WheelRates;
+use crate::wheel_frames::{self, WheelFrames};
 use gyronet::bias::StaticError;
-use gyronet::can::DataFrame;
-use gyronet::can::feeds::Feeds;
+use gyronet::coprocessor::{Clock, Config, Coprocessor, TimedFrame};
+use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::health::{Counters, Status};
 use gyronet::model::WindowNetwork;
-use gyronet::pipeline::{Output, Pipeline, PipelineConfig, YawRate};
+use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, Micros, Yaw};
-use gyronet::vehicle::VehicleSample;
 use std::io::{self, Write};
 use std::ops::Range;
 
@@ -36,23 +35,23 @@ pub enum DriveError {
     },
 }
 
-/// What went out for one row.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The results of one row.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Index of the row in the recording.
     pub row: usize,
     /// The sample's time stamp.
     pub time: Micros,
-    /// Its rate, as sent at once.
-    pub prompt: YawRate,
-    /// Its rate, as sent for navigation some samples later; `None` before static initialisation
-    /// is over, and of the last samples, whose turn never came.
-    pub navigation: Option<YawRate>,
+    /// Everything that was sent with this row.
+    pub vehicle: VehicleSample,
+    /// The navigation rate of this row's sample, which was sent some samples later; `None` before static
+    /// initialisation is over, and for the last samples, whose turn never came.
+    pub navigation: Option<YawEstimate>,
     /// Gyro less static bias less the best estimate of the network, known some samples later;
     /// the prompt rate where no such came.
     pub settled: AngularRate,
-    /// What the messages are made from that went out with this row.
-    pub vehicle: VehicleSample,
+    /// The frames that were sent.
+    pub frames: Vec<TimedFrame>,
 }
 
 /// A drive with its corrected yaw rate.
@@ -66,8 +65,10 @@ pub struct Drive {
     pub gyro_bias: [AngularRate; 3],
     /// What the navigation rates still owe at the end.
     pub owed: Yaw,
-    /// Events.
+    /// The numbers of events.
     pub counters: Counters,
+    /// Messages that reported "failed" because a value did not fit its signal.
+    pub out_of_range: u32,
 }
 
 impl Drive {
@@ -79,49 +80,62 @@ impl Drive {
     pub fn run(
         recording: &Recording,
         config: &PipelineConfig,
-        mut wheels: Option<WheelRates>,
+        mut wheels: Option<WheelFrames>,
         network: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
     ) -> Result<Self, DriveError> {
-        let mut pipeline = Pipeline::new(*config);
+        let mut coprocessor = Coprocessor::new(Config {
+            pipeline: *config,
+            wheels: wheels.as_ref().map(|_| wheel_frames::receiver()),
+            clock: Clock::Sensor,
+            ..Config::DEFAULT
+        });
         let mut steps: Vec<Step> = Vec::with_capacity(recording.rows.len());
-        let mut start = None;
+        let (mut start, mut now) = (None, Micros(0));
         for (index, row) in recording.rows.iter().enumerate() {
             tick();
-            if let Some(wheels) = &mut wheels {
-                pipeline.wheels(wheels.at(row));
+            let time = row.sample.time;
+            now = now.max(time);
+            if let Some(frame) = wheels.as_mut().and_then(|wheels| wheels.next(row)) {
+                // A speed that no frame can hold is not valid, and counted.
+                let _ = coprocessor.can(&frame, now);
             }
-            // What has no place in time gives no frame; the pipeline has counted it.
-            let Ok(output) = pipeline.process(row.sample) else { continue };
-            if let Some(source) = output.refused {
+            // A row whose time stamp has no place on the grid gives no frame, and is counted.
+            let Ok(observation) = coprocessor.imu(row.sample, now) else { continue };
+            if let Some(source) = observation.refused {
                 let path = recording.path.clone();
                 return Err(DriveError::StartsMoving { path, line: row.line, source });
             }
-            if let Some(window) = output.window {
-                pipeline.deliver(window.end, network.estimate(&window.features));
+            let frames = std::iter::from_fn(|| coprocessor.next_frame()).collect();
+            if let Some(window) = coprocessor.window() {
+                let estimate = network.estimate(&window.features);
+                coprocessor.deliver(window.end, estimate).expect("the window that is due");
             }
-            let Output { prompt, navigation, settled, vehicle, .. } = output;
-            if start.is_none() && prompt.status != Status::Init {
+            let vehicle = observation.vehicle;
+            if start.is_none() && vehicle.prompt.status != Status::Init {
                 start = Some(steps.len());
             }
-            let (time, rate) = (row.sample.time, prompt.rate);
-            steps.push(Step { row: index, time, prompt, navigation: None, settled: rate, vehicle });
-            if navigation.status != Status::Init
-                && let Some(step) = earlier(&mut steps, navigation.tick)
+            let settled = vehicle.prompt.rate;
+            steps.push(Step { row: index, time, vehicle, navigation: None, settled, frames });
+            if vehicle.navigation.status != Status::Init
+                && let Some(step) = earlier(&mut steps, vehicle.navigation.tick)
             {
-                step.navigation = Some(navigation);
+                step.navigation = Some(vehicle.navigation);
             }
-            if let Some(settled) = settled
+            if let Some(settled) = observation.settled
                 && let Some(step) = earlier(&mut steps, settled.tick)
             {
                 step.settled = AngularRate(settled.rate.0.saturating_sub(settled.correction.0));
             }
         }
+        let pipeline = coprocessor.pipeline();
         let gyro_bias = pipeline
             .gyro_bias()
             .ok_or_else(|| DriveError::NeverInitialised { path: recording.path.clone() })?;
         let start = start.unwrap_or(steps.len());
-        Ok(Self { steps, start, gyro_bias, owed: pipeline.owed().navigation, counters: *pipeline.counters() })
+        let (owed, counters) = (pipeline.owed().navigation, *pipeline.counters());
+        let out_of_range = coprocessor.input_counters().out_of_range;
+        Ok(Self { steps, start, gyro_bias, owed, counters, out_of_range })
     }
 
     /// The steps that have a navigation rate: from the end of static initialisation on.
@@ -132,7 +146,7 @@ impl Drive {
     }
 
     /// The navigation rates of those.
-    pub fn navigation(&self) -> impl Iterator<Item = YawRate> {
+    pub fn navigation(&self) -> impl Iterator<Item = YawEstimate> {
         self.steps[self.compared()].iter().filter_map(|step| step.navigation)
     }
 
@@ -141,16 +155,19 @@ impl Drive {
         self.steps[self.compared()].iter().map(|step| step.settled)
     }
 
-    /// Writes the messages of the whole drive as a candump log, and says how many they are.
+    /// The frames of the whole drive.
+    pub fn frames(&self) -> impl Iterator<Item = &TimedFrame> {
+        self.steps.iter().flat_map(|step| &step.frames)
+    }
+
+    /// Writes the frames of the whole drive as a candump log, and returns their number.
     ///
     /// # Errors
-    /// What the writer says.
-    pub fn log(&self, feeds: &mut Feeds, out: impl Write) -> io::Result<u64> {
+    /// The writer's error.
+    pub fn log(&self, out: impl Write) -> io::Result<u64> {
         let mut log = Log::new(out);
-        for step in &self.steps {
-            for frame in feeds.process::<DataFrame>(&step.vehicle) {
-                log.frame(step.time, &frame)?;
-            }
+        for TimedFrame { frame, time } in self.frames() {
+            log.frame(*time, frame)?;
         }
         log.finish()
     }
@@ -158,14 +175,15 @@ impl Drive {
     /// How many steps had each status.
     #[must_use]
     pub fn status_counts(&self) -> [(Status, usize); 4] {
-        [Status::Init, Status::Degraded, Status::Ready, Status::Clipped]
-            .map(|status| (status, self.steps.iter().filter(|step| step.prompt.status == status).count()))
+        [Status::Init, Status::Degraded, Status::Ready, Status::Clipped].map(|status| {
+            (status, self.steps.iter().filter(|step| step.vehicle.prompt.status == status).count())
+        })
     }
 }
 
 /// The step of a sample, at most a few back.
 fn earlier(steps: &mut [Step], tick: u32) -> Option<&mut Step> {
-    steps.iter_mut().rev().find(|step| step.prompt.tick == tick)
+    steps.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
 }
 
 #[cfg(test)]
@@ -188,7 +206,11 @@ mod tests {
         let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
         for k in 0..rows {
             let time = 0.01 * (k + usize::from(k >= gap_at)) as f64;
-            writeln!(text, "{time:.2},0,0,9.8,0,0,{}", yaw_rate(k)).unwrap();
+            // Every axis flickers as a sensor does, with mean zero over three rows: equal readings are stuck ones.
+            let noise = ((k % 3) as f64 - 1.0) / 8_192.0;
+            let yaw_rate = yaw_rate(k) + noise;
+            writeln!(text, "{time:.2},{noise},{noise},{},{noise},{noise},{yaw_rate}", 9.8 + 10.0 * noise)
+                .unwrap();
         }
         Recording::parse("a.csv", text.as_bytes()).unwrap()
     }
@@ -201,11 +223,12 @@ mod tests {
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
         let drive = Drive::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
         assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
-        assert_eq!(drive.gyro_bias[2], recording.rows[0].sample.angular_rate[2]);
+        assert_eq!(drive.gyro_bias[2], recording.rows[1].sample.angular_rate[2]);
         // Two estimates of 100 codes: all samples but the last, which no window has covered.
         let sent: i64 = drive.navigation().map(|rate| i64::from(rate.rate.0)).sum();
         assert_eq!((drive.compared(), sent), (300..993, -100 * 693));
-        assert_eq!(drive.owed, Yaw(-100 * 7));
+        // Those seven, and the flicker of the last of them.
+        assert_eq!(drive.owed, Yaw(-100 * 7 - (1 << 14)));
         let [(_, init), (_, degraded), (_, ready), (_, clipped)] = drive.status_counts();
         assert_eq!((init, clipped), (300, 0));
         assert_eq!(degraded + ready, 700);

@@ -1,9 +1,9 @@
 //! FoGNet's f32 checkpoint, as `tools/train` exports it.
 
 use crate::tensors::{CheckpointError, Shape, Tensors, bilstm, dense, tensor};
+use gyronet::fog::seconds::STEPS;
 use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogNetF32;
-use gyronet::seconds::STEPS;
 use std::path::Path;
 
 /// The network's tensors, layer by layer.

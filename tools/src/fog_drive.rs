@@ -1,10 +1,10 @@
 //! A sequence through FoGNet: what the board would send, from the gyro's increments on.
 
 use crate::sequence::{Sequence, Step};
+use gyronet::fog::seconds::FogFrame;
 use gyronet::fog::{FogConfig, FogCorrector, PseudoFog};
 use gyronet::model::fognet::MinuteNetwork;
 use gyronet::sample::RATE_HZ;
-use gyronet::seconds::FogFrame;
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 use gyronet::window::Features;
 
@@ -72,7 +72,7 @@ fn run_with(
         });
         let frame =
             FogFrame { turn: *turn, inertial: inertial.filter(|_| !step.imu_gap), wheels: Some(wheels) };
-        let output = corrector.process(&frame);
+        let output = corrector.correct(&frame);
         if let (Some(number), Some(window)) = (output.due, corrector.window()) {
             let estimate = network.estimate(&window);
             drive.windows += 1;
@@ -119,8 +119,8 @@ fn angle(rad: f64) -> Angle {
 mod tests {
     use super::*;
     use crate::simulate::layout::{self, Layout, Spec};
+    use gyronet::fog::seconds::SecondsWindow;
     use gyronet::model::fognet::FogEstimate;
-    use gyronet::seconds::SecondsWindow;
 
     /// Says that a constant bias and nothing else is wrong.
     struct Bias;

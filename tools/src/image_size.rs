@@ -3,8 +3,9 @@
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
 
-/// What an image with both networks and everything else may take, bytes: flash, static RAM, stack.
-pub const BUDGETS: [u64; 3] = [640 << 10, 48 << 10, 8 << 10];
+/// Limits of an image with both networks and everything else, bytes: flash, static RAM, stack. The stack is deepest at the
+/// start, where the coprocessor is made before any interrupt is on.
+pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 24 << 10];
 
 /// Sizes of one image, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -13,8 +14,10 @@ pub struct ImageSize {
     pub flash: u64,
     /// Of that, the two assembly kernels.
     pub kernels: u64,
-    /// Statics in RAM.
+    /// Statics in SRAM, and the code that runs from there.
     pub static_ram: u64,
+    /// Statics in CCM.
+    pub ccm: u64,
 }
 
 /// Why an image cannot be measured.
@@ -52,11 +55,12 @@ impl ImageSize {
         for section in file.sections() {
             match section.name() {
                 Ok(".vector_table" | ".text" | ".rodata") => size.flash += section.size(),
-                Ok(".data") => {
+                Ok(".data" | ".ram_code") => {
                     size.flash += section.size();
                     size.static_ram += section.size();
                 }
                 Ok(".bss" | ".uninit") => size.static_ram += section.size(),
+                Ok(".ccm") => size.ccm += section.size(),
                 _ => {}
             }
         }

@@ -38,4 +38,4 @@ pub mod tensors;
 pub mod trajectory_error;
 pub mod via;
 pub mod weight_file;
-pub mod wheel_rates;
+pub mod wheel_frames;

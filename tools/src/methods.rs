@@ -3,7 +3,7 @@
 use crate::drive::{Drive, DriveError};
 use crate::fir;
 use crate::recording::Recording;
-use crate::wheel_rates::WheelRates;
+use crate::wheel_frames::WheelFrames;
 use gyronet::compensate::{CompensateConfig, Mode};
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
@@ -169,14 +169,14 @@ impl Rates {
     ) -> Result<Self, DriveError> {
         let start = Instant::now();
         let drive =
-            Drive::run(recording, &PipelineConfig::DEFAULT, WheelRates::new(recording), integer, &mut tick)?;
+            Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), integer, &mut tick)?;
         let run_time = start.elapsed();
         let float =
-            Drive::run(recording, &PipelineConfig::DEFAULT, WheelRates::new(recording), float, &mut tick)?;
+            Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), float, &mut tick)?;
         let newest =
-            Drive::run(recording, &with_mode(Mode::Newest), WheelRates::new(recording), integer, &mut tick)?;
+            Drive::run(recording, &with_mode(Mode::Newest), WheelFrames::new(recording), integer, &mut tick)?;
         let middle =
-            Drive::run(recording, &with_mode(Mode::Middle), WheelRates::new(recording), integer, &mut tick)?;
+            Drive::run(recording, &with_mode(Mode::Middle), WheelFrames::new(recording), integer, &mut tick)?;
         let compared = || drive.steps[drive.compared()].iter();
         let [.., bias] = drive.gyro_bias;
         let gyro = |row: usize| yaw_rate(&recording.rows[row].sample);
@@ -192,7 +192,7 @@ impl Rates {
             Method::Middle => settled(&middle),
             Method::GyronetF32 => settled(&float),
             Method::GyronetInt => settled(&drive),
-            Method::Prompt => compared().map(|step| step.prompt.rate.rad_per_sec()).collect(),
+            Method::Prompt => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
             Method::Default => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
         });
         let first = recording.rows.first().map_or(0, |row| row.sample.time.0);

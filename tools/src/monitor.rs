@@ -15,7 +15,7 @@ use embedded_can::{Frame, Id};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
 use gyronet::can::e2e::{Fault, Sequence, Verdict};
-use gyronet::can::fog_feed::FogFeed;
+use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::j1939::{VDC2_PGN, Vdc2};
 use gyronet::can::yaw::FOG_IDS;
 use yaw_set::{Part, YawSet};
@@ -72,7 +72,7 @@ impl Monitor {
     pub fn new(config: &Config) -> Self {
         Self {
             own_set: config.settings().yaw.map(|yaw| YawSet::new(yaw.ids, yaw.e2e.profiles())),
-            fog_set: YawSet::new(FOG_IDS, FogFeed::profiles(FOG_IDS)),
+            fog_set: YawSet::new(FOG_IDS, FogEncoder::profiles(FOG_IDS)),
             bosch: [Sequence::new(16, MAX_DELTA); LAYOUTS.len()],
             pace: None,
             frames_per_second: None,

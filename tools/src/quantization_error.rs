@@ -1,8 +1,8 @@
 //! What quantisation adds: integer network against f32 network, window by window.
 
+use gyronet::fog::seconds::SecondsWindow;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::{Estimate, WindowNetwork};
-use gyronet::seconds::SecondsWindow;
 use gyronet::window::{Features, WINDOW};
 
 /// Runs two networks on every window, passes on the first one's estimate and sums up how far

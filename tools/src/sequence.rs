@@ -22,7 +22,7 @@ pub use summary::{Seen, Spread, StreamSummary};
 use crate::metrics::DT;
 use crate::recording::{Recording, Row as RecordingRow};
 use crate::simulate::layout::{Layout, MARKER, Spec};
-use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 use std::cell::Cell;
 use std::fs;
@@ -231,7 +231,7 @@ impl Sequence {
                 specific_force: [fx.ok()?, fy.ok()?, fz.ok()?],
                 angular_rate: [wx.ok()?, wy.ok()?, wz.ok()?],
                 temperature: None,
-                clipped: false,
+                validity: Validity::Good,
             };
             let [left, right] = self.wheel_rates(step).map(Some);
             let wheels = [None, right, None, left];

@@ -8,20 +8,16 @@
 
 use crate::monitor::{Counts, Monitor};
 use crate::simulate::{Config as Simulated, Sample, Simulation};
-use gyronet::can::DataFrame;
-use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
+use crate::wheel_frames;
 use gyronet::can::slcan::emit_stamped;
-use gyronet::guard::Guard;
+use gyronet::coprocessor::{Config, Coprocessor};
 use gyronet::health::{Counters, Status, WatchCounters};
 use gyronet::model::WindowNetwork;
-use gyronet::pipeline::PipelineConfig;
-use gyronet::sample::{PERIOD_US, RATE_HZ, Standstill, WHEELS, WheelSample};
-
+use gyronet::sample::{PERIOD_US, RATE_HZ, WHEELS};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config, OutputRate};
 use gyronet::sensor::xsens::{MtData2, Mti};
-use gyronet::units::{Micros, WheelSpeed, Yaw};
+use gyronet::units::{Micros, Yaw};
 use serde::Serialize;
 use std::fmt;
 
@@ -29,7 +25,7 @@ use std::fmt;
 const TICKS: u32 = (PERIOD_US / 100) as u32;
 /// Self-test passed, filter valid.
 const GOOD: u32 = 3;
-/// Frames of a sample with the settings of [`Config::DEFAULT`].
+/// Frames of a sample with the messages of [`Config::DEFAULT`].
 const FRAMES: u64 = 6;
 /// Samples until the first one that is corrected, with something to spare.
 const INITIALISED: u32 = 100 * RATE_HZ;
@@ -43,7 +39,7 @@ pub struct Soak {
     pub samples: u32,
     /// What the pipeline counted.
     pub pipeline: Counters,
-    /// What the watch over the sensor counted.
+    /// What the sensor monitor counted.
     pub watch: WatchCounters,
     /// What the receiver counted.
     pub receiver: Counts,
@@ -89,8 +85,7 @@ pub fn run(samples: u32, network: &mut impl WindowNetwork, mut tick: impl FnMut(
 struct Drive {
     mti: Mti,
     gyro: Dsp1760,
-    guard: Guard,
-    feeds: Feeds,
+    coprocessor: Coprocessor,
     monitor: Monitor,
     /// First values of the part's ticks, the board's clock, the gyro's clock.
     starts: [u32; 3],
@@ -111,9 +106,11 @@ impl Drive {
         Self {
             mti: Mti::new(),
             gyro: Dsp1760::new(Dsp1760Config { rate, ..Dsp1760Config::DEFAULT }),
-            guard: Guard::new(PipelineConfig::DEFAULT),
-            feeds: Feeds::new(Config::DEFAULT),
-            monitor: Monitor::new(&Config::DEFAULT),
+            coprocessor: Coprocessor::new(Config {
+                wheels: Some(wheel_frames::receiver()),
+                ..Config::DEFAULT
+            }),
+            monitor: Monitor::new(&Config::DEFAULT.can),
             starts: [
                 0u32.wrapping_sub(half.wrapping_mul(TICKS)),
                 0u32.wrapping_sub(micros),
@@ -144,26 +141,26 @@ impl Drive {
         self.gyro(k, sample);
 
         let now = Micros(u64::from(self.starts[1]) + u64::from(k) * PERIOD_US + 1_000);
-        let speed = WheelSpeed((sample.speed * f64::from(1u32 << WheelSpeed::FRACTION_BITS)) as i32);
-        let standstill = if speed == WheelSpeed(0) { Standstill::Still } else { Standstill::Moving };
-        self.guard.wheels(WheelSample { time: received.time, speeds: [Some(speed); WHEELS], standstill });
-        let output = self.guard.process(received, now).expect("a place on the grid");
-        if let Some(due) = &output.window {
-            self.guard.pipeline().deliver(due.end, network.estimate(&due.features));
+        let wheels = wheel_frames::frame([Some(3.6 * sample.speed); WHEELS]).expect("four speeds");
+        self.coprocessor.can(&wheels, now).expect("a good wheel frame");
+        let vehicle = self.coprocessor.imu(received, now).expect("a place on the grid").vehicle;
+        if let Some(due) = self.coprocessor.window() {
+            let estimate = network.estimate(&due.features);
+            self.coprocessor.deliver(due.end, estimate).expect("the window that is due");
         }
-        match output.prompt.status {
+        match vehicle.prompt.status {
             Status::Init => self.statuses[0] += 1,
             Status::Degraded => self.statuses[1] += 1,
             Status::Ready => self.statuses[2] += 1,
-            // Counted by the watch.
+            // Counted by the sensor monitor.
             _ => {}
         }
-        for frame in self.feeds.process::<DataFrame>(&output.vehicle) {
-            let line = emit_stamped(&frame, received.time).expect("a data frame");
+        while let Some(sent) = self.coprocessor.next_frame() {
+            let line = emit_stamped(&sent.frame, sent.time).expect("a data frame");
             let line = std::str::from_utf8(&line).expect("ASCII").trim_end();
             self.monitor.take_line(line, 0.0);
         }
-        let yaw = output.vehicle.yaw.yaw;
+        let yaw = vehicle.navigation.yaw;
         self.yaw = Some((self.yaw.map_or(yaw, |(first, _)| first), yaw));
         self.turned += sample.reference[2].abs() / f64::from(RATE_HZ);
     }
@@ -191,14 +188,14 @@ impl Drive {
         }
     }
 
-    fn finish(mut self, samples: u32, early: Option<u64>) -> Soak {
+    fn finish(self, samples: u32, early: Option<u64>) -> Soak {
         let wraps = |start: u32, span: u64| ((u64::from(start) + u64::from(samples - 1) * span) >> 32) as u32;
         let [ticks, board, gyro] = self.starts;
         let (first, last) = self.yaw.unwrap_or_default();
         Soak {
             samples,
-            pipeline: *self.guard.pipeline().counters(),
-            watch: *self.guard.counters(),
+            pipeline: *self.coprocessor.pipeline().counters(),
+            watch: *self.coprocessor.monitor_counters(),
             receiver: self.monitor.counts,
             statuses: self.statuses,
             clock_error_us: self.clock_error_us,

@@ -18,8 +18,8 @@ const LIMIT: Duration = Duration::from_secs(900);
 const POLL: Duration = Duration::from_millis(5);
 /// The images that count, one after the other.
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
-/// The image that is flashed.
-const FLASHED: &str = "coprocessor";
+/// The images that are flashed.
+const FLASHED: [&str; 2] = ["coprocessor", "bringup"];
 /// The emulated board.
 pub const MACHINE: &str = "netduinoplus2";
 /// The image's target.
@@ -62,8 +62,10 @@ pub struct Count {
     pub name: String,
     /// Executed instructions.
     pub instructions: u64,
-    /// Modelled Cortex-M4 cycles, with the plugin.
+    /// Modelled Cortex-M4 cycles at zero wait states, with the plugin.
     pub cycles: Option<u64>,
+    /// The same on an STM32F405 at 168 MHz: flash with 5 wait states, empty caches at the start.
+    pub cycles_5ws: Option<u64>,
     /// Bytes of stack below the caller.
     pub stack: u64,
 }
@@ -152,18 +154,26 @@ pub fn target_installed() -> Result<(), String> {
     }
 }
 
-/// Builds an image of the firmware under `folder` and returns where it lies.
+/// Builds an image of the firmware for the emulated board under `folder` and returns where it lies.
 ///
 /// # Errors
 /// [`BenchError`] with the compiler's output.
 pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
+    build_for("netduino-plus-2", workspace, image, folder)
+}
+
+/// Builds an image for a board, named by its feature.
+///
+/// # Errors
+/// [`BenchError`] with the compiler's output.
+pub fn build_for(board: &str, workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
     cargo.current_dir(workspace).args(["build", "--release", "--quiet", "-p", "gyronet", "--bin", image]);
-    if image == FLASHED {
-        // As `cargo fw` does.
+    if FLASHED.contains(&image) {
+        // As `cargo fw` and `cargo bringup` do.
         cargo.args(["--config", "profile.release.opt-level='s'"]);
     }
-    cargo.args(["--features", "firmware", "--target", TARGET, "--target-dir"]).arg(folder);
+    cargo.args(["--features", board, "--target", TARGET, "--target-dir"]).arg(folder);
     run(&mut cargo)?;
     Ok(folder.join(TARGET).join("release").join(image))
 }
@@ -178,6 +188,29 @@ pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
         Some(plugin) => count(image, Some(&plugin)).or_else(|_| count(image, None)),
         None => count(image, None),
     }
+}
+
+/// What ST's manual leaves open of the flash accelerator, or what if it were wrong: a name, and the
+/// counter's options for it. The first one is the model's.
+pub const POLICIES: [(&str, &str); 4] = [
+    ("least recently used", ""),
+    ("first in, first out", ",policy=fifo"),
+    ("prefetched lines kept", ",prefetched=kept"),
+    ("both", ",policy=fifo,prefetched=kept"),
+];
+
+/// Counts of the bench image under each of [`POLICIES`].
+///
+/// # Errors
+/// [`BenchError`], also where there is no C compiler.
+pub fn measure_policies(workspace: &Path, image: &Path) -> Result<Vec<Counts>, BenchError> {
+    let plugin = plugin(workspace).ok_or_else(|| BenchError::Line("no instruction counter".into()))?;
+    let counts = POLICIES.iter().map(|(_, options)| {
+        let mut plugin = plugin.clone().into_os_string();
+        plugin.push(options);
+        count(image, Some(Path::new(&plugin)))
+    });
+    counts.collect()
 }
 
 /// Compiles the instruction counter; `None` where there is no C compiler.
@@ -211,11 +244,14 @@ fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
         let (instructions, cycles) = if plugin.is_some() {
             let region = regions.next().ok_or_else(unexpected)?;
             let instructions = field(region, "insns=").ok_or_else(unexpected)?;
-            (instructions, Some(field(region, "m4cycles~").ok_or_else(unexpected)?))
+            let cycles = field(region, "m4cycles~").ok_or_else(unexpected)?;
+            let waited = field(region, "waited~").ok_or_else(unexpected)?;
+            (instructions, Some((cycles, waited)))
         } else {
             (field(line, "ticks=").ok_or_else(unexpected)? * 1000 / TICKS_PER_1000, None)
         };
-        counts.regions.push(Count { name: name.to_owned(), instructions, cycles, stack });
+        let (cycles, cycles_5ws) = cycles.unzip();
+        counts.regions.push(Count { name: name.to_owned(), instructions, cycles, cycles_5ws, stack });
     }
     Ok(counts)
 }

@@ -19,10 +19,64 @@ pub const KINDS: usize = 5;
 pub struct Tasks {
     /// Its handlers.
     pub handlers: Vec<Handler>,
-    /// Modelled cycles for which all interrupts were off, at worst.
-    pub all_off: u64,
-    /// Modelled cycles for which idle kept the output task out, at worst.
-    pub some_off: u64,
+    /// For which all interrupts were off, at worst.
+    pub all_off: Cycles,
+    /// For which idle kept the output task out, at worst.
+    pub some_off: Cycles,
+}
+
+/// Modelled cycles: the largest at zero wait states, and the largest on an STM32F405 at 168 MHz.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Cycles {
+    /// At zero wait states.
+    pub zero: u64,
+    /// With flash at 5 wait states and empty caches at the start.
+    pub five: u64,
+}
+
+/// The cheapest of some activations, preemption left out; zero: there was none.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Least {
+    /// Of that one.
+    pub cycles: Cycles,
+    /// Lines that it has put into the caches.
+    pub fills: u64,
+}
+
+impl std::fmt::Display for Least {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} fills={}", self.cycles, self.fills)
+    }
+}
+
+impl Cycles {
+    /// The larger one of each.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self { zero: self.zero.max(other.zero), five: self.five.max(other.five) }
+    }
+}
+
+impl std::ops::Add for Cycles {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { zero: self.zero + other.zero, five: self.five + other.five }
+    }
+}
+
+impl std::ops::Mul<u64> for Cycles {
+    type Output = Self;
+
+    fn mul(self, times: u64) -> Self {
+        Self { zero: self.zero * times, five: self.five * times }
+    }
+}
+
+impl std::fmt::Display for Cycles {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "cycles={} cycles_5ws={}", self.zero, self.five)
+    }
 }
 
 /// One interrupt handler of the image.
@@ -34,8 +88,10 @@ pub struct Handler {
     pub priority: u8,
     /// Of each kind, the worst.
     pub activations: [Option<Activation>; KINDS],
-    /// Modelled cycles of the cheapest activation.
-    pub least: u64,
+    /// The cheapest activation.
+    pub least: Least,
+    /// The cheapest one that looks at every line and processes no sample, where there is one.
+    pub looking: Least,
     /// Halfwords of its code, what it calls left out.
     pub code: u64,
 }
@@ -47,24 +103,29 @@ pub struct Activation {
     pub runs: u64,
     /// Instructions of the longest one.
     pub instructions: u64,
-    /// Modelled cycles of the most expensive one.
-    pub cycles: u64,
+    /// Of the most expensive one.
+    pub cycles: Cycles,
+    /// Lines that the one with most has put into the caches.
+    pub fills: u64,
 }
 
 impl std::fmt::Display for Handler {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "task/{} priority={}", self.name, self.priority)?;
-        if self.least == 0 {
+        if self.least.cycles.zero == 0 {
             write!(f, " runs=0")?;
         }
         for (kind, activation) in self.activations.iter().enumerate() {
-            if let Some(Activation { runs, instructions, cycles }) = activation {
+            if let Some(Activation { runs, instructions, cycles, fills }) = activation {
                 let more = if kind == KINDS - 1 { "+" } else { "" };
-                write!(f, " [{kind}{more}: runs={runs} instructions={instructions} cycles={cycles}]")?;
+                write!(f, " [{kind}{more}: runs={runs} instructions={instructions} {cycles} fills={fills}]")?;
             }
         }
-        if self.least > 0 {
-            write!(f, " least={}", self.least)?;
+        if self.least.cycles.zero > 0 {
+            write!(f, " least: {}", self.least)?;
+        }
+        if self.looking.cycles.zero > 0 {
+            write!(f, " looking: {}", self.looking)?;
         }
         Ok(())
     }
@@ -73,11 +134,7 @@ impl std::fmt::Display for Handler {
 impl std::fmt::Display for Tasks {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.handlers.iter().try_for_each(|handler| writeln!(f, "{handler}"))?;
-        write!(
-            f,
-            "interrupts off: cycles={}; output kept out by idle: cycles={}",
-            self.all_off, self.some_off
-        )
+        write!(f, "interrupts off: {}; output kept out by idle: {}", self.all_off, self.some_off)
     }
 }
 
@@ -86,10 +143,10 @@ impl std::fmt::Display for Tasks {
 /// # Errors
 /// [`BenchError`], also when the image does not answer.
 pub fn measure(image: &Path, plugin: &Path) -> Result<Tasks, BenchError> {
-    let Symbols { handlers, watched } = Symbols::read(image).map_err(BenchError::Line)?;
-    let mut options = format!("{},watch={watched:x}", plugin.display());
+    let Symbols { handlers, watched, looking } = Symbols::read(image).map_err(BenchError::Line)?;
+    let mut options = format!("{},watch={watched:x},look={looking:x}", plugin.display());
     handlers.iter().for_each(|(_, option)| options += option);
-    let (mut all_off, mut some_off) = (0, 0);
+    let (mut all_off, mut some_off) = (Cycles::default(), Cycles::default());
     let mut found: Vec<Handler> = handlers.into_iter().map(|(handler, _)| handler).collect();
     let failed = |error: EmulatorError| BenchError::Failed {
         program: image.display().to_string(),
@@ -100,15 +157,25 @@ pub fn measure(image: &Path, plugin: &Path) -> Result<Tasks, BenchError> {
         let (what, rest) = line.split_once(' ').unwrap_or_default();
         let number = |key| field(line, key).ok_or_else(|| BenchError::Line(line.to_owned()));
         if what == "LOCKED" {
-            (all_off, some_off) = (number("all=")?, number("some=")?);
+            all_off = Cycles { zero: number("all=")?, five: number("all_waited=")? };
+            some_off = Cycles { zero: number("some=")?, five: number("some_waited=")? };
         }
         let name = rest.split(' ').next().unwrap_or_default();
         let Some(handler) = found.iter_mut().find(|handler| handler.name == name) else { continue };
         if what == "HANDLER" {
-            handler.least = number("least=")?;
+            let least = |zero, five, fills| {
+                let cycles = Cycles { zero: number(zero)?, five: number(five)? };
+                Ok::<_, BenchError>(Least { cycles, fills: number(fills)? })
+            };
+            handler.least = least("least=", "least_waited=", "least_fills=")?;
+            handler.looking = least("looking=", "looking_waited=", "looking_fills=")?;
         } else if let Some(activation) = handler.activations.get_mut(number("seen=")? as usize) {
-            let (runs, instructions, cycles) = (number("runs=")?, number("insns=")?, number("cycles=")?);
-            *activation = Some(Activation { runs, instructions, cycles });
+            *activation = Some(Activation {
+                runs: number("runs=")?,
+                instructions: number("insns=")?,
+                cycles: Cycles { zero: number("cycles=")?, five: number("waited=")? },
+                fills: number("fills=")?,
+            });
         }
     }
     Ok(Tasks { handlers: found, all_off, some_off })

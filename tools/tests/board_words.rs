@@ -2,6 +2,7 @@
 
 use gyronet::health::Status;
 use gyronet::service::calibrate::CalibrationFault;
+use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
 use gyronet::service::message::{FlashState, Origin};
 use gyronet::store::slots::{Slot, SlotError, WeightSource};
@@ -16,8 +17,8 @@ fn states_are_sentences() {
          at 250000 bit/s"
     );
     assert_eq!(
-        FlashState::Failed(StoreError::Corrupt).to_string(),
-        "cannot be read: the record sectors are damaged"
+        FlashState::Failed(StoreError::Full).to_string(),
+        "cannot be read: no room is left for the record"
     );
     assert_eq!(WeightSource::Slot(Slot::B).to_string(), "slot B");
     for (fault, part) in [
@@ -42,10 +43,26 @@ fn calibrations_name_the_axis() {
 
 #[test]
 fn events_are_sentences() {
-    let crash = Crash { kind: CrashKind::HardFault, place: 0x0800_1234, count: 2 };
+    let crash = Crash {
+        kind: CrashKind::HardFault,
+        place: 0x0800_1234,
+        link: 0x0800_5679,
+        status: 0x8200,
+        address: 0x1FFF_FFF8,
+        file: [0; FILE],
+        count: 2,
+    };
+    let panic = Crash { kind: CrashKind::Panic, place: 12, file: *b"coprocessor/src/main.rs\0", ..crash };
     for (kind, due) in [
         (EventKind::Started(ResetCause::PowerOn), "started by power on"),
-        (EventKind::Crashed(crash), "crashed before: hard fault at 0x08001234, 2 since power came on"),
+        (
+            EventKind::Crashed(crash),
+            "crashed before: hard fault at 0x08001234, called from 0x08005679, CFSR 0x00008200, address 0x1ffffff8, 2 since power came on",
+        ),
+        (
+            EventKind::Crashed(panic),
+            "crashed before: panic in line 12 of coprocessor/src/main.rs, 2 since power came on",
+        ),
         (EventKind::SlotRefused(Slot::A, SlotError::Empty), "slot A not used: the slot is empty"),
         (EventKind::Status(Status::Init), "status: initialising, no bias yet"),
         (

@@ -2,12 +2,12 @@
 
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
-use gyronet::can::fog_feed::FogFeed;
+use gyronet::can::encoder::CanEncoder;
+use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::slcan;
 use gyronet::can::yaw::FOG_IDS;
+use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
-use gyronet::vehicle::{PromptSample, VehicleSample, YawSample};
 use gyronet_tools::candump::Log;
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -17,15 +17,15 @@ use std::time::Instant;
 
 /// Frames of so many samples at 1 deg/s.
 fn frames(samples: u32) -> Vec<DataFrame> {
-    let mut feeds = Feeds::new(Config::DEFAULT);
+    let mut encoder = CanEncoder::new(Config::DEFAULT);
     let rate = AngularRate::from_rad_per_sec(1_f32.to_radians()).unwrap();
     let sample = |tick: u32| VehicleSample {
-        prompt: PromptSample { rate, quality: gyronet::health::Quality::Good },
-        yaw: YawSample {
+        prompt: YawEstimate { rate, quality: gyronet::health::Quality::Good, ..YawEstimate::default() },
+        navigation: YawEstimate {
             rate,
             yaw: Yaw(i64::from(rate.0) * i64::from(tick)),
             quality: gyronet::health::Quality::Good,
-            ..YawSample::default()
+            ..YawEstimate::default()
         },
         roll_rate: AngularRate::ZERO,
         pitch_rate: AngularRate::ZERO,
@@ -33,7 +33,7 @@ fn frames(samples: u32) -> Vec<DataFrame> {
         temperature: None,
         tick,
     };
-    (0..samples).flat_map(|tick| feeds.process::<DataFrame>(&sample(tick))).collect()
+    (0..samples).flat_map(|tick| encoder.encode(&sample(tick))).collect()
 }
 
 fn file(name: &str, content: &[u8]) -> PathBuf {
@@ -95,16 +95,16 @@ fn a_log_is_summed_up_and_tabled() {
 
 #[test]
 fn a_fibre_optic_gyro_is_a_second_block() {
-    let mut feed = FogFeed::new(FOG_IDS);
+    let mut feed = FogEncoder::new(FOG_IDS);
     let rate = AngularRate::from_rad_per_sec(2_f32.to_radians()).unwrap();
-    let sample = |tick: i64| YawSample {
+    let sample = |tick: i64| YawEstimate {
         rate,
         yaw: Yaw(i64::from(rate.0) * tick),
         quality: gyronet::health::Quality::Good,
-        ..YawSample::default()
+        ..YawEstimate::default()
     };
     let mut all = frames(100);
-    all.extend((0..100).flat_map(|tick| feed.process::<DataFrame>(&sample(tick))));
+    all.extend((0..100).flat_map(|tick| feed.encode(&sample(tick))));
     // An angle of it.
     all.remove(600 + 3 * 50 + 1);
     let log = log("fog.log", &all);

@@ -14,76 +14,78 @@ pub mod synthetic;
 #[path = "../../src/wire.rs"]
 pub mod wire;
 
-#[path = "../../tests/adis16465.rs"]
+#[path = "../../tests/library/adis16465.rs"]
 mod adis16465;
-#[path = "../../tests/align_faults.rs"]
+#[path = "../../tests/library/align_faults.rs"]
 mod align_faults;
-#[path = "../../tests/bosch_set.rs"]
+#[path = "../../tests/library/bosch_set.rs"]
 mod bosch_set;
-#[path = "../../tests/bosch_tx1.rs"]
+#[path = "../../tests/library/bosch_tx1.rs"]
 mod bosch_tx1;
-#[path = "../../tests/can_config.rs"]
+#[path = "../../tests/library/can_config.rs"]
 mod can_config;
-#[path = "../../tests/can_dbc.rs"]
+#[path = "../../tests/library/can_dbc.rs"]
 mod can_dbc;
-#[path = "../../tests/carry.rs"]
+#[path = "../../tests/library/carry.rs"]
 mod carry;
-#[path = "../../tests/e2e.rs"]
+#[path = "../../tests/library/clock_ratio.rs"]
+mod clock_ratio;
+#[path = "../../tests/library/e2e.rs"]
 mod e2e;
-#[path = "../../tests/framer.rs"]
+#[path = "../../tests/library/framer.rs"]
 mod framer;
-#[path = "../../tests/guard.rs"]
-mod guard;
-#[path = "../../tests/icm42688.rs"]
+#[path = "../../tests/library/icm42688.rs"]
 mod icm42688;
-#[path = "../../tests/j1939.rs"]
+#[path = "../../tests/library/j1939.rs"]
 mod j1939;
-#[path = "../../tests/kvh_dsp1760.rs"]
+#[path = "../../tests/library/kvh_dsp1760.rs"]
 mod kvh_dsp1760;
-#[path = "../../tests/kvh_dsp3000.rs"]
+#[path = "../../tests/library/kvh_dsp3000.rs"]
 mod kvh_dsp3000;
-#[path = "../../tests/pipeline.rs"]
+#[path = "../../tests/library/pipeline.rs"]
 mod pipeline;
-#[path = "../../tests/pipeline_estimates.rs"]
+#[path = "../../tests/library/pipeline_estimates.rs"]
 mod pipeline_estimates;
-#[path = "../../tests/pipeline_wheels.rs"]
+#[path = "../../tests/library/pipeline_wheels.rs"]
 mod pipeline_wheels;
-#[path = "../../tests/sensor_damage.rs"]
+#[path = "../../tests/library/sensor_damage.rs"]
 mod sensor_damage;
-#[path = "../../tests/sensor_serial.rs"]
+#[path = "../../tests/library/sensor_monitor.rs"]
+mod sensor_monitor;
+#[path = "../../tests/library/sensor_serial.rs"]
 mod sensor_serial;
-#[path = "../../tests/slcan.rs"]
+#[path = "../../tests/library/slcan.rs"]
 mod slcan;
-#[path = "../../tests/slcan_command.rs"]
+#[path = "../../tests/library/slcan_command.rs"]
 mod slcan_command;
-#[path = "../../tests/slcan_port.rs"]
+#[path = "../../tests/library/slcan_port.rs"]
 mod slcan_port;
-#[path = "../../tests/supervisor.rs"]
+#[path = "../../tests/library/supervisor.rs"]
 mod supervisor;
-#[path = "../../tests/transmit_queue.rs"]
+#[path = "../../tests/library/transmit_queue.rs"]
 mod transmit_queue;
-#[path = "../../tests/wheel_input.rs"]
+#[path = "../../tests/library/wheel_input.rs"]
 mod wheel_input;
-#[path = "../../tests/xsens.rs"]
+#[path = "../../tests/library/xsens.rs"]
 mod xsens;
-#[path = "../../tests/xsens_config.rs"]
+#[path = "../../tests/library/xsens_config.rs"]
 mod xsens_config;
-#[path = "../../tests/xsens_formats.rs"]
+#[path = "../../tests/library/xsens_formats.rs"]
 mod xsens_formats;
-#[path = "../../tests/xsens_stream.rs"]
+#[path = "../../tests/library/xsens_stream.rs"]
 mod xsens_stream;
-#[path = "../../tests/yaw_feed.rs"]
-mod yaw_feed;
+#[path = "../../tests/library/yaw_encoder.rs"]
+mod yaw_encoder;
 
 // What the networks do with words, for Miri alone.
 #[cfg(miri)]
-#[path = "../../tests/blob.rs"]
+#[path = "../../tests/library/blob.rs"]
 mod blob;
 #[cfg(miri)]
-#[path = "../../tests/fognet_blob.rs"]
+#[path = "../../tests/library/fognet_blob.rs"]
 mod fognet_blob;
 #[cfg(miri)]
-#[path = "../../tests/lstm_exact.rs"]
+#[path = "../../tests/library/lstm_exact.rs"]
 mod lstm_exact;
 #[cfg(miri)]
 #[path = "../../src/packing.rs"]

@@ -4,11 +4,8 @@ use super::ram_flash::RamFlash;
 use super::{Seed, byte, take};
 use crate::synthetic::turning;
 use embedded_storage::nor_flash::ReadNorFlash;
-use gyronet::can::DataFrame;
-use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
+use gyronet::Coprocessor;
 use gyronet::model::blob::CRC;
-use gyronet::pipeline::Pipeline;
 use gyronet::store::{Accepted, Calibration, Configuration, Level, Record, Store};
 use gyronet::units::{AngularRate, CentiCelsius};
 
@@ -21,7 +18,7 @@ type Flash = RamFlash<SECTOR>;
 /// ranges and fit to be run with, and what is stored is read again.
 pub fn flash(mut data: &[u8]) {
     let flash = if byte(&mut data) & 1 == 0 { Flash::new(data) } else { Flash::new(&fitting(data)) };
-    let mut store = Store::open(flash, 0).expect("the flash answers");
+    let mut store = Store::open(flash, 0, false).expect("the flash answers");
     let calibration = store.get::<Calibration>().ok().flatten().unwrap_or_default();
     calibration.check().expect("what is read was checked");
     for temperature in [i16::MIN, 0, 2_500, i16::MAX] {
@@ -37,13 +34,13 @@ pub fn flash(mut data: &[u8]) {
     }
 }
 
-/// A few samples through a pipeline and its messages.
+/// A few samples through a coprocessor with this configuration.
 fn run(configuration: &Configuration, calibration: &Calibration) {
-    let mut pipeline = Pipeline::new(configuration.pipeline(calibration));
-    let mut feeds = Feeds::new(Config::new(configuration.can).expect("checked with the rest"));
+    let mut coprocessor = Coprocessor::new(configuration.coprocessor(calibration));
     for tick in 0..3 {
-        let output = pipeline.process(turning(tick, AngularRate(1_000))).expect("a place on the grid");
-        let _ = feeds.process::<DataFrame>(&output.vehicle);
+        let sample = turning(tick, AngularRate(1_000));
+        coprocessor.imu(sample, sample.time).expect("a place on the grid");
+        while coprocessor.next_frame().is_some() {}
     }
 }
 
@@ -71,12 +68,12 @@ pub fn seeds() -> Vec<Seed> {
     calibration.add_bias([AngularRate(5), AngularRate(-5), AngularRate(7)], Some(CentiCelsius(2_500)));
     calibration.add_bias([AngularRate(6), AngularRate(-6), AngularRate(8)], Some(CentiCelsius(4_500)));
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
-    let mut store = Store::open(Flash::new(&[]), 0).expect("the flash answers");
+    let mut store = Store::open(Flash::new(&[]), 0, false).expect("the flash answers");
     store.set(&configuration).and_then(|()| store.set(&calibration)).expect("there is room");
     // The first sector, as the flash has it.
     let mut raw = vec![0; 1 + SECTOR];
     let mut flash = Flash::new(&[]);
-    let mut store = Store::open(&mut flash, 0);
+    let mut store = Store::open(&mut flash, 0, false);
     if let Ok(store) = &mut store {
         store.set(&configuration).and_then(|()| store.set(&calibration)).expect("there is room");
     }

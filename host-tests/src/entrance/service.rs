@@ -8,6 +8,7 @@ use crate::synthetic::idling;
 
 use gyronet::health::Status;
 use gyronet::model::blob::CRC;
+use gyronet::sample::Standstill;
 use gyronet::service::calibrate::Task;
 use gyronet::service::frame::{Deframer, MAX_MESSAGE, emit};
 use gyronet::service::message::{AllCounters, Calibrate, Identity};
@@ -47,9 +48,9 @@ pub fn line(mut data: &[u8]) {
         let content = take(&mut data, len);
         framed(content).iter().for_each(|byte| answer(&mut board, *byte));
         if len == 0 {
-            ticks
-                .by_ref()
-                .for_each(|tick| board.observe(Some(&idling(tick, 0.001, &mut noise)), 0, Status::Ready));
+            ticks.by_ref().for_each(|tick| {
+                board.observe(Some(&idling(tick, 0.001, &mut noise)), 0, Status::Ready, Standstill::Still)
+            });
         }
     }
     board.configuration().check().expect("what it runs with was checked");

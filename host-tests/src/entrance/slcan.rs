@@ -5,7 +5,7 @@ use crate::synthetic::{rate, vehicle};
 use embedded_can::{Frame, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
+use gyronet::can::encoder::CanEncoder;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::slcan::{emit, emit_stamped, parse, parse_stamped};
 use gyronet::units::{Micros, Yaw};
@@ -78,13 +78,13 @@ pub fn host(data: &[u8]) {
 }
 
 pub fn host_seeds() -> Vec<Seed> {
-    let mut feeds = Feeds::new(Config::DEFAULT);
+    let mut encoder = CanEncoder::new(Config::DEFAULT);
     let (mut plain, mut stamped, mut log) = (Vec::new(), Vec::new(), Vec::new());
     let mut candump = Log::new(&mut log);
     for tick in 0..2 {
         let time = Micros(u64::from(tick) * 10_000);
         let sample = vehicle(tick, rate(0.25), Yaw(i64::from(tick) << 20));
-        for frame in feeds.process::<DataFrame>(&sample) {
+        for frame in encoder.encode(&sample) {
             plain.extend(emit(&frame).expect("a data frame"));
             stamped.extend(emit_stamped(&frame, time).expect("a data frame"));
             candump.frame(time, &frame).expect("a vector takes all");

@@ -1,138 +1,162 @@
-//! The board: its lines, and what it says of itself. What differs from part to part is in `chip`.
-#![allow(unsafe_code, reason = "an interrupt's priority; the block says why it is sound")]
+//! The board's lines, and what it reports of itself.
+#![allow(
+    unsafe_code,
+    clippy::undocumented_unsafe_blocks,
+    reason = "rings; a comment above them names both ends"
+)]
 
-use crate::chip::bus::Bus;
-use crate::chip::spi::Spi;
-use crate::chip::watchdog::Watchdog;
-use crate::chip::{CAN_INTERRUPT, pac};
-use crate::clock::{BoardTime, Clocks};
+use crate::boards::{BOARD, Line};
 use crate::crash;
-use crate::queue::Queue;
+use crate::ring::Ring;
 use crate::serial;
-use crate::usart::Usart;
-use cortex_m::peripheral::{NVIC, SYST};
+use crate::stm32f405::can::{Can, Mode};
+use crate::stm32f405::clocks::Clocks;
+use crate::stm32f405::pins::{self, Speed};
+use crate::stm32f405::spi::{self, Spi};
+use crate::stm32f405::usart::Usart;
+use crate::stm32f405::{Chip, pac, supply};
+use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use embedded_can::Id;
 use gyronet::health::supervisor::Supervisor;
-use gyronet::service::event::ResetCause;
+use gyronet::service::event::{CanFault, ClockFault};
 use gyronet::service::message::Identity;
 use pac::Interrupt;
 
-/// Bytes of a part that may wait: twice what comes in the 20 ms that an estimate is waited for.
-pub const IMU_QUEUE: usize = 384;
-/// Bytes of a fibre-optic gyro that may wait: 7 ms at 1000 messages a second; it is looked at every
+/// Bytes of the inertial sensor that may wait: more than come in the 20 ms that an estimate is waited for.
+pub const IMU_RING: usize = 512;
+/// Bytes of the fibre-optic gyro that may wait: 7 ms at 1000 messages a second; they are looked at every
 /// millisecond.
-pub const FOG_QUEUE: usize = 256;
-/// Bytes of a host that may wait: a window's worth of wheel frames.
-pub const SLCAN_QUEUE: usize = 256;
-/// Bytes of the service line that may wait: a frame, and then the line is held.
-pub const SERVICE_QUEUE: usize = 256;
+pub const FOG_RING: usize = 256;
+/// Bytes of an SLCAN host that may wait: a window's worth of wheel frames.
+pub const SLCAN_RING: usize = 256;
+/// Bytes of the service line that may wait: a frame.
+pub const SERVICE_RING: usize = 256;
 /// Bytes on their way to a line.
 pub const SENDING: usize = 128;
 
-/// Of received frames, as RTIC counts: higher is more urgent.
-pub const CAN_PRIORITY: u8 = 3;
-
-/// Which tasks have run.
+/// Collects which tasks have run.
 pub static SUPERVISOR: Supervisor = Supervisor::new();
 
 static FAULTS: [serial::Faults; 4] = [const { serial::Faults::new() }; 4];
 
-static IMU: Queue<u8, IMU_QUEUE> = Queue::new();
-static FOG: Queue<u8, FOG_QUEUE> = Queue::new();
-static SLCAN: Queue<u8, SLCAN_QUEUE> = Queue::new();
-static SERVICE: Queue<u8, SERVICE_QUEUE> = Queue::new();
-static TO_LINES: [Queue<u8, SENDING>; 4] = [const { Queue::new() }; 4];
+// SAFETY, for all rings: the handler of a line is at one end, and the task that has its port at the other.
+static IMU: Ring<u8, IMU_RING> = unsafe { Ring::new() };
+static FOG: Ring<u8, FOG_RING> = unsafe { Ring::new() };
+static SLCAN: Ring<u8, SLCAN_RING> = unsafe { Ring::new() };
+static SERVICE: Ring<u8, SERVICE_RING> = unsafe { Ring::new() };
+static TO_LINES: [Ring<u8, SENDING>; 4] = [const { unsafe { Ring::new() } }; 4];
 
-/// What the part has started, and says of itself.
-pub struct Chip {
-    pub clocks: Clocks,
-    /// Where the controller answers and the clock is exact enough for it.
-    pub can: Option<Bus>,
-    /// Where it is driven.
-    pub spi: Option<Spi>,
-    pub watchdog: Watchdog,
-    /// `None`: nothing answers where a part would say what it is, which is so in the emulator.
-    pub device_id: Option<u32>,
-    pub reset: ResetCause,
-}
-
-/// Of reset flags. The pin's is set by every reset, and a brown-out's by power-on, so the order matters.
-pub fn most_telling(causes: [(bool, ResetCause); 6]) -> ResetCause {
-    causes.into_iter().find_map(|(set, cause)| set.then_some(cause)).unwrap_or(ResetCause::Unknown)
-}
-
-/// What the tasks use.
+/// The tasks' ends of everything.
 pub struct Board {
-    pub imu: serial::Port<IMU_QUEUE>,
-    pub fog: serial::Port<FOG_QUEUE>,
-    pub slcan: serial::Port<SLCAN_QUEUE>,
-    pub service: serial::Port<SERVICE_QUEUE>,
-    /// Where the controller answers and the clock is exact enough for it.
-    pub can: Option<Bus>,
-    /// Where it is driven.
-    pub spi: Option<Spi>,
-    pub time: BoardTime,
-    pub watchdog: Watchdog,
-    /// Known since the start.
+    pub imu: serial::Port<IMU_RING>,
+    pub fog: serial::Port<FOG_RING>,
+    pub slcan: serial::Port<SLCAN_RING>,
+    pub service: serial::Port<SERVICE_RING>,
+    /// The CAN controller; `None` where it does not answer, or the clock is not exact enough.
+    pub can: Option<Can>,
+    pub spi: Spi,
+    /// Whether the board is emulated without a clock tree: its sensors send at the host's pace.
+    pub emulated: bool,
+    pub clocks: Clocks,
+    /// What the board reports of itself.
     pub identity: Identity,
 }
 
-/// What the interrupts use.
+/// The interrupts' ends.
 pub struct Handlers {
-    pub imu: serial::Handler<IMU_QUEUE>,
-    pub fog: serial::Handler<FOG_QUEUE>,
-    pub slcan: serial::Handler<SLCAN_QUEUE>,
-    pub service: serial::Handler<SERVICE_QUEUE>,
+    pub imu: serial::Handler<IMU_RING>,
+    pub fog: serial::Handler<FOG_RING>,
+    pub slcan: serial::Handler<SLCAN_RING>,
+    pub service: serial::Handler<SERVICE_RING>,
 }
 
 impl Board {
-    /// Starts everything.
-    #[inline(never)]
-    pub fn start(p: pac::Peripherals, systick: SYST) -> (Self, Handlers) {
-        release_can();
-        let Chip { clocks, can, spi, watchdog, device_id, reset } = Chip::start(p);
+    /// Starts everything. CAN receives the frames of these identifiers, once it has joined the bus.
+    pub fn start(p: pac::Peripherals, systick: SYST, received: impl Iterator<Item = Id>) -> (Self, Handlers) {
+        let Chip { clocks, device_id, reset } = Chip::start(&p, BOARD.crystal_hz);
+        assign_pins();
+        let can =
+            if clocks.exact() { Can::start(p.CAN1, received, Mode::Normal) } else { Err(CanFault::Clock) };
         let identity = Identity {
             firmware: version(),
             device_id,
             clock_hz: clocks.core_hz,
-            can: can.is_some(),
+            clock_fault: clocks.fault,
+            can_fault: can.as_ref().err().copied(),
             reset,
             crash: crash::take(),
         };
-        let [to_imu, to_fog, to_slcan, to_service] = &TO_LINES;
-        let [imu_faults, fog_faults, slcan_faults, service_faults] = &FAULTS;
-        let usart1 = Usart { registers: pac::USART1::ptr(), interrupt: Interrupt::USART1 };
-        let usart2 = Usart { registers: pac::USART2::ptr(), interrupt: Interrupt::USART2 };
-        let usart3 = Usart { registers: pac::USART3::ptr(), interrupt: Interrupt::USART3 };
-        let usart6 = Usart { registers: pac::USART6::ptr(), interrupt: Interrupt::USART6 };
-        let (imu_handler, imu) = serial::line(usart1, &IMU, to_imu, imu_faults);
-        let (fog_handler, fog) = serial::line(usart3, &FOG, to_fog, fog_faults);
-        let (slcan_handler, slcan) = serial::line(usart2, &SLCAN, to_slcan, slcan_faults);
-        let (service_handler, service) = serial::line(usart6, &SERVICE, to_service, service_faults);
-        usart1.start(clocks.apb2_hz, 115_200);
-        usart2.start(clocks.apb1_hz, 921_600);
-        usart3.start(clocks.apb1_hz, 921_600);
-        usart6.start(clocks.apb2_hz, 115_200);
-        let time = BoardTime::start(systick, clocks, identity.device_id.is_none());
+        let (imu_handler, imu) =
+            line(0, pac::USART1::ptr(), Interrupt::USART1, &IMU, (&BOARD.imu, clocks.apb2_hz, &clocks));
+        let (slcan_handler, slcan) =
+            line(1, pac::USART2::ptr(), Interrupt::USART2, &SLCAN, (&BOARD.slcan, clocks.apb1_hz, &clocks));
+        let (fog_handler, fog) =
+            line(2, pac::USART3::ptr(), Interrupt::USART3, &FOG, (&BOARD.fog, clocks.apb1_hz, &clocks));
+        let (service_handler, service) = line(
+            3,
+            pac::USART6::ptr(),
+            Interrupt::USART6,
+            &SERVICE,
+            (&BOARD.service, clocks.apb2_hz, &clocks),
+        );
+        let spi = spi::start(&p.SPI1, BOARD.spi);
+        if clocks.exact() {
+            supply::watch(&p.EXTI);
+        }
+        start_ticks(systick, &clocks);
         let handlers =
             Handlers { imu: imu_handler, fog: fog_handler, slcan: slcan_handler, service: service_handler };
-        (Self { imu, fog, slcan, service, can, spi, time, watchdog, identity }, handlers)
+        let emulated = device_id.is_none();
+        (Self { imu, fog, slcan, service, can: can.ok(), spi, emulated, clocks, identity }, handlers)
     }
 }
 
-/// The interrupt of received frames has another name in each part, and RTIC binds names: so it is
-/// not RTIC that sets its priority. It shares nothing but a queue.
-fn release_can() {
-    const UNITS: u8 = 1 << (8 - pac::NVIC_PRIO_BITS);
-    // SAFETY: interrupts are off until RTIC has started, and no critical section of its own
-    // depends on this priority.
-    unsafe {
-        let mut core = cortex_m::Peripherals::steal();
-        core.NVIC.set_priority(CAN_INTERRUPT, 0_u8.wrapping_sub(CAN_PRIORITY.wrapping_mul(UNITS)));
-        NVIC::unmask(CAN_INTERRUPT);
+/// Starts a line and gives both of its ends.
+fn line<const N: usize>(
+    number: usize,
+    registers: *const pac::usart1::RegisterBlock,
+    interrupt: Interrupt,
+    received: &'static Ring<u8, N>,
+    (line, bus_hz, clocks): (&Line, u32, &Clocks),
+) -> (serial::Handler<N>, serial::Port<N>) {
+    let usart = Usart::new(registers, interrupt);
+    let emulated = clocks.fault == Some(ClockFault::Emulated);
+    let ends = serial::line(usart, received, &TO_LINES[number % 4], &FAULTS[number % 4], emulated);
+    // At 16 MHz, 921600 baud would be 2.1 % off before the oscillator's own error.
+    usart.start(bus_hz, if clocks.exact() { line.baud } else { line.fallback_baud });
+    ends
+}
+
+/// Starts SysTick, which interrupts every millisecond.
+fn start_ticks(mut systick: SYST, clocks: &Clocks) {
+    systick.set_clock_source(SystClkSource::Core);
+    systick.set_reload(clocks.core_hz / 1_000 - 1);
+    systick.clear_current();
+    systick.enable_interrupt();
+    systick.enable_counter();
+}
+
+/// Hands the pins to USARTs and CAN. A line that hangs open reads as idle.
+fn assign_pins() {
+    let lines = [
+        (&BOARD.imu, pins::USART_1_TO_3),
+        (&BOARD.slcan, pins::USART_1_TO_3),
+        (&BOARD.fog, pins::USART_1_TO_3),
+        (&BOARD.service, pins::USART_6),
+    ];
+    for (line, function) in lines {
+        line.rx.pull_up();
+        line.rx.alternate(function, Speed::Low);
+        line.tx.alternate(function, Speed::Low);
+    }
+    let (led, lit) = BOARD.led;
+    led.output(!lit);
+    for pin in BOARD.can {
+        pin.alternate(pins::CAN_1, Speed::Fast);
     }
 }
 
-/// Of the package.
+/// The version of the package.
 fn version() -> [u8; 3] {
     let number = |text: &str| text.bytes().fold(0, |number: u8, digit| number * 10 + (digit - b'0'));
     [

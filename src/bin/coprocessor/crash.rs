@@ -1,67 +1,142 @@
-//! What is left of a crash: its reason, in RAM that a reset does not clear.
+//! Keeps the reason of a crash in RAM that a reset does not clear.
+//!
+//! The handler of hard faults begins by setting the stack pointer to the top of the stack: after an
+//! overflow it points below the RAM, and the first push of a compiled function would lock the
+//! processor up (ARMv7-M, B1.5.15), so that only the watchdog would end it, without a reason.
 #![allow(unsafe_code, reason = "memory without a value at the start, and exception handlers")]
 
+use core::arch::naked_asm;
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr::{addr_of_mut, read_volatile, write_volatile};
 use cortex_m::peripheral::SCB;
-use cortex_m_rt::{ExceptionFrame, exception};
-use gyronet::service::event::{Crash, CrashKind};
+use cortex_m_rt::exception;
+use gyronet::service::crash::{Crash, CrashKind, FILE};
 
-/// Says that a record is one. After power-on the RAM holds anything.
-const MAGIC: u32 = 0x4752_4E43;
+/// Marks a record as one. After power-on the RAM holds anything.
+const MAGIC: u32 = 0x4752_4E44;
+/// Words of a record: magic, count of crashes, kind (0: none since the last start), place, link, status, address,
+/// file, check word.
+const WORDS: usize = 7 + FILE / 4 + 1;
+/// The RAM that a stack pointer can be in, and bytes of an exception frame.
+const RAM: core::ops::Range<u32> = 0x2000_0000..0x2002_0000;
+const FRAME: u32 = 32;
 
-/// Kind (0: none since the last start), place, count, and a check word.
-type Words = [u32; 5];
+type Words = [u32; WORDS];
 
 #[unsafe(link_section = ".uninit.crash")]
 static mut RECORD: MaybeUninit<Words> = MaybeUninit::uninit();
 
-fn read() -> Option<[u32; 3]> {
+/// The check word of a record.
+fn check(words: &Words) -> u32 {
+    words.iter().take(WORDS - 1).fold(MAGIC, |check, word| check.rotate_left(5) ^ word)
+}
+
+fn read() -> Option<Words> {
     // SAFETY: any bits are words. Nothing else runs: this is before the first interrupt, or the
     // last thing that happens.
-    let [magic, kind, place, count, check] = unsafe { read_volatile(addr_of_mut!(RECORD).cast::<Words>()) };
-    let good = magic == MAGIC && check == MAGIC ^ kind ^ place.rotate_left(8) ^ count.rotate_left(16);
-    good.then_some([kind, place, count])
+    let words = unsafe { read_volatile(addr_of_mut!(RECORD).cast::<Words>()) };
+    (words[0] == MAGIC && words[WORDS - 1] == check(&words)).then_some(words)
 }
 
-fn write([kind, place, count]: [u32; 3]) {
-    let check = MAGIC ^ kind ^ place.rotate_left(8) ^ count.rotate_left(16);
+fn write(mut words: Words) {
+    words[0] = MAGIC;
+    words[WORDS - 1] = check(&words);
     // SAFETY: as in `read`.
-    unsafe { write_volatile(addr_of_mut!(RECORD).cast::<Words>(), [MAGIC, kind, place, count, check]) };
+    unsafe { write_volatile(addr_of_mut!(RECORD).cast::<Words>(), words) };
 }
 
-/// The crash that led to this start, if one did.
+/// Gives the crash that led to this start, if one did, and clears it.
 pub fn take() -> Option<Crash> {
-    let [kind, place, count] = read()?;
-    write([0, 0, count]);
+    let words = read()?;
+    let [_, count, kind, place, link, status, address, ..] = words;
+    let mut rest = [0; WORDS];
+    rest[1] = count;
+    write(rest);
     let kind = match kind {
         0 => return None,
         1 => CrashKind::Panic,
         2 => CrashKind::HardFault,
-        other => CrashKind::Unhandled((other >> 2) as u16),
+        3 => CrashKind::CrystalStopped,
+        4 => CrashKind::SupplyLow,
+        other => CrashKind::Unhandled((other >> 8) as u16),
     };
-    Some(Crash { kind, place, count })
+    let mut file = [0; FILE];
+    for (bytes, word) in file.as_chunks_mut::<4>().0.iter_mut().zip(words.iter().skip(7)) {
+        *bytes = word.to_le_bytes();
+    }
+    Some(Crash { kind, place, link, status, address, file, count })
 }
 
-fn crash(kind: u32, place: u32) -> ! {
-    let count = read().map_or(0, |[_, _, count]| count);
-    write([kind, place, count.saturating_add(1)]);
+/// Keeps a crash and resets the chip.
+fn crash(kind: u32, [place, link, status, address]: [u32; 4], path: &str) -> ! {
+    let mut words = [0; WORDS];
+    words[1] = read().map_or(0, |words| words[1]).saturating_add(1);
+    words[2] = kind;
+    words[3] = place;
+    words[4] = link;
+    words[5] = status;
+    words[6] = address;
+    let end = path.as_bytes();
+    let end = end.get(end.len().saturating_sub(FILE)..).unwrap_or_default();
+    for (k, byte) in end.iter().enumerate() {
+        if let Some(word) = words.get_mut(7 + k / 4) {
+            *word |= u32::from(*byte) << (8 * (k % 4));
+        }
+    }
+    write(words);
     SCB::sys_reset()
+}
+
+/// Ends the image because the supply has fallen; the start waits for it to rise.
+pub fn supply_low() -> ! {
+    crash(4, [0; 4], "")
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    crash(1, info.location().map_or(0, core::panic::Location::line))
+    let (line, file) = info.location().map_or((0, ""), |place| (place.line(), place.file()));
+    crash(1, [line, 0, 0, 0], file)
 }
 
+/// The hard fault's vector. Puts the stack where it began, with the old stack pointer as the argument.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+unsafe extern "C" fn HardFault() -> ! {
+    naked_asm!(
+        "mrs r0, msp",
+        "movw r1, #:lower16:_stack_start",
+        "movt r1, #:upper16:_stack_start",
+        "msr msp, r1",
+        "b {handler}",
+        handler = sym hard_fault,
+    )
+}
+
+/// Keeps what the exception frame holds, where the stack pointer still pointed into the RAM.
+unsafe extern "C" fn hard_fault(stack: u32) -> ! {
+    let inside = RAM.contains(&stack) && RAM.end - stack >= FRAME && stack.is_multiple_of(4);
+    let word = |k: u32| {
+        // SAFETY: inside the RAM, on a word boundary.
+        if inside { unsafe { read_volatile((stack + 4 * k) as *const u32) } } else { 0 }
+    };
+    // SAFETY: the registers are only read.
+    let scb = unsafe { &*SCB::PTR };
+    let status = scb.cfsr.read();
+    // MMARVALID: the address of a memory fault; BFARVALID: of a bus fault.
+    let address = if status & 1 << 7 != 0 { scb.mmfar.read() } else { scb.bfar.read() };
+    crash(2, [word(6), word(5), status, address], "")
+}
+
+/// The NMI, which only the clock security system raises: the crystal has stopped, and the chip runs on the
+/// internal oscillator.
 #[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    crash(2, frame.pc())
+unsafe fn NonMaskableInt() -> ! {
+    crash(3, [0; 4], "")
 }
 
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
     // Exceptions 1 to 15 are -15 to -1 here.
-    crash(3 | ((i32::from(number) + 16) as u32) << 2, 0)
+    crash(5 | ((i32::from(number) + 16) as u32) << 8, [0; 4], "")
 }

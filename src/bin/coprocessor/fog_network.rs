@@ -1,6 +1,6 @@
 //! FoGNet in idle time: a piece of its window with every turn.
 
-use gyronet::fog::lane::FogLane;
+use gyronet::coprocessor::Coprocessor;
 use gyronet::model::FogNet;
 use gyronet::model::fognet::FogEstimate;
 
@@ -21,10 +21,16 @@ impl FogNetwork {
         self.network.is_some() && self.number.is_none()
     }
 
-    /// Begins the window that is due, if one is: reads it, which is all that it needs the lane for.
+    /// Whether a window is being worked on.
+    pub fn is_running(&self) -> bool {
+        self.number.is_some()
+    }
+
+    /// Begins the window that is due, if one is: reads it, which is all that it needs the coprocessor for.
     #[inline(never)]
-    pub fn begin(&mut self, lane: &mut FogLane) -> bool {
-        let (Some(network), Some((number, window))) = (self.network.as_mut(), lane.window()) else {
+    pub fn begin(&mut self, coprocessor: &mut Coprocessor) -> bool {
+        let (Some(network), Some((number, window))) = (self.network.as_mut(), coprocessor.fog_window())
+        else {
             return false;
         };
         network.start(&window);

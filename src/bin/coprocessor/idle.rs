@@ -1,21 +1,26 @@
 //! What is done when nothing else is to do: the service line, and the weights' own checksum.
+#![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::fog_network::FogNetwork;
 use crate::imu::BringUp;
-use crate::queue::Queue;
 use crate::regions::{Records, Slots};
-use crate::{board, clock, serial};
+use crate::ring::Ring;
+use crate::stm32f405::{clocks, timer};
+use crate::{board, serial};
 use embedded_io::{Write, WriteReady};
 use gyronet::health::Status;
 use gyronet::model::FogNet;
 use gyronet::model::background::BackgroundCheck;
-use gyronet::sample::ImuSample;
+use gyronet::sample::{ImuSample, Standstill};
 use gyronet::service::Device;
+use gyronet::service::event::ClockFault;
 use gyronet::service::frame::Frame;
 use gyronet::service::message::AllCounters;
 
 /// Bytes of the service line that are looked at in one turn.
 const SERVICE_TURN: usize = 16;
+/// Interval at which a failed clock is tried again.
+const RETRY_MS: u32 = 1_000;
 /// How long one pass over the weights takes.
 const CHECK_MS: usize = 10_000;
 
@@ -25,18 +30,24 @@ pub struct Observation {
     pub sample: Option<ImuSample>,
     pub tick: u32,
     pub status: Status,
+    pub wheels: Standstill,
 }
 
 /// Samples that idle has not looked at.
-pub static OBSERVATIONS: Queue<Observation, 8> = Queue::new();
+pub static OBSERVATIONS: Ring<Observation, 8> =
+    // SAFETY: the output task writes, idle reads.
+    unsafe { Ring::new() };
 
 /// The idle task.
 pub struct Idle {
     device: &'static mut Device<Records, Slots>,
     check: Option<BackgroundCheck<'static>>,
-    service: serial::Port<{ board::SERVICE_QUEUE }>,
+    service: serial::Port<{ board::SERVICE_RING }>,
     fog_network: FogNetwork,
     bring_up: Option<BringUp>,
+    /// Why the internal oscillator runs, and when it was last looked whether that is over, ms.
+    clock_fault: Option<ClockFault>,
+    retried: u32,
     /// An answer on its way out, and how much of it is.
     answer: Frame,
     sent: usize,
@@ -50,25 +61,55 @@ impl Idle {
     #[inline(never)]
     pub fn new(
         (device, check): Stored,
-        service: serial::Port<{ board::SERVICE_QUEUE }>,
+        service: serial::Port<{ board::SERVICE_RING }>,
         fog_network: Option<&'static mut FogNet<'static, 'static>>,
         bring_up: Option<BringUp>,
+        clock_fault: Option<ClockFault>,
     ) -> Self {
         let fog_network = FogNetwork::new(fog_network);
-        Self { device, check, service, fog_network, bring_up, answer: Frame::new(), sent: 0, milliseconds: 0 }
+        Self {
+            device,
+            check,
+            service,
+            fog_network,
+            bring_up,
+            clock_fault,
+            retried: 0,
+            answer: Frame::new(),
+            sent: 0,
+            milliseconds: 0,
+        }
     }
 
     /// A bounded piece of work; whether the weights were found to be damaged.
     #[inline(never)]
     pub fn turn(&mut self, counters: &AllCounters) -> bool {
-        while let Some(Observation { sample, tick, status }) = OBSERVATIONS.pop() {
-            self.device.observe(sample.as_ref(), tick, status);
+        while let Some(Observation { sample, tick, status, wheels }) = OBSERVATIONS.pop() {
+            self.device.observe(sample.as_ref(), tick, status, wheels);
         }
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::turn) {
             self.device.sensor(result);
         }
         self.answer(counters);
+        self.retry_clock();
         self.check()
+    }
+
+    /// Whether there is more to do before the next interrupt.
+    pub fn is_busy(&self) -> bool {
+        self.fog_network.is_running()
+    }
+
+    /// Restarts the board once the fault that keeps it on the internal oscillator is over.
+    fn retry_clock(&mut self) {
+        let now = timer::milliseconds();
+        let Some(fault) = self.clock_fault.filter(|_| now.wrapping_sub(self.retried) >= RETRY_MS) else {
+            return;
+        };
+        self.retried = now;
+        if clocks::recovered(fault) {
+            cortex_m::peripheral::SCB::sys_reset();
+        }
     }
 
     /// FoGNet, for what it shares with the output task.
@@ -77,7 +118,7 @@ impl Idle {
     }
 
     fn check(&mut self) -> bool {
-        let now = clock::milliseconds();
+        let now = timer::milliseconds();
         let Some(check) = self.check.as_mut().filter(|_| now != self.milliseconds) else { return false };
         self.milliseconds = now;
         let piece = check.len() / CHECK_MS + 1;

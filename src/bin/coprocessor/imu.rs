@@ -3,39 +3,49 @@
 //! The part on SPI is brought up in idle time, for that takes it 50 ms, and again every second
 //! for as long as it does not answer. Between the two ends it is handed over through [`READY`];
 //! [`WANTED`] says whose turn it is with the bus.
+#![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::chip::spi::Spi;
-use crate::queue::Queue;
-use crate::{board, clock, serial};
+use crate::ring::Ring;
+use crate::stm32f405::spi::Spi;
+use crate::stm32f405::timer;
+use crate::{board, serial};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_hal::delay::DelayNs;
+use gyronet::health::supervisor::Task;
 use gyronet::sample::ImuSample;
-use gyronet::sensor::icm42688::{Icm42688, Icm42688Config, Icm42688Error, OutputRate, packet::Resolution};
+use gyronet::sensor::icm42688::packet::Resolution;
+use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::event::SensorFault;
 use gyronet::store::ImuPart;
 
 /// Bytes of a line in one turn: all that can wait.
-pub const TURN: usize = board::IMU_QUEUE;
+pub const TURN: usize = board::IMU_RING;
 /// What a look at the part on SPI counts as: four a turn.
 const LOOK: usize = TURN / 4;
 /// From one attempt to bring it up to the next one.
 const RETRY_MS: u32 = 1_000;
-/// Looks at the time before a delay is given up, should it stand still: a millisecond is some ten
-/// thousands.
+/// Looks at the time before a delay is given up, should it stand still: a millisecond has some ten
+/// thousand.
 const LOOKS_PER_MS: u32 = 1_000_000;
 
-const ICM: Icm42688Config = Icm42688Config { rate: OutputRate::Hz100, resolution: Resolution::Bits20 };
+const ICM: Icm42688Config = Icm42688Config {
+    rate: OutputRate::Hz100,
+    bandwidth: Bandwidth::Sixteenth,
+    resolution: Resolution::Bits20,
+};
 
 type Part = Icm42688<Spi>;
 
-static READY: Queue<Part, 1> = Queue::new();
+static READY: Ring<Part, 1> =
+    // SAFETY: idle writes, the output task reads.
+    unsafe { Ring::new() };
 static WANTED: AtomicBool = AtomicBool::new(true);
 
 /// The output task's end.
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; there is one of them")]
 pub enum Imu {
-    Line(serial::Port<{ board::IMU_QUEUE }>, Mti),
+    Line(serial::Port<{ board::IMU_RING }>, Mti),
     /// `None`: not brought up.
     Spi(Option<Part>),
 }
@@ -43,7 +53,7 @@ pub enum Imu {
 impl Imu {
     /// Of the part that is configured. What the image does not drive, no configuration has.
     #[inline]
-    pub fn new(part: ImuPart, line: serial::Port<{ board::IMU_QUEUE }>) -> Self {
+    pub fn new(part: ImuPart, line: serial::Port<{ board::IMU_RING }>) -> Self {
         if part == ImuPart::Icm42688 { Self::Spi(None) } else { Self::Line(line, Mti::new()) }
     }
 
@@ -100,15 +110,14 @@ pub struct BringUp {
 
 impl BringUp {
     /// Where such a part is configured.
-    pub fn of(part: ImuPart, spi: Option<Spi>) -> Option<Self> {
-        let spi = spi.filter(|_| part == ImuPart::Icm42688)?;
-        Some(Self { spi, tried: None })
+    pub fn new(part: ImuPart, spi: Spi) -> Option<Self> {
+        (part == ImuPart::Icm42688).then_some(Self { spi, tried: None })
     }
 
     /// Tries to bring the part up, where it is not and it is time to.
     #[inline(never)]
     pub fn turn(&mut self) -> Option<Result<(), SensorFault>> {
-        let now = clock::milliseconds();
+        let now = timer::milliseconds();
         let soon = |tried: u32| now.wrapping_sub(tried) < RETRY_MS;
         if !WANTED.load(Ordering::Acquire) || self.tried.is_some_and(soon) {
             return None;
@@ -136,15 +145,16 @@ fn fault<E>(error: Icm42688Error<E>) -> SensorFault {
     }
 }
 
-/// By the board's clock, which interrupts idle.
+/// Waits by the board's clock. Idle counts as running meanwhile: the wait is bounded.
 struct Delay;
 
 impl DelayNs for Delay {
     fn delay_ns(&mut self, ns: u32) {
-        // The millisecond that has begun does not count.
-        let wait = ns.div_ceil(1_000_000) + 1;
-        let begin = clock::milliseconds();
-        let over = |_| clock::milliseconds().wrapping_sub(begin) >= wait;
-        let _ = (0..wait.saturating_mul(LOOKS_PER_MS)).any(over);
+        let until = timer::micros() + u64::from(ns.div_ceil(1_000)) + 1;
+        let over = |_| {
+            board::SUPERVISOR.report(Task::Idle);
+            timer::micros() >= until
+        };
+        let _ = (0..(ns / 1_000_000 + 1).saturating_mul(LOOKS_PER_MS)).any(over);
     }
 }

@@ -1,26 +1,28 @@
-//! The coprocessor's firmware, for the STM32F405 or the part in `chip`: sensor bytes in, CAN frames out.
+//! The coprocessor's firmware, for an STM32F405: sensor bytes in, CAN frames out.
 //!
-//! | pin | function |
+//! Pins and bit rates are those of the board that it is built for (`boards`).
+//!
+//! | line | what |
 //! |---|---|
-//! | PA10 (PA9) | USART1 RX (TX), 115200 8N1, Xsens MTi |
-//! | PA5, PA6, PA7, PA4 | SPI1 clock, in, out, select: ICM-42688-P, where one is configured |
-//! | PB11 (PB10) | USART3 RX (TX), 921600 8N1, KVH DSP-1760 |
-//! | PA2, PA3 | USART2 TX, RX, 921600 8N1, SLCAN |
-//! | PC6, PC7 | USART6 TX, RX, 115200 8N1, service line |
-//! | PB8, PB9 | CAN1 RX, TX, 500 kbit/s |
+//! | USART1 | Xsens MTi |
+//! | SPI1 | ICM-42688-P, where one is configured |
+//! | USART3 | KVH DSP-1760 |
+//! | USART2 | SLCAN |
+//! | USART6 | service line |
+//! | CAN1 | 500 kbit/s |
 //!
 //! # What runs when
 //! | priority | task | when | what |
 //! |---|---|---|---|
 //! | 4 | `imu_line`, `fog_line`, `slcan_line`, `tick` | a byte, 1 ms | a byte into or out of its queue; board time |
-//! | 3 | `service_line`, `bus::receive` | a byte, a frame | into and out of their queues |
-//! | 2 | `output` | pended by both | samples, pipeline, frames, watchdog |
+//! | 3 | `service_line`, `can_received`, `can_sent` | a byte, a frame | into and out of their queues |
+//! | 2 | `output` | pended by these | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
-//! | 0 | `idle` | the rest | FoGNet in pieces, service line, weights against their checksum |
+//! | 0 | `idle` | the rest | FoGNet in pieces, service line, weights against their checksum; else it sleeps |
 //!
-//! Tasks hand things over in queues of fixed length; what does not fit is counted. An estimate is
-//! used two samples after its window, so when it was ready changes no frame; see `window.rs` for
-//! one that is late. A crash leaves its reason in RAM and resets.
+//! The library's `Coprocessor` is shared by `output`, `window` and `idle`; the rest is handed over in queues of fixed
+//! length, and what does not fit is counted. An estimate is used two samples after its window, so the time at
+//! which it is ready changes no frame. A crash leaves its reason in RAM and resets.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -33,14 +35,9 @@ use defmt_rtt as _;
 
 #[cfg(target_os = "none")]
 mod board;
-#[cfg(all(target_os = "none", feature = "firmware"))]
-#[path = "stm32f405/mod.rs"]
-mod chip;
-#[cfg(all(target_os = "none", not(feature = "firmware")))]
-#[path = "stm32h743/mod.rs"]
-mod chip;
 #[cfg(target_os = "none")]
-mod clock;
+#[path = "../boards/mod.rs"]
+mod boards;
 #[cfg(target_os = "none")]
 mod crash;
 #[cfg(target_os = "none")]
@@ -54,21 +51,20 @@ mod outgoing;
 #[cfg(target_os = "none")]
 mod output;
 #[cfg(target_os = "none")]
-mod queue;
+mod pause;
 #[cfg(target_os = "none")]
 mod received;
 #[cfg(target_os = "none")]
 mod regions;
 #[cfg(target_os = "none")]
+mod ring;
+#[cfg(target_os = "none")]
 mod serial;
 #[cfg(target_os = "none")]
 mod start;
 #[cfg(target_os = "none")]
-mod usart;
-#[cfg(target_os = "none")]
-mod wheels;
-#[cfg(target_os = "none")]
-mod window;
+#[path = "../stm32f405/mod.rs"]
+mod stm32f405;
 
 /// Vector and priority of each task below: RTIC has them in instructions alone, the bound of the
 /// stack wants them as data. A test holds them against the running image.
@@ -76,9 +72,8 @@ mod window;
 #[allow(unsafe_code, reason = "a section that is not loaded")]
 #[used]
 #[unsafe(link_section = ".priorities")]
-static PRIORITIES: [[u8; 2]; 8] = {
-    use crate::board::CAN_PRIORITY;
-    use crate::chip::{CAN_INTERRUPT, pac::Interrupt};
+static PRIORITIES: [[u8; 2]; 10] = {
+    use crate::stm32f405::pac::Interrupt;
     const SYSTICK: u8 = 15;
     const FIRST: u8 = 16;
     [
@@ -86,8 +81,10 @@ static PRIORITIES: [[u8; 2]; 8] = {
         [FIRST + Interrupt::USART3 as u8, 4],
         [SYSTICK, 4],
         [FIRST + Interrupt::USART2 as u8, 4],
+        [FIRST + Interrupt::PVD as u8, 4],
         [FIRST + Interrupt::USART6 as u8, 3],
-        [FIRST + CAN_INTERRUPT as u8, CAN_PRIORITY],
+        [FIRST + Interrupt::CAN1_RX0 as u8, 3],
+        [FIRST + Interrupt::CAN1_TX as u8, 3],
         [FIRST + Interrupt::UART4 as u8, 2],
         [FIRST + Interrupt::UART5 as u8, 1],
     ]
@@ -96,128 +93,161 @@ static PRIORITIES: [[u8; 2]; 8] = {
 // The vectors of UART4 and UART5, which this board does not use, are pended by hand.
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
-#[rtic::app(device = crate::chip::pac, peripherals = true)]
+#[rtic::app(device = crate::stm32f405::pac, peripherals = true)]
 mod app {
-    use crate::chip::pac::Interrupt;
     use crate::idle::Idle;
     use crate::imu::BringUp;
     use crate::output::Output;
-    use crate::window::WindowTask;
-    use crate::{board, clock, serial, start};
+    use crate::stm32f405::pac::Interrupt;
+    use crate::stm32f405::{can, timer};
+    use crate::{board, crash, received, serial, start};
     use core::mem::MaybeUninit;
-    use gyronet::fog::FogConfig;
-    use gyronet::fog::lane::FogLane;
+    use cortex_m::asm::dsb;
+    use gyronet::coprocessor::Coprocessor;
     use gyronet::health::supervisor::Task;
-    use gyronet::model::GyroNet;
+    use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::{GyroNet, WindowNetwork};
     use gyronet::service::message::AllCounters;
-    use gyronet::units::Micros;
 
-    /// What idle tells of, and what it has found out.
     #[shared]
     struct Shared {
+        coprocessor: &'static mut Coprocessor,
+        /// For idle, which answers the service line.
         counters: AllCounters,
-        weights_damaged: bool,
-        fog: &'static mut FogLane,
     }
 
     #[local]
     struct Local {
-        imu: serial::Handler<{ board::IMU_QUEUE }>,
-        fog_handler: serial::Handler<{ board::FOG_QUEUE }>,
-        slcan: serial::Handler<{ board::SLCAN_QUEUE }>,
-        service: serial::Handler<{ board::SERVICE_QUEUE }>,
+        imu: serial::Handler<{ board::IMU_RING }>,
+        fog_handler: serial::Handler<{ board::FOG_RING }>,
+        slcan: serial::Handler<{ board::SLCAN_RING }>,
+        service: serial::Handler<{ board::SERVICE_RING }>,
         sender: &'static mut Output,
-        network: WindowTask,
+        network: Option<GyroNet<'static, &'static mut GyroNetState>>,
         rest: &'static mut Idle,
     }
 
     #[init(local = [
-        network_place: MaybeUninit<GyroNet<'static>> = MaybeUninit::uninit(),
+        network_state: GyroNetState = GyroNetState::ZERO,
+        coprocessor_place: MaybeUninit<Coprocessor> = MaybeUninit::uninit(),
         sender_place: MaybeUninit<Output> = MaybeUninit::uninit(),
-        fog_place: MaybeUninit<FogLane> = MaybeUninit::uninit(),
         rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
+        let (board, handlers) = board::Board::start(cx.device, cx.core.SYST, start::received());
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
-        let start::Parts { output, weights, fog_network, fog_expected, device } = parts;
-        let network = weights.map(|blob| start::place(cx.local.network_place, || GyroNet::new(blob)));
-        let network = WindowTask { network };
+        let start::Parts { output, config, weights, fog_network, device } = parts;
+        let coprocessor = start::place(cx.local.coprocessor_place, || Coprocessor::new(config));
+        let network = weights.map(|blob| GyroNet::with_state(blob, cx.local.network_state));
         let service = board.service;
-        let bring_up = BringUp::of(output.part, board.spi);
+        let bring_up = BringUp::new(output.part, board.spi);
         let ports = (board.imu, board.fog, board.slcan, board.can);
-        let has_network = fog_network.is_some();
-        let fog = start::place(cx.local.fog_place, || FogLane::new(FogConfig::DEFAULT, has_network));
-        if fog_expected {
-            // The board's clock has just begun.
-            fog.expect(Micros(0));
-        }
-        let sender =
-            start::place(cx.local.sender_place, || output.connect(ports, board.time, board.watchdog));
-        let rest = start::place(cx.local.rest_place, || Idle::new(device, service, fog_network, bring_up));
+        let sender = start::place(cx.local.sender_place, || output.connect(ports));
+        let rest = start::place(cx.local.rest_place, || {
+            Idle::new(device, service, fog_network, bring_up, board.clocks.fault)
+        });
         let board::Handlers { imu, fog: fog_handler, slcan, service } = handlers;
-        let shared = Shared { counters: AllCounters::default(), weights_damaged: false, fog };
+        let shared = Shared { coprocessor, counters: AllCounters::default() };
         (shared, Local { imu, fog_handler, slcan, service, sender, network, rest })
     }
 
+    // Short handlers end with a barrier: a store that is still on its way while the handler returns can make
+    // the processor take the wrong vector (Arm erratum 838869 of the Cortex-M4).
     #[task(binds = USART1, priority = 4, local = [imu])]
+    #[unsafe(link_section = ".ram_code.imu_line")]
     fn imu_line(cx: imu_line::Context) {
         cx.local.imu.serve();
-        rtic::pend(Interrupt::UART4);
+        dsb();
     }
 
-    // A thousand messages a second: they are looked at with every tick, not with every byte.
     #[task(binds = USART3, priority = 4, local = [fog_handler])]
+    #[unsafe(link_section = ".ram_code.fog_line")]
     fn fog_line(cx: fog_line::Context) {
         cx.local.fog_handler.serve();
+        dsb();
     }
 
     #[task(binds = SysTick, priority = 4)]
+    #[unsafe(link_section = ".ram_code.tick")]
     fn tick(_: tick::Context) {
-        clock::tick();
+        timer::tick();
         board::SUPERVISOR.report(Task::Tick);
         rtic::pend(Interrupt::UART4);
+        dsb();
     }
 
     #[task(binds = USART2, priority = 4, local = [slcan])]
+    #[unsafe(link_section = ".ram_code.slcan_line")]
     fn slcan_line(cx: slcan_line::Context) {
         cx.local.slcan.serve();
+        dsb();
     }
 
     #[task(binds = USART6, priority = 3, local = [service])]
+    #[unsafe(link_section = ".ram_code.service_line")]
     fn service_line(cx: service_line::Context) {
         cx.local.service.serve();
+        dsb();
     }
 
-    #[task(binds = UART4, priority = 2, local = [sender], shared = [counters, weights_damaged, fog])]
+    #[task(binds = CAN1_RX0, priority = 3)]
+    fn can_received(_: can_received::Context) {
+        received::take();
+        dsb();
+    }
+
+    #[task(binds = CAN1_TX, priority = 3)]
+    fn can_sent(_: can_sent::Context) {
+        can::transmitted();
+        rtic::pend(Interrupt::UART4);
+        dsb();
+    }
+
+    /// The supply falls: the chip must not go on at this clock, nor change its flash.
+    #[task(binds = PVD, priority = 4)]
+    fn supply_low(_: supply_low::Context) {
+        crash::supply_low();
+    }
+
+    #[task(binds = UART4, priority = 2, local = [sender], shared = [coprocessor, counters])]
     fn output(cx: output::Context) {
-        (cx.shared.counters, cx.shared.weights_damaged, cx.shared.fog)
-            .lock(|counters, damaged, fog| cx.local.sender.turn(counters, *damaged, fog));
+        (cx.shared.coprocessor, cx.shared.counters)
+            .lock(|coprocessor, counters| cx.local.sender.turn(coprocessor, counters));
         rtic::pend(Interrupt::UART5);
     }
 
-    #[task(binds = UART5, priority = 1, local = [network])]
-    fn window(cx: window::Context) {
-        if cx.local.network.run() {
+    #[task(binds = UART5, priority = 1, local = [network], shared = [coprocessor])]
+    fn window(mut cx: window::Context) {
+        let due = cx.shared.coprocessor.lock(|coprocessor| coprocessor.window());
+        if let (Some(due), Some(network)) = (due, cx.local.network) {
+            let estimate = network.estimate(&due.features);
+            // One that is late is counted.
+            let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver(due.end, estimate));
             rtic::pend(Interrupt::UART4);
         }
         board::SUPERVISOR.report(Task::Window);
     }
 
-    #[idle(local = [rest], shared = [counters, weights_damaged, fog])]
+    #[idle(local = [rest], shared = [coprocessor, counters])]
     fn idle(mut cx: idle::Context) -> ! {
         loop {
             let counters = cx.shared.counters.lock(|counters| *counters);
             let damaged = cx.local.rest.turn(&counters);
             if damaged {
-                cx.shared.weights_damaged.lock(|known| *known = true);
+                cx.shared.coprocessor.lock(|coprocessor| coprocessor.weights_damaged());
             }
             let fog_network = cx.local.rest.fog_network();
-            let begun = fog_network.is_waiting() && cx.shared.fog.lock(|fog| fog_network.begin(fog));
+            let begun = fog_network.is_waiting()
+                && cx.shared.coprocessor.lock(|coprocessor| fog_network.begin(coprocessor));
             if let (false, Some((number, estimate))) = (begun, fog_network.advance()) {
-                cx.shared.fog.lock(|fog| fog.deliver(number, estimate));
+                // One that is late is counted.
+                let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver_fog(number, estimate));
             }
             board::SUPERVISOR.report(Task::Idle);
+            if !cx.local.rest.is_busy() {
+                // Every interrupt wakes it, the next tick at the latest.
+                cortex_m::asm::wfi();
+            }
         }
     }
 }

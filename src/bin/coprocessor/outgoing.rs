@@ -1,6 +1,6 @@
 //! The two lines that frames leave by: SLCAN always, CAN where its controller is up.
 
-use crate::chip::bus::Bus;
+use crate::stm32f405::can::{self, Can, STALE_MS, State};
 use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::queue::TransmitQueue;
@@ -8,55 +8,83 @@ use gyronet::can::slcan::host::StatusFlags;
 use gyronet::can::slcan::port::Port;
 use gyronet::units::Micros;
 
-/// Frames that may wait for a line: what older ones say is of no use to anybody.
+/// Frames that may wait for a line.
 const QUEUE: usize = 24;
 
-pub type SlcanPort = serial::Port<{ board::SLCAN_QUEUE }>;
+pub type SlcanPort = serial::Port<{ board::SLCAN_RING }>;
 
 /// Both lines and what waits for them.
 pub struct Outgoing {
     slcan: SlcanPort,
     port: Port<QUEUE>,
-    can: Option<Bus>,
-    queue: TransmitQueue<DataFrame, QUEUE>,
+    can: Option<Can>,
+    /// Frames for CAN, with the millisecond in which they were made.
+    queue: TransmitQueue<(DataFrame, u32), QUEUE>,
+    /// Board time, ms.
+    now: u32,
 }
 
 impl Outgoing {
-    pub fn new(slcan: SlcanPort, bits_per_second: u32, can: Option<Bus>) -> Self {
-        Self { slcan, port: Port::new(bits_per_second), can, queue: TransmitQueue::new() }
+    pub fn new(slcan: SlcanPort, bits_per_second: u32, can: Option<Can>) -> Self {
+        Self { slcan, port: Port::new(bits_per_second), can, queue: TransmitQueue::new(), now: 0 }
     }
 
-    /// Puts a frame behind those that wait.
-    pub fn push(&mut self, frame: DataFrame, time: Micros) {
-        self.port.push(frame, time);
+    /// Takes part in the bus.
+    pub fn join(&self) {
+        self.can.iter().for_each(Can::join);
+    }
+
+    /// Queues a frame; `stamp` is the time of its measurement.
+    pub fn push(&mut self, frame: DataFrame, stamp: Micros) {
+        self.port.push(frame, stamp);
         if self.can.is_some() {
-            self.queue.push(frame);
+            self.queue.push((frame, self.now));
         }
     }
 
     /// Sends what the lines take; gives what a host has sent over SLCAN.
     pub fn service(&mut self, take: impl FnMut(DataFrame)) {
-        self.port.set_bus(if self.off() { StatusFlags::BUS_ERROR } else { StatusFlags::default() });
+        self.port.set_bus(match self.state() {
+            State::Active => StatusFlags::default(),
+            State::Warning => StatusFlags::ERROR_WARNING,
+            State::Passive => StatusFlags::ERROR_PASSIVE,
+            State::Off => StatusFlags::BUS_ERROR,
+        });
         // A byte that the line lost is answered as a bad line, or missing in it.
         let _ = self.port.service(&mut self.slcan, take);
         self.refill();
     }
 
-    /// Gives the controller what it has room for.
+    /// Sets the time, ms, and looks after the controller. Called every millisecond.
+    pub fn tick(&mut self, now: u32) {
+        self.now = now;
+        self.can.iter_mut().for_each(|can| can.poll(now));
+    }
+
+    /// Gives the controller the frames that it has room for. Stale ones are dropped, and all of them while
+    /// the controller is off the bus.
     pub fn refill(&mut self) {
-        if let Some(can) = self.can.as_mut() {
-            self.queue.service(can);
+        let Some(can) = self.can.as_mut() else { return };
+        let off = can.state() == State::Off;
+        while let Some((frame, made)) = self.queue.front() {
+            if off || self.now.wrapping_sub(*made) > STALE_MS {
+                self.queue.drop_front();
+            } else if can.transmit(frame, *made) {
+                let _ = self.queue.pop();
+            } else {
+                break;
+            }
         }
     }
 
     /// Frames that a line did not take in time.
     pub fn dropped(&self) -> u32 {
-        self.port.dropped().saturating_add(self.queue.dropped())
+        self.port.dropped().saturating_add(self.queue.dropped()).saturating_add(can::aborted())
     }
 
-    /// Whether the controller has taken itself off the bus.
-    pub fn off(&self) -> bool {
-        self.can.as_ref().is_some_and(Bus::off)
+    /// The CAN controller's state of error confinement; active where there is no controller.
+    pub fn state(&self) -> State {
+        self.can.as_ref().map_or(State::Active, Can::state)
     }
 
     /// Bytes of the SLCAN line that came damaged, and bytes that had to wait.

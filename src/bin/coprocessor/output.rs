@@ -1,49 +1,29 @@
-//! The output task: samples, pipeline, frames. Nothing in it waits.
+//! The output task: samples and frames between the lines and the coprocessor. Nothing in it waits.
 
 use crate::board::SUPERVISOR;
-use crate::chip::bus::Bus;
-use crate::chip::watchdog::Watchdog;
-use crate::clock::{self, BoardTime};
+use crate::boards::BOARD;
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{Imu, TURN};
 use crate::outgoing::{Outgoing, SlcanPort};
+use crate::pause;
 use crate::received::{self, FRAMES};
-use crate::wheels::Wheels;
-use crate::window::Windows;
+use crate::stm32f405::can::{Can, State};
+use crate::stm32f405::{timer, watchdog};
 use crate::{board, serial};
-use gyronet::can::DataFrame;
-use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
-use gyronet::can::fog_feed::FogFeed;
-use gyronet::can::wheel::WheelSettings;
-use gyronet::fog::lane::FogLane;
-use gyronet::guard::{Guard, TIMEOUT_US};
-use gyronet::health::{Faults, Status, count};
-use gyronet::sample::ImuSample;
+use gyronet::coprocessor::{self, Coprocessor};
+use gyronet::health::count;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
-use gyronet::vehicle::VehicleSample;
 
-/// What was found at the start to be wrong with what is stored.
-#[derive(Clone, Copy)]
-pub struct Doubts {
-    /// Anything at all.
-    pub stored: bool,
-    /// The configuration itself: the built-in one stands in for it.
-    pub configuration: bool,
-}
+/// Half a period of the LED, ms; a power of two.
+const BLINK_MS: u32 = 512;
 
-/// Everything that the output task owns, but its lines.
-pub struct Unconnected {
-    pub guard: &'static mut Guard,
-    pub config: Config,
-    pub wheels: Option<WheelSettings>,
-    pub windows: Windows,
+/// What the configuration says of the output task's lines.
+pub struct OutputParts {
     pub part: ImuPart,
-    pub fog_ids: [u16; 3],
-    pub doubts: Doubts,
+    pub bits_per_second: u32,
 }
 
 /// The output task.
@@ -51,88 +31,74 @@ pub struct Output {
     imu: Imu,
     fog: FogPort,
     dsp1760: Dsp1760,
-    fog_feed: FogFeed,
-    guard: &'static mut Guard,
-    windows: Windows,
-    doubts: Doubts,
-    tick: u32,
+    outgoing: Outgoing,
     /// The millisecond in which the other lines were looked at.
     looked: u32,
-    wheels: Wheels,
-    feeds: Feeds,
-    outgoing: Outgoing,
-    /// Time stamp of the newest sample.
-    sample_time: Micros,
-    /// When it came, by the board's clock.
-    heard: Micros,
-    time: BoardTime,
+    /// Whether CAN takes part in the bus.
+    joined: bool,
     lines: LineCounters,
-    /// Frames dropped or lost when the last sample was sent.
-    dropped: u32,
-    watchdog: Watchdog,
 }
 
-type FogPort = serial::Port<{ board::FOG_QUEUE }>;
-type ImuPort = serial::Port<{ board::IMU_QUEUE }>;
-type Ports = (ImuPort, FogPort, SlcanPort, Option<Bus>);
+type FogPort = serial::Port<{ board::FOG_RING }>;
+type ImuPort = serial::Port<{ board::IMU_RING }>;
+type Ports = (ImuPort, FogPort, SlcanPort, Option<Can>);
 
-impl Unconnected {
+impl OutputParts {
     #[inline]
-    pub fn connect(self, (imu, fog, slcan, can): Ports, time: BoardTime, watchdog: Watchdog) -> Output {
-        let Self { guard, config, wheels, windows, part, fog_ids, doubts } = self;
+    pub fn connect(self, (imu, fog, slcan, can): Ports) -> Output {
         Output {
-            imu: Imu::new(part, imu),
+            imu: Imu::new(self.part, imu),
             fog,
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
-            fog_feed: FogFeed::new(fog_ids),
-            guard,
-            windows,
-            doubts,
-            tick: 0,
+            outgoing: Outgoing::new(slcan, self.bits_per_second, can),
             looked: 0,
-            wheels: Wheels::new(wheels),
-            feeds: Feeds::new(config),
-            outgoing: Outgoing::new(slcan, config.settings().bits_per_second, can),
-            sample_time: Micros(0),
-            heard: Micros(0),
-            time,
+            joined: false,
             lines: LineCounters::NONE,
-            dropped: 0,
-            watchdog,
         }
     }
 }
 
+// What the coprocessor refuses it has counted, so its results are not looked at here.
 impl Output {
-    /// Does what there is to do. `weights_damaged`: what idle has found out.
+    /// Does what there is to do.
     #[inline(never)]
-    pub fn turn(&mut self, counters: &mut AllCounters, weights_damaged: bool, lane: &mut FogLane) {
-        self.windows.has_network &= !weights_damaged;
+    pub fn turn(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
         // A part's bytes come one by one. All else is looked at with the next tick, or before the sample
         // that they make; but for the CAN controller, which takes three frames at a time.
-        let tick = clock::milliseconds();
-        let now = self.time.now();
+        let now = Micros(timer::micros());
+        let tick = (now.0 / 1_000) as u32;
+        if !core::mem::replace(&mut self.joined, true) {
+            // From here on received frames are taken, and every task reports in time.
+            self.outgoing.join();
+            watchdog::set(watchdog::Limit::Short);
+        }
         let mut looked = core::mem::replace(&mut self.looked, tick) != tick;
         if looked {
-            self.look(lane, now);
+            self.outgoing.tick(tick);
+            // The LED blinks as long as this task runs.
+            let (led, lit) = BOARD.led;
+            led.set(lit == (tick & BLINK_MS != 0));
+            self.look(coprocessor, now);
+        }
+        coprocessor.pause(pause::is_requested());
+        if pause::is_requested() {
+            self.send(coprocessor, now);
+            pause::announce();
         }
         let mut turn = TURN;
-        loop {
-            self.windows.deliver(self.guard.pipeline());
-            if self.windows.must_wait(self.tick, now) {
-                self.guard.wait(now);
-                break;
-            }
+        while coprocessor.is_ready(now) {
             match self.imu.next_sample(&mut turn) {
                 Some(Ok(sample)) => {
                     if !core::mem::replace(&mut looked, true) {
-                        self.look(lane, now);
+                        self.look(coprocessor, now);
                     }
-                    self.process(sample, now);
-                    self.fog_out(lane, now);
-                    self.frames_out();
+                    self.report_bus(coprocessor);
+                    if let Ok(observation) = &coprocessor.imu(sample, now) {
+                        self.note(observation);
+                    }
+                    self.send(coprocessor, now);
                 }
-                Some(Err(())) => count(&mut self.lines.sensor_errors, 1),
+                Some(Err(())) => coprocessor.imu_error(),
                 None => break,
             }
         }
@@ -140,133 +106,76 @@ impl Output {
             self.outgoing.refill();
             return;
         }
-        if let Some(vehicle) = self.guard.poll(now) {
-            self.silence(vehicle, now);
-            self.frames_out();
+        self.report_bus(coprocessor);
+        if let Ok(Some(observation)) = &coprocessor.poll(now) {
+            self.note(observation);
         }
-        let watch = *self.guard.counters();
+        self.send(coprocessor, now);
         *counters = AllCounters {
-            pipeline: *self.guard.pipeline().counters(),
-            watch,
+            pipeline: *coprocessor.pipeline().counters(),
+            watch: *coprocessor.monitor_counters(),
             lines: self.lines,
-            fog: *lane.counters(),
+            fog: *coprocessor.fog_counters(),
+            inputs: *coprocessor.input_counters(),
         };
         if SUPERVISOR.complete() {
-            self.watchdog.feed();
+            watchdog::feed();
         }
     }
 
-    /// What has come on all other lines.
+    /// Takes what has come on all other lines.
     #[inline(never)]
-    fn look(&mut self, lane: &mut FogLane, now: Micros) {
-        self.frames_in();
-        self.fog_in(lane, now);
-        self.frames_out();
-    }
-
-    #[inline(never)]
-    fn process(&mut self, sample: ImuSample, now: Micros) {
-        self.sample_time = sample.time;
-        if let Some(known) = self.wheels.at(sample.time) {
-            self.guard.wheels(known);
+    fn look(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
+        while let Some(frame) = FRAMES.pop() {
+            let _ = coprocessor.can(&frame, now);
         }
-        // What has no place in time is counted and gives no frame.
-        let Ok(output) = &self.guard.process(sample, now) else { return };
-        self.heard = now;
-        self.tick = output.prompt.tick;
-        self.send(output.vehicle, sample.time);
-        let taken = self.windows.hand_out(output.window.as_ref(), now);
-        count(&mut self.lines.overruns, u32::from(!taken));
-        self.note(Some(sample), self.tick, output.prompt.status);
-    }
-
-    /// What the fibre-optic gyro has sent.
-    fn fog_in(&mut self, lane: &mut FogLane, now: Micros) {
-        for _ in 0..board::FOG_QUEUE {
+        for _ in 0..board::FOG_RING {
             let Some(byte) = self.fog.receive() else { break };
             self.dsp1760.push(byte);
             while let Some(sample) = self.dsp1760.next_sample() {
                 match sample {
                     Ok(sample) => {
-                        let (time, _) = self.stream_time(now);
-                        lane.push(time, sample);
-                        self.fog_out(lane, now);
+                        let _ = coprocessor.fog(sample, now);
+                        self.queue(coprocessor);
                     }
-                    Err(_) => count(&mut self.lines.fog_errors, 1),
+                    Err(_) => coprocessor.fog_error(),
                 }
             }
         }
-        self.fog_out(lane, now);
+        self.send(coprocessor, now);
     }
 
-    #[inline(never)]
-    fn fog_out(&mut self, lane: &mut FogLane, now: Micros) {
-        let (time, fresh) = self.stream_time(now);
-        let inertial = self.guard.pipeline().inertial().filter(|_| fresh);
-        while let Some(yaw) = lane.next_step(time, inertial, self.wheels.known.as_ref()) {
-            for frame in &self.fog_feed.process::<DataFrame>(&yaw) {
-                self.outgoing.push(*frame, self.sample_time);
-            }
-        }
-    }
-
-    /// The time that the gyro's increments are summed by, and whether the other sensor's newest sample
-    /// is of that time. The emulator's parts send at the host's pace: there the time stamps are the
-    /// time, as they are for the pipeline.
-    fn stream_time(&self, now: Micros) -> (Micros, bool) {
-        if self.time.emulated() {
-            (self.sample_time, true)
-        } else {
-            (now, now.0.saturating_sub(self.heard.0) < TIMEOUT_US)
-        }
-    }
-
-    /// The sensor says nothing: that is told by its own time, as far as it is known.
-    fn silence(&mut self, vehicle: VehicleSample, now: Micros) {
-        let time = Micros(self.sample_time.0 + now.0.saturating_sub(self.heard.0));
-        self.send(vehicle, time);
-        self.note(None, vehicle.tick, Status::Silent);
-    }
-
-    #[inline(never)]
-    fn note(&mut self, sample: Option<ImuSample>, tick: u32, status: Status) {
-        if !OBSERVATIONS.push(Observation { sample, tick, status }) {
-            count(&mut self.lines.overruns, 1);
-        }
-    }
-
-    #[inline(never)]
-    fn send(&mut self, mut vehicle: VehicleSample, time: Micros) {
-        vehicle.yaw.faults = vehicle.yaw.faults.with(self.faults());
-        if self.doubts.configuration {
-            vehicle.doubt();
-        }
-        for frame in &self.feeds.process::<DataFrame>(&vehicle) {
-            self.outgoing.push(*frame, time);
-        }
-    }
-
-    /// What the pipeline cannot know.
-    fn faults(&mut self) -> Faults {
+    /// Hands on what the bus has lost.
+    fn report_bus(&mut self, coprocessor: &mut Coprocessor) {
         self.lines.unsent = self.outgoing.dropped();
         self.lines.frames_lost = received::lost();
-        let dropped = self.lines.unsent.saturating_add(self.lines.frames_lost);
-        let lost = core::mem::replace(&mut self.dropped, dropped) < dropped;
-        let bus = if lost || self.outgoing.off() { Faults::BUS } else { Faults::NONE };
-        if self.windows.has_network && !self.doubts.stored { bus } else { bus.with(Faults::STORED) }
+        let lost = self.lines.unsent.saturating_add(self.lines.frames_lost);
+        coprocessor.bus(lost, self.outgoing.state() >= State::Passive);
     }
 
-    fn frames_in(&mut self) {
-        while let Some(frame) = FRAMES.pop() {
-            self.wheels.take(&frame, self.sample_time);
+    /// Hands an observation to idle.
+    #[inline(never)]
+    fn note(&mut self, observation: &coprocessor::Observation) {
+        let coprocessor::Observation { sample, vehicle, wheels, .. } = observation;
+        let (tick, status) = (vehicle.tick, vehicle.prompt.status);
+        let note = Observation { sample: *sample, tick, status, wheels: *wheels };
+        count(&mut self.lines.overruns, u32::from(!OBSERVATIONS.push(note)));
+    }
+
+    fn queue(&mut self, coprocessor: &mut Coprocessor) {
+        while let Some(sent) = coprocessor.next_frame() {
+            self.outgoing.push(sent.frame, sent.time);
         }
     }
 
+    /// Sends the coprocessor's frames, and takes the frames that a host has sent over SLCAN.
     #[inline(never)]
-    fn frames_out(&mut self) {
-        let Self { outgoing, wheels, sample_time, .. } = self;
-        outgoing.service(|frame| wheels.take(&frame, *sample_time));
-        let ([lost, held], [slcan_lost, slcan_held]) = (self.imu.line_faults(), outgoing.line_faults());
+    fn send(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
+        self.queue(coprocessor);
+        self.outgoing.service(|frame| {
+            let _ = coprocessor.can(&frame, now);
+        });
+        let ([lost, held], [slcan_lost, slcan_held]) = (self.imu.line_faults(), self.outgoing.line_faults());
         self.lines.line_errors = lost.saturating_add(self.fog.lost()).saturating_add(slcan_lost);
         self.lines.held = held.saturating_add(self.fog.held()).saturating_add(slcan_held);
     }

@@ -1,33 +1,22 @@
 //! The two regions of the flash that are written: records and weight slots.
+#![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
-use crate::chip::flash::Flash;
+use crate::pause;
+use crate::stm32f405::flash::{Flash, FlashError, WORD};
 use core::ops::Range;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use gyronet::service::MappedSlots;
 use gyronet::store::layout::{RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE};
 
-/// Of a write.
-pub const WORD: usize = 4;
-
-/// What the controller or the caller did wrong.
-#[derive(Debug, Clone, Copy)]
-pub struct FlashError(pub NorFlashErrorKind);
-
-impl NorFlashError for FlashError {
-    fn kind(&self) -> NorFlashErrorKind {
-        self.0
-    }
-}
-
 /// An offset into a region as one into the flash.
 fn absolute(region: &Range<u32>, offset: u32, len: usize, unit: usize) -> Result<u32, FlashError> {
-    let start = region.start.checked_add(offset).ok_or(FlashError(NorFlashErrorKind::OutOfBounds))?;
+    let start = region.start.checked_add(offset).ok_or(FlashError::OutOfBounds)?;
     let end = u32::try_from(len).ok().and_then(|len| start.checked_add(len));
     if end.is_none_or(|end| end > region.end) {
-        return Err(FlashError(NorFlashErrorKind::OutOfBounds));
+        return Err(FlashError::OutOfBounds);
     }
     let aligned = (start as usize).is_multiple_of(unit) && len.is_multiple_of(unit);
-    if aligned { Ok(start) } else { Err(FlashError(NorFlashErrorKind::NotAligned)) }
+    if aligned { Ok(start) } else { Err(FlashError::NotAligned) }
 }
 
 macro_rules! region {
@@ -57,9 +46,10 @@ macro_rules! region {
             const ERASE_SIZE: usize = $sector;
 
             fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-                let len = to.checked_sub(from).ok_or(FlashError(NorFlashErrorKind::OutOfBounds))? as usize;
+                let len = to.checked_sub(from).ok_or(FlashError::OutOfBounds)? as usize;
                 let start = absolute(&$range, from, len, $sector)?;
-                (start..start + len as u32).step_by($sector).try_for_each(|sector| self.0.erase(sector))
+                let sectors = || (start..start + len as u32).step_by($sector);
+                pause::announced(|| sectors().try_for_each(|sector| self.0.erase(sector)))
             }
 
             fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
@@ -74,6 +64,12 @@ region!(Slots, SLOTS, SLOT_SIZE, "The weight slots.");
 
 impl MappedSlots for Slots {
     fn slots(&self) -> [&[u8]; 2] {
-        self.0.slots_at_start()
+        slots_at_start()
     }
+}
+
+/// Gives both slots as they are. The one that the network runs on is not written while it does.
+pub fn slots_at_start() -> [&'static [u8]; 2] {
+    // SAFETY: inside the flash; see above.
+    [SLOTS.start, SLOTS.start + SLOT_SIZE as u32].map(|offset| unsafe { Flash::mapped(offset, SLOT_SIZE) })
 }

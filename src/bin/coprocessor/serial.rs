@@ -1,20 +1,17 @@
-//! Serial lines: a handler at the register's end, queues, a port at the other.
+//! Serial lines: an interrupt handler moves bytes between the USART and two rings, and a port gives the
+//! other ends of the rings to a task.
 #![allow(unsafe_code, reason = "the interrupt mask; the block says why it is sound")]
 
 use crate::board::SENDING;
-use crate::queue::Queue;
-use crate::usart::Usart;
+use crate::ring::Ring;
+use crate::stm32f405::usart::{Status, Usart};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 
 /// Polls before a flush gives up: about ten byte times at 115200.
 const FLUSH_POLLS: u32 = 100_000;
-/// Bytes that a handler takes from or gives the line in one turn. A real one has one and takes two
-/// at most; the emulated one has what the host has sent, takes all and never asks for more.
-const BURST: usize = SENDING;
-
-/// What a line has done wrong since the start. The handler alone counts.
+/// Counts a line's faults since the start. The handler alone counts.
 pub struct Faults {
     lost: AtomicU32,
     held: AtomicU32,
@@ -23,7 +20,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Nothing yet.
+    /// Starts at zero.
     pub const fn new() -> Self {
         Self { lost: AtomicU32::new(0), held: AtomicU32::new(0), holding: AtomicBool::new(false) }
     }
@@ -33,83 +30,97 @@ fn count(counter: &AtomicU32) {
     counter.store(counter.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
 }
 
-/// What the handler has of a line.
+/// The interrupt's end of a line.
 pub struct Handler<const N: usize> {
     usart: Usart,
-    received: &'static Queue<u8, N>,
-    sending: &'static Queue<u8, SENDING>,
+    received: &'static Ring<u8, N>,
+    sending: &'static Ring<u8, SENDING>,
     faults: &'static Faults,
+    /// Whether room for a byte raises the interrupt.
+    room_requested: bool,
+    emulated: bool,
 }
 
 impl<const N: usize> Handler<N> {
-    /// Moves bytes both ways; waits for nothing.
+    /// Moves a byte each way; waits for nothing. The interrupt is raised again for the next one, in the emulator
+    /// by hand: its USART has all bytes of the host at once, and raises it for the first.
+    #[inline(always)]
     pub fn serve(&mut self) {
-        self.take();
-        self.give();
-    }
-
-    fn take(&mut self) {
-        for _ in 0..BURST {
-            let status = self.usart.status();
-            if !status.received {
-                return;
-            }
-            if self.received.is_full() {
-                // It stays in the register until there is room: the line is held up, or reports
-                // an overrun. Masked in the NVIC: the emulated USART keeps its interrupt raised
-                // whatever its own enable bit says.
-                NVIC::mask(self.usart.interrupt);
-                if !self.faults.holding.swap(true, Ordering::Relaxed) {
-                    count(&self.faults.held);
-                }
-                return;
-            }
-            if status.damaged {
-                count(&self.faults.lost);
-            }
-            let _ = self.received.push(self.usart.read());
+        let status = self.usart.status();
+        let took = status.received() && self.take(status);
+        // Also where there was no room for a byte: a task that waits to send would never make room.
+        let gave = status.room() && self.give();
+        let wanted = !self.sending.is_empty();
+        if wanted != self.room_requested {
+            self.room_requested = wanted;
+            self.usart.request_room(wanted);
         }
-        // More may wait. A real line would interrupt again by itself.
-        NVIC::pend(self.usart.interrupt);
+        if self.emulated && (took || gave) {
+            NVIC::pend(self.usart.interrupt);
+        }
     }
 
-    fn give(&mut self) {
-        for _ in 0..BURST {
-            if !self.usart.status().room {
-                return;
-            }
-            let Some(byte) = self.sending.pop() else { break };
+    /// Takes the byte that has come; whether there was room for it.
+    #[inline(always)]
+    fn take(&mut self, status: Status) -> bool {
+        if !self.received.push_with(|| self.usart.read()) {
+            self.hold();
+            return false;
+        }
+        if status.damaged() {
+            count(&self.faults.lost);
+        }
+        true
+    }
+
+    /// Leaves the byte in the register until there is room; the line then reports an overrun. The interrupt is
+    /// masked in the NVIC: the emulated USART keeps it raised whatever its own enable bit says.
+    #[cold]
+    fn hold(&self) {
+        NVIC::mask(self.usart.interrupt);
+        if !self.faults.holding.swap(true, Ordering::Relaxed) {
+            count(&self.faults.held);
+        }
+    }
+
+    /// Gives the line the next byte; whether there was one.
+    #[inline(always)]
+    fn give(&mut self) -> bool {
+        let byte = self.sending.pop();
+        if let Some(byte) = byte {
             self.usart.write(byte);
         }
-        if self.sending.is_empty() {
-            self.usart.wants_room(false);
-        }
+        byte.is_some()
     }
 }
 
-/// A port that waits for nothing: what is not ready is an error (`TimedOut`).
+/// A task's end of a line. It never waits: where nothing is ready it gives an error (`TimedOut`).
 pub struct Port<const N: usize> {
     usart: Usart,
-    received: &'static Queue<u8, N>,
-    sending: &'static Queue<u8, SENDING>,
+    received: &'static Ring<u8, N>,
+    sending: &'static Ring<u8, SENDING>,
     faults: &'static Faults,
 }
 
 /// Both ends of a line.
 pub fn line<const N: usize>(
     usart: Usart,
-    received: &'static Queue<u8, N>,
-    sending: &'static Queue<u8, SENDING>,
+    received: &'static Ring<u8, N>,
+    sending: &'static Ring<u8, SENDING>,
     faults: &'static Faults,
+    emulated: bool,
 ) -> (Handler<N>, Port<N>) {
-    (Handler { usart, received, sending, faults }, Port { usart, received, sending, faults })
+    (
+        Handler { usart, received, sending, faults, room_requested: false, emulated },
+        Port { usart, received, sending, faults },
+    )
 }
 
 impl<const N: usize> Port<N> {
     /// The next received byte.
     pub fn receive(&mut self) -> Option<u8> {
         let byte = self.received.pop()?;
-        // There is room again: let the line go on.
+        // There is room again.
         if self.faults.holding.swap(false, Ordering::Relaxed) {
             self.wake();
         }
@@ -126,20 +137,13 @@ impl<const N: usize> Port<N> {
         self.faults.held.load(Ordering::Relaxed)
     }
 
-    /// Has the handler run. Pended by hand: the emulated line raises no interrupt when it can send, nor
-    /// a second time for a byte that has come while the one before was read.
+    /// Runs the handler, even where reception is held up. Pended by hand: the emulated line raises no interrupt when it can send, nor a
+    /// second time for a byte that came while the one before was read.
     fn wake(&self) {
-        // SAFETY: the handler shares nothing but the queues, and nobody masks an interrupt to
+        // SAFETY: the handler shares nothing but the rings, and nobody masks an interrupt to
         // keep it from them.
         unsafe { NVIC::unmask(self.usart.interrupt) };
         NVIC::pend(self.usart.interrupt);
-    }
-
-    /// Has the handler send what waits. Also where the line is held: what a flooded line has to say
-    /// must get out, or nobody takes what waits.
-    fn kick(&self) {
-        self.usart.wants_room(true);
-        self.wake();
     }
 }
 
@@ -164,7 +168,7 @@ impl<const N: usize> Read for Port<N> {
 impl<const N: usize> WriteReady for Port<N> {
     fn write_ready(&mut self) -> Result<bool, ErrorKind> {
         if !self.sending.is_empty() {
-            self.kick();
+            self.wake();
         }
         Ok(!self.sending.is_full())
     }
@@ -176,12 +180,12 @@ impl<const N: usize> Write for Port<N> {
         if taken == 0 && !bytes.is_empty() {
             return Err(ErrorKind::TimedOut);
         }
-        self.kick();
+        self.wake();
         Ok(taken)
     }
 
     fn flush(&mut self) -> Result<(), ErrorKind> {
-        let sent = |_| self.sending.is_empty() && self.usart.status().sent;
+        let sent = |_| self.sending.is_empty() && self.usart.status().sent();
         if (0..FLUSH_POLLS).any(sent) { Ok(()) } else { Err(ErrorKind::TimedOut) }
     }
 }

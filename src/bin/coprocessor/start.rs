@@ -1,66 +1,77 @@
 //! Makes what the tasks own, where it stays.
+#![allow(unsafe_code, reason = "a peripheral that is taken; the block says why it is sound")]
 
 use crate::board::Board;
-use crate::chip::{PARTS, bus::BITS_PER_SECOND, flash::Flash};
 use crate::idle::Stored;
-use crate::output::{Doubts, Unconnected};
-use crate::regions::{Records, Slots};
-use crate::window::Windows;
+use crate::output::OutputParts;
+use crate::regions::{self, Records, Slots};
+use crate::stm32f405::{can::BITS_PER_SECOND, flash::Flash, pac};
 use core::mem::MaybeUninit;
-use gyronet::can::config::Config;
-use gyronet::can::wheel::WheelSettings;
-use gyronet::guard::Guard;
+use gyronet::align::clock_ratio::ClockRatioConfig;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::coprocessor::{Clock, Config, StorageFaults};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{Blob, FogBlob, FogNet, weights};
 use gyronet::service::{Device, Drives};
-use gyronet::store::FogPart;
+use gyronet::store::{FogPart, ImuPart};
 
-/// A fibre-optic gyro is listened to whether one is configured or not.
-const DRIVES: Drives = Drives { imus: PARTS, fogs: &[FogPart::Dsp1760], bits_per_second: &[BITS_PER_SECOND] };
+/// The hardware that this image drives. It listens to a fibre-optic gyro whether one is configured or not.
+const DRIVES: Drives = Drives {
+    imus: &[ImuPart::XsensMti, ImuPart::Icm42688],
+    fogs: &[FogPart::Dsp1760],
+    bits_per_second: &[BITS_PER_SECOND],
+};
 /// Whose wheel frames are understood.
 pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
 
+/// The identifiers of the frames that CAN receives.
+pub fn received() -> impl Iterator<Item = embedded_can::Id> {
+    WHEELS.frames.into_iter().flatten().map(|frame| frame.id)
+}
+
 /// What each task gets.
 pub struct Parts {
-    pub output: Unconnected,
+    pub output: OutputParts,
+    pub config: Config,
     /// To be put under the network.
     pub weights: Option<Blob<'static>>,
     pub fog_network: Option<&'static mut FogNet<'static, 'static>>,
-    /// A fibre-optic gyro is configured.
-    pub fog_expected: bool,
     pub device: Stored,
 }
 
 /// `None` when they have been made before.
 #[inline(never)]
 pub fn parts(board: &Board) -> Option<Parts> {
-    let flash = match Flash::probe() {
-        Some(flash) => Some(&*cortex_m::singleton!(: Flash = flash)?),
-        None => None,
-    };
+    // SAFETY: the clock tree is done with the controller, and this runs once.
+    let registers = unsafe { pac::FLASH::steal() };
+    let flash = &*cortex_m::singleton!(: Flash = Flash::new(registers))?;
     let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(&DRIVES) })?;
-    let writable = flash.is_some_and(Flash::writable);
-    device.begin(flash.map(Records), flash.map(Slots), writable, board.identity);
+    device.begin(Some(Records(flash)), Some(Slots(flash)), flash.writable(), board.identity);
     // Without good weights the pipeline still runs: the status says degraded, and the rate is
     // the gyro's less its static bias.
-    let blob = device.weights(flash.map(Flash::slots_at_start), &weights::DEFAULT.0);
+    let blob = device.weights(Some(regions::slots_at_start()), &weights::DEFAULT.0);
     let check = blob.as_ref().map(BackgroundCheck::new);
     let configuration = device.configuration();
-    let pipeline = configuration.pipeline(device.calibration());
-    let windows = Windows::new(blob.is_some(), pipeline.compensate.mode.delay());
-    let (part, fog_ids) = (configuration.imu, configuration.fog_ids);
-    let fog_expected = configuration.fog.is_some();
-    let doubts = Doubts { stored: device.stored_damaged(), configuration: device.configuration_lost() };
-    // What is stored has been checked.
-    let config = Config::new(configuration.can).unwrap_or(Config::DEFAULT);
-    let guard = cortex_m::singleton!(: MaybeUninit<Guard> = MaybeUninit::uninit())?;
-    let guard = place(guard, || Guard::new(pipeline));
+    let fog_network = fog_network();
+    let config = Config {
+        wheels: WheelReceiver::new(WHEELS).ok(),
+        has_gyronet: blob.is_some(),
+        has_fognet: fog_network.is_some(),
+        clock: if board.emulated { Clock::Sensor } else { Clock::Outside },
+        clock_ratio: board.clocks.exact().then_some(ClockRatioConfig::DEFAULT),
+        storage: StorageFaults {
+            damaged: device.stored_damaged(),
+            configuration_lost: device.configuration_lost(),
+        },
+        ..configuration.coprocessor(device.calibration())
+    };
+    let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
-        output: Unconnected { guard, config, wheels: Some(WHEELS), windows, part, fog_ids, doubts },
+        output: OutputParts { part, bits_per_second },
+        config,
         weights: blob,
-        fog_network: fog_network(),
-        fog_expected,
+        fog_network,
         device: (device, check),
     })
 }

@@ -93,7 +93,7 @@ impl Config {
         messages
     }
 
-    /// Checks identifiers of further messages, those of [`super::fog_feed`]: none of them is ours.
+    /// Checks identifiers of further messages, those of [`super::fog_encoder`]: none of them is ours.
     ///
     /// # Errors
     /// [`ConfigError::Identifier`], [`ConfigError::DuplicateIdentifier`].

@@ -8,8 +8,7 @@
 //!
 //! | per column pair | instructions | cycles |
 //! |---|---|---|
-//! | load the words of gates (i, f) and (g, o) | 2 LDR, or half an LDM of 4 | 3, or 2.5 |
-//! | load the column pair | 2 LDR for two steps, or half an LDRD for one | 2, or 1.5 |
+//! | load the words of gates (i, f) and (g, o), and the column pair of one or two steps | 3 or 4 LDR | 3.5, or 5 |
 //! | SMLAD over the packed rows | 2 for each step | 2 |
 //! | SXTB16: their low bytes, in place | 2 | 2 |
 //! | SMLAD over the low rows | 2 for each step | 2 |
@@ -19,13 +18,22 @@
 //! multiply-accumulates for 14 instructions and 15 cycles. That is as many as the registers
 //! hold: 8 accumulators, 2 words of weights, 2 of columns, 2 pointers. [`step`] must wait for
 //! the state before it: 4 rows x 1 step, two column pairs at a time, 16 multiply-accumulates
-//! for 14 instructions and 20 cycles; its 4 rows are one unit's gates, so the unit is finished
+//! for 18 instructions and 19 cycles; its 4 rows are one unit's gates, so the unit is finished
 //! on the spot and no gate is ever stored. (8 rows would save an eighth of the recurrent
 //! cycles, but their accumulators and weights do not fit beside the pointers.)
 //!
-//! Inner loops are unrolled [`PROJECT_UNROLL`] and [`STEP_UNROLL`] times and entered in the
-//! middle where the columns do not divide by that; for 60 units and 120 inputs there is no
-//! remainder. No branch depends on data: the count of instructions is the same for all inputs.
+//! Loads stand side by side, since they are pipelined (Cortex-M4 TRM 3.3.2), and go to low registers,
+//! so that they take two bytes: a load through a pointer that stands 4 bytes before its words reaches
+//! 30 of them so. The last one through each pointer moves it on.
+//!
+//! # As small as the cache
+//! Flash is read in lines of 16 bytes, six cycles each on an STM32F405 at 168 MHz, and its accelerator
+//! holds 64 of them (RM0090 3.5.2). Inner loops are unrolled [`PROJECT_UNROLL`] and [`STEP_UNROLL`]
+//! times, so that each kernel fits in four fifths of that with the loop around it: only weights are
+//! read from flash, and those of several pairs of steps once. Loops are entered in the middle where the
+//! columns do not divide by the unrolling. Where a loop reads weights from flash, it begins in the middle
+//! of a line: the load that misses comes last in its line, when the prefetch of the next one is over.
+//! No branch depends on data: the count of instructions is the same for all inputs.
 //!
 //! # A unit's end
 //! Sums to gate inputs: SMULWB/SMULWT with 16-bit multipliers, SSAT to 18 bits. A gate: table
@@ -34,18 +42,21 @@
 //! unit.
 //!
 //! # Expected and got
-//! Modelled cycles per multiply-accumulate, zero wait states (`cargo bench-target`):
+//! Modelled cycles per multiply-accumulate (`cargo bench-target`):
 //!
-//! | kernel | multiply-accumulates | inner loop alone | whole kernel |
-//! |---|---|---|---|
-//! | `kernel/project_120x60` | 57,600 | 0.94 | 0.99 |
-//! | `kernel/step_60` | 14,400 | 1.25 | 1.57, gates and states included |
+//! | kernel | multiply-accumulates | inner loop alone | zero wait states | flash at 5 |
+//! |---|---|---|---|---|
+//! | `kernel/project_120x60`: one pair of steps, weights from flash | 57,600 | 0.94 | 1.03 | 1.23 |
+//! | `kernel/project_120x60x5`: five pairs, each weight copied once | 288,000 | 0.94 | 1.08 | 1.12 |
+//! | `kernel/step_60`: weights from flash; gates and states included | 14,400 | 1.19 | 1.54 | 1.90 |
+//! | `kernel/step_60_from_ram`: the same, weights copied before | 14,400 | 1.19 | 1.54 | 1.55 |
 
 #![allow(unsafe_code, reason = "assembly; the only such file of the library")]
 
 use crate::nn::activation::{SIGMOID, SIGMOID_SHIFT, TANH, TANH_FRACTION_SCALE, TANH_SHIFT};
-use crate::nn::lstm::{Accumulators, Direction};
+use crate::nn::lstm::{Accumulators, BIAS_WORDS, Direction, MAX_INPUTS, Projection};
 use core::arch::naked_asm;
+use core::mem::MaybeUninit;
 
 /// Names a core that has the extension, where the architecture has it as an option: the code of
 /// a naked function is assembled without the compiler's target features.
@@ -63,32 +74,43 @@ macro_rules! cpu {
 }
 
 /// Column pairs in the unrolled loop of the projection.
-const PROJECT_UNROLL: usize = 30;
-/// Bytes of code for one of them: 14 instructions of 4 bytes.
-const PROJECT_BYTES: usize = 56;
+const PROJECT_UNROLL: usize = 12;
+/// Bytes of code for one of them: 4 loads of 2 bytes and 10 instructions of 4; the last one has 4 more.
+const PROJECT_BYTES: usize = 48;
 /// Double column pairs in the unrolled loop of the recurrent step.
-const STEP_UNROLL: usize = 15;
-/// Bytes of code for one of them: 14 instructions of 4 bytes.
-const STEP_BYTES: usize = 56;
+const STEP_UNROLL: usize = 8;
+/// Bytes of code for one of them: 4 loads of 2 bytes and 14 instructions of 4; the last one has 2 more.
+const STEP_BYTES: usize = 64;
 
 /// What the projection kernel needs, in the order in which it unpacks it.
 #[repr(C)]
 struct ProjectCall {
+    /// A word before the columns of the first pair of steps.
     x: *const u32,
+    /// A word before the end of those of the last one.
     x_end: *const u32,
-    first: *mut Accumulators,
-    second: *mut Accumulators,
-    first_end: *const Accumulators,
-    /// Bytes into the unrolled loop at which a unit begins.
+    /// The first unit's, of the first step.
+    projection: *mut Accumulators,
+    projection_end: *const Accumulators,
+    /// Where a unit's record is copied to, or null: it is read where it lies.
+    record: *mut u32,
+    record_bytes: usize,
+    /// Bytes into the unrolled loop at which a pair of steps begins.
     entry: usize,
-    /// From a unit's bias to where its weights would begin if the loop were entered at its top.
-    to_weights: isize,
+    /// Bytes of columns and of weights before where they begin, as if the loop were entered at its top.
+    skipped: usize,
+    /// Bytes from a step's accumulators to those of the next one.
+    step_bytes: usize,
+    /// Bytes from a pair's columns to those of the next one.
+    pair_bytes: usize,
 }
 
 /// What the step kernel needs, in the order in which it unpacks it.
 #[repr(C)]
 struct StepCall {
+    /// A word before the columns, less those that the first turn of the loop leaves out.
     previous: *const u32,
+    /// A word before their end.
     previous_end: *const u32,
     projection: *const Accumulators,
     cell_state: *mut i32,
@@ -96,8 +118,9 @@ struct StepCall {
     hidden_end: *const u16,
     /// Bytes into the unrolled loop at which a unit begins, or [`NO_PREVIOUS`].
     entry: usize,
-    /// Bytes of recurrent words before a unit's multipliers.
-    row_bytes: usize,
+    /// From a unit's weights back to where they would begin if the loop were entered at its top; without
+    /// a previous state, over all of them to its multipliers.
+    to_weights: isize,
     sigmoid: *const i32,
     tanh: *const i32,
 }
@@ -108,29 +131,34 @@ const NO_PREVIOUS: usize = usize::MAX;
 pub(in crate::nn) fn project<const U: usize>(
     direction: &Direction<'_>,
     x: &[u32],
-    projection: &mut [[Accumulators; U]; 2],
+    projection: &mut [Projection<U>],
 ) {
-    let pairs = direction.inputs() / 2;
-    let [first, second] = projection;
-    // The caller has made sure of both lengths.
-    let (Some(x), Some(units)) = (x.get(..direction.inputs()), first.get(..direction.units())) else {
+    let inputs = direction.inputs();
+    // The caller has made sure of all lengths.
+    if U == 0 || projection.is_empty() || x.len() != inputs * projection.len() || U != direction.units() {
         return;
-    };
-    let first_end = units.as_ptr_range().end;
-    let skipped = entry(pairs, PROJECT_UNROLL);
+    }
+    // A record is read for each pair of steps: from a second one on, its copy is the quicker one to read.
+    let mut record = MaybeUninit::<[u32; BIAS_WORDS + MAX_INPUTS]>::uninit();
+    let copy = if projection.len() > 1 { record.as_mut_ptr().cast() } else { core::ptr::null_mut() };
+    let first = projection.as_mut_ptr().cast::<Accumulators>();
+    let skipped = entry(inputs / 2, PROJECT_UNROLL);
     let call = ProjectCall {
-        // The loop addresses from its top, also when it is entered in the middle.
-        x: x.as_ptr().wrapping_sub(2 * skipped),
-        x_end: x.as_ptr_range().end,
-        first: first.as_mut_ptr(),
-        second: second.as_mut_ptr(),
-        first_end,
+        x: x.as_ptr().wrapping_sub(1),
+        x_end: x.as_ptr_range().end.wrapping_sub(1),
+        projection: first,
+        projection_end: first.wrapping_add(U),
+        record: copy,
+        record_bytes: size_of::<Accumulators>() + 4 * inputs,
         entry: skipped * PROJECT_BYTES,
-        to_weights: 16 - 8 * skipped as isize,
+        skipped: 8 * skipped,
+        step_bytes: size_of::<[Accumulators; U]>(),
+        pair_bytes: 4 * inputs,
     };
-    // SAFETY: `Direction` guarantees units x (4 + inputs) readable words and at least one pair
-    // of inputs; `x` has exactly `inputs` words, both planes hold `U` = `units` records. The
-    // kernel reads and writes just these, and nothing else is aliased by the `&mut`.
+    // SAFETY: `Direction` guarantees units x (4 + inputs) readable words, at least one pair of inputs
+    // and at most as many as `record` has words for; `x` has `inputs` words for each pair of steps, and
+    // `projection` two times `U` = `units` records. The kernel reads and writes just these, and
+    // nothing else is aliased by the `&mut`.
     unsafe { project_kernel(&call, direction.input().as_ptr()) }
 }
 
@@ -143,19 +171,20 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
 ) {
     let hidden = hidden.as_mut_ptr().cast::<u16>();
     let quads = W / 2;
-    let (start, entry) = match previous {
-        Some(previous) => (previous.as_ptr(), entry(quads, STEP_UNROLL) * STEP_BYTES),
-        None => (core::ptr::null(), NO_PREVIOUS),
+    let skipped = entry(quads, STEP_UNROLL);
+    let (start, entry, to_weights) = match previous {
+        Some(previous) => (previous.as_ptr(), skipped * STEP_BYTES, -((16 * skipped) as isize)),
+        None => (core::ptr::null(), NO_PREVIOUS, (8 * W) as isize),
     };
     let call = StepCall {
-        previous: start,
-        previous_end: start.wrapping_add(2 * quads),
+        previous: start.wrapping_sub(2 * skipped + 1),
+        previous_end: start.wrapping_add(2 * quads).wrapping_sub(1),
         projection: projection.as_ptr(),
         cell_state: cell_state.as_mut_ptr(),
         hidden,
         hidden_end: hidden.wrapping_add(direction.units()),
         entry,
-        row_bytes: 8 * W,
+        to_weights,
         // Entry 0 is the most negative input; the kernel indexes from the middle.
         sigmoid: SIGMOID[SIGMOID.len() / 2..].as_ptr(),
         tanh: TANH[TANH.len() / 2..].as_ptr(),
@@ -167,15 +196,57 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
     unsafe { step_kernel(&call, direction.recurrent().as_ptr()) }
 }
 
+/// Words that the copying kernel takes at once.
+const COPY_WORDS: usize = 8;
+
+/// Copies as much as is in both.
+pub(in crate::nn) fn copy(from: &[u32], to: &mut [u32]) {
+    let (from, to) = (from.as_chunks::<COPY_WORDS>(), to.as_chunks_mut::<COPY_WORDS>());
+    let chunks = from.0.len().min(to.0.len());
+    if chunks > 0 {
+        // SAFETY: both have so many chunks, and the `&mut` is aliased by nothing.
+        unsafe { copy_kernel(from.0.as_ptr(), to.0.as_mut_ptr(), to.0.as_ptr().wrapping_add(chunks)) }
+    }
+    for (from, to) in from.1.iter().zip(to.1) {
+        *to = *from;
+    }
+}
+
+/// Copies chunks until `to` is `to_end`, at least one. The loop lies in one line of flash, whose reads do
+/// not get in the way of the data's then.
+///
+/// # Safety
+/// As stated where it is called.
+#[unsafe(naked)]
+unsafe extern "C" fn copy_kernel(
+    from: *const [u32; COPY_WORDS],
+    to: *mut [u32; COPY_WORDS],
+    to_end: *const [u32; COPY_WORDS],
+) {
+    naked_asm!(
+        cpu!(),
+        "push {{r4-r10}}",
+        "b.n 1f",
+        ".p2align 4",
+        "1:",
+        "ldm r0!, {{r3-r10}}",
+        "stm r1!, {{r3-r10}}",
+        "cmp r1, r2",
+        "bne.n 1b",
+        "pop {{r4-r10}}",
+        "bx lr",
+    )
+}
+
 /// Where to enter a loop of `unroll` so that `count` is met at the end of a turn.
 fn entry(count: usize, unroll: usize) -> usize {
     (unroll - count % unroll) % unroll
 }
 
-/// For each unit: `first` and `second` := bias + rows . x.
+/// For each unit and each pair of steps: both steps' accumulators := bias + rows . columns.
 ///
-/// r0 weights, r1 columns, r2 r3 columns of both steps, r4-r7 sums of the first step, r8-r11 of
-/// the second, r12 lr weights.
+/// r0 a word before the weights, r1 a word before the columns, r2 r3 columns of both steps, r4 r5
+/// weights, r6-r9 sums of the first step, r10-r12 lr of the second.
 ///
 /// # Safety
 /// As stated where it is called.
@@ -184,63 +255,144 @@ unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
     naked_asm!(
         cpu!(),
         "push {{r4-r11, lr}}",
-        "ldm r0, {{r2-r8}}",
+        "ldm r0, {{r2-r11}}",
         "adr.w r12, 2f",
-        "add r7, r7, r12",
-        "orr r7, r7, #1",
-        "push {{r2-r8}}",
-        // sp: +0 x, +4 x_end, +8 first, +12 second, +16 first_end, +20 entry, +24 to_weights
-        "mov r0, r1",
+        "add r8, r8, r12",
+        "orr r8, r8, #1",
+        "sub sp, sp, #16",
+        "push {{r2-r11}}",
+        // sp: +0 x, +4 x_end, +8 projection, +12 projection_end, +16 record, +20 record_bytes,
+        // +24 entry, +28 skipped, +32 step_bytes, +36 pair_bytes; +40 the record at work, +44 the
+        // accumulators at work, +48 the end of the pair's columns, +52 the next unit's record
+        // All pointers to records stand at their last bias.
+        "add.w r1, r1, #12",
+        // A unit: its record is copied, or read where it lies.
         "1:",
-        "ldm r0, {{r8-r11}}",
-        "ldm r0, {{r4-r7}}",
+        "ldr r0, [sp, #16]",
+        "ldr r2, [sp, #20]",
+        "str r1, [sp, #40]",
+        "cmp r0, #0",
+        "bne.w 4f",
+        "add r1, r1, r2",
+        "6:",
+        "str r1, [sp, #52]",
         "ldr r1, [sp, #0]",
-        "ldr r2, [sp, #24]",
-        "add r0, r0, r2",
-        "ldr.w pc, [sp, #20]",
-        ".p2align 2",
+        "ldr r2, [sp, #8]",
+        "str r2, [sp, #44]",
+        // A pair of steps.
+        "7:",
+        "ldr r0, [sp, #40]",
+        "ldr r2, [sp, #28]",
+        "ldr r3, [sp, #36]",
+        "ldr r6, [r0, #-12]",
+        "ldr r7, [r0, #-8]",
+        "ldr r8, [r0, #-4]",
+        "ldr r9, [r0]",
+        "add r3, r3, r1",
+        "str r3, [sp, #48]",
+        "sub r1, r1, r2",
+        "sub r0, r0, r2",
+        "mov r10, r6",
+        "mov r11, r7",
+        "mov r12, r8",
+        "mov lr, r9",
+        "ldr.w pc, [sp, #24]",
+        ".p2align 4",
+        ".space 8",
         "2:",
-        ".set gyronet_at, 0",
-        ".rept {unroll}",
-        // Four single loads in a row overlap: one cycle less than two LDRD.
-        "ldr.w r12, [r0, #gyronet_at]",
-        "ldr.w lr, [r0, #gyronet_at + 4]",
-        "ldr.w r2, [r1, #gyronet_at]",
-        "ldr.w r3, [r1, #gyronet_at + 4]",
+        ".set gyronet_at, 4",
+        ".rept {unroll} - 1",
+        "ldr.n r2, [r1, #gyronet_at]",
+        "ldr.n r3, [r1, #gyronet_at + 4]",
+        "ldr.n r4, [r0, #gyronet_at]",
+        "ldr.n r5, [r0, #gyronet_at + 4]",
         ".set gyronet_at, gyronet_at + 8",
-        "smlad r5, r12, r2, r5",
-        "smlad r9, r12, r3, r9",
-        "smlad r7, lr, r2, r7",
-        "smlad r11, lr, r3, r11",
-        "sxtb16 r12, r12",
-        "sxtb16 lr, lr",
-        "smlad r4, r12, r2, r4",
-        "smlad r8, r12, r3, r8",
-        "smlad r6, lr, r2, r6",
-        "smlad r10, lr, r3, r10",
+        "smlad r7, r4, r2, r7",
+        "smlad r11, r4, r3, r11",
+        "smlad r9, r5, r2, r9",
+        "smlad lr, r5, r3, lr",
+        "sxtb16 r4, r4",
+        "sxtb16 r5, r5",
+        "smlad r6, r4, r2, r6",
+        "smlad r10, r4, r3, r10",
+        "smlad r8, r5, r2, r8",
+        "smlad r12, r5, r3, r12",
         ".endr",
-        "add.w r0, r0, #8 * {unroll}",
-        "add.w r1, r1, #8 * {unroll}",
-        "ldr r2, [sp, #4]",
+        "ldr.n r2, [r1, #gyronet_at]",
+        "ldr.w r3, [r1, #gyronet_at + 4]!",
+        "ldr.n r4, [r0, #gyronet_at]",
+        "ldr.w r5, [r0, #gyronet_at + 4]!",
+        "smlad r7, r4, r2, r7",
+        "smlad r11, r4, r3, r11",
+        "smlad r9, r5, r2, r9",
+        "smlad lr, r5, r3, lr",
+        "sxtb16 r4, r4",
+        "sxtb16 r5, r5",
+        "smlad r6, r4, r2, r6",
+        "smlad r10, r4, r3, r10",
+        "smlad r8, r5, r2, r8",
+        "smlad r12, r5, r3, r12",
+        "ldr r2, [sp, #48]",
         "cmp r1, r2",
         "bne.w 2b",
-        "ldrd r2, r3, [sp, #8]",
-        "stm r2!, {{r4-r7}}",
-        "stm r3!, {{r8-r11}}",
-        "strd r2, r3, [sp, #8]",
-        "ldr r12, [sp, #16]",
-        "cmp r2, r12",
+        // The next line is wanted before its prefetch has ended. So it comes into the cache, and is not
+        // prefetched again with each turn, when the first weights are to be read.
+        "b.n 8f",
+        ".p2align 4",
+        "8:",
+        "ldr r2, [sp, #44]",
+        "ldr r3, [sp, #32]",
+        "ldr r4, [sp, #4]",
+        "stm r2, {{r6-r9}}",
+        "add r2, r2, r3",
+        "stm r2, {{r10-r12, lr}}",
+        "add r2, r2, r3",
+        "str r2, [sp, #44]",
+        "cmp r1, r4",
+        "bne.w 7b",
+        "ldr r2, [sp, #8]",
+        "ldr r3, [sp, #12]",
+        "ldr r1, [sp, #52]",
+        "adds r2, r2, #16",
+        "str r2, [sp, #8]",
+        "cmp r2, r3",
         "bne.w 1b",
-        "add sp, sp, #28",
+        "add sp, sp, #56",
         "pop {{r4-r11, pc}}",
+        // A record is copied.
+        "4:",
+        "sub.w r1, r1, #12",
+        "bic r3, r2, #31",
+        "add r3, r3, r0",
+        "add.w r4, r0, #12",
+        "str r4, [sp, #40]",
+        "cmp r0, r3",
+        "beq.n 9f",
+        "5:",
+        "ldm r1!, {{r4-r11}}",
+        "stm r0!, {{r4-r11}}",
+        "cmp r0, r3",
+        "bne.n 5b",
+        "9:",
+        // Less than two lines are left, half of one where the pairs of columns are odd in number.
+        "tst r2, #16",
+        "itt ne",
+        "ldmne r1!, {{r4-r7}}",
+        "stmne r0!, {{r4-r7}}",
+        "tst r2, #8",
+        "itt ne",
+        "ldmne r1!, {{r4, r5}}",
+        "stmne r0!, {{r4, r5}}",
+        "add.w r1, r1, #12",
+        "b.w 6b",
         unroll = const PROJECT_UNROLL,
     )
 }
 
 /// For each unit: sums := projection + rows . previous; gates; cell state; hidden state.
 ///
-/// r0 weights, r1 previous, r2 r3 columns, r4-r7 sums, r8-r11 weights, r12 and lr the middles
-/// of the tables.
+/// r0 a word before the weights, r1 a word before previous, r2 r3 columns, r4-r7 weights, r8-r11 sums,
+/// r12 and lr the middles of the tables.
 ///
 /// # Safety
 /// As stated where it is called.
@@ -250,12 +402,12 @@ unsafe extern "C" fn step_kernel(call: &StepCall, weights: *const u32) {
         cpu!(),
         "push {{r4-r11, lr}}",
         "ldm r0, {{r2-r11}}",
-        "mov r0, r1",
+        "sub.w r0, r1, #4",
         "mov r12, r10",
         "mov lr, r11",
-        // Without a previous state the entry is the jump over the products.
+        // Without a previous state the entry is behind the products.
         "adr.w r10, 2f",
-        "adr.w r11, 4f",
+        "adr.w r11, 3f",
         "add r10, r10, r8",
         "cmp r8, #{no_previous}",
         "it eq",
@@ -263,92 +415,116 @@ unsafe extern "C" fn step_kernel(call: &StepCall, weights: *const u32) {
         "orr r8, r10, #1",
         "push {{r2-r9}}",
         // sp: +0 previous, +4 previous_end, +8 projection, +12 cell_state, +16 hidden,
-        // +20 hidden_end, +24 entry, +28 row_bytes
+        // +20 hidden_end, +24 entry, +28 to_weights
         "1:",
         "ldr r1, [sp, #0]",
         "ldr r2, [sp, #8]",
-        "ldm r2!, {{r4-r7}}",
+        "ldr r3, [sp, #28]",
+        "ldm r2!, {{r8-r11}}",
+        "add r0, r0, r3",
         "str r2, [sp, #8]",
         "ldr.w pc, [sp, #24]",
-        ".p2align 2",
-        "4:",
-        "ldr r2, [sp, #28]",
-        "add r0, r0, r2",
-        "b.w 3f",
-        ".p2align 2",
+        ".p2align 4",
+        ".space 8",
         "2:",
-        ".rept {unroll}",
-        "ldm.w r0!, {{r8-r11}}",
-        "ldrd r2, r3, [r1], #8",
-        "smlad r5, r8, r2, r5",
-        "smlad r7, r9, r2, r7",
-        "smlad r5, r10, r3, r5",
-        "smlad r7, r11, r3, r7",
-        "sxtb16 r8, r8",
-        "sxtb16 r9, r9",
-        "sxtb16 r10, r10",
-        "sxtb16 r11, r11",
-        "smlad r4, r8, r2, r4",
-        "smlad r6, r9, r2, r6",
-        "smlad r4, r10, r3, r4",
-        "smlad r6, r11, r3, r6",
+        ".set gyronet_at, 4",
+        ".rept {unroll} - 1",
+        "ldr.n r2, [r1, #gyronet_at]",
+        "ldr.n r3, [r1, #gyronet_at + 4]",
+        "ldr.n r4, [r0, #2 * gyronet_at - 4]",
+        "ldr.n r5, [r0, #2 * gyronet_at]",
+        "ldr.w r6, [r0, #2 * gyronet_at + 4]",
+        "ldr.w r7, [r0, #2 * gyronet_at + 8]",
+        ".set gyronet_at, gyronet_at + 8",
+        "smlad r9, r4, r2, r9",
+        "smlad r11, r5, r2, r11",
+        "smlad r9, r6, r3, r9",
+        "smlad r11, r7, r3, r11",
+        "sxtb16 r4, r4",
+        "sxtb16 r5, r5",
+        "sxtb16 r6, r6",
+        "sxtb16 r7, r7",
+        "smlad r8, r4, r2, r8",
+        "smlad r10, r5, r2, r10",
+        "smlad r8, r6, r3, r8",
+        "smlad r10, r7, r3, r10",
         ".endr",
+        "ldr.n r2, [r1, #gyronet_at]",
+        "ldr.w r3, [r1, #gyronet_at + 4]!",
+        "ldr.n r4, [r0, #2 * gyronet_at - 4]",
+        "ldr.n r5, [r0, #2 * gyronet_at]",
+        "ldr.w r6, [r0, #2 * gyronet_at + 4]",
+        "ldr.w r7, [r0, #2 * gyronet_at + 8]!",
+        "smlad r9, r4, r2, r9",
+        "smlad r11, r5, r2, r11",
+        "smlad r9, r6, r3, r9",
+        "smlad r11, r7, r3, r11",
+        "sxtb16 r4, r4",
+        "sxtb16 r5, r5",
+        "sxtb16 r6, r6",
+        "sxtb16 r7, r7",
+        "smlad r8, r4, r2, r8",
+        "smlad r10, r5, r2, r10",
+        "smlad r8, r6, r3, r8",
+        "smlad r10, r7, r3, r10",
         "ldr r2, [sp, #4]",
         "cmp r1, r2",
         "bne.w 2b",
+        ".p2align 2",
         "3:",
         // The high rows are what the packed sums have more than the low ones, times 256.
-        "ldm r0!, {{r2, r3}}",
-        "sub r5, r5, r4",
-        "sub r7, r7, r6",
-        "smulwb r4, r4, r2",
-        "smulwt r5, r5, r2",
-        "smulwb r6, r6, r3",
-        "smulwt r7, r7, r3",
-        "ssat r4, #18, r4",
-        "ssat r5, #18, r5, asr #8",
-        "ssat r6, #18, r6",
-        "ssat r7, #18, r7, asr #8",
+        "ldr r2, [r0, #4]",
+        "ldr.w r3, [r0, #8]!",
+        "sub r9, r9, r8",
+        "sub r11, r11, r10",
+        "smulwb r8, r8, r2",
+        "smulwt r9, r9, r2",
+        "smulwb r10, r10, r3",
+        "smulwt r11, r11, r3",
+        "ssat r8, #18, r8",
+        "ssat r9, #18, r9, asr #8",
+        "ssat r10, #18, r10",
+        "ssat r11, #18, r11, asr #8",
         // Gates i, f, g, o: table words by the upper bits ...
-        "asr r8, r4, #{sigmoid_shift}",
-        "asr r9, r5, #{sigmoid_shift}",
-        "asr r10, r6, #{tanh_shift}",
-        "asr r11, r7, #{sigmoid_shift}",
-        "ldr r8, [r12, r8, lsl #2]",
-        "ldr r9, [r12, r9, lsl #2]",
-        "ldr r10, [lr, r10, lsl #2]",
-        "ldr r11, [r12, r11, lsl #2]",
+        "asr r4, r8, #{sigmoid_shift}",
+        "asr r5, r9, #{sigmoid_shift}",
+        "asr r6, r10, #{tanh_shift}",
+        "asr r7, r11, #{sigmoid_shift}",
+        "ldr r4, [r12, r4, lsl #2]",
+        "ldr r5, [r12, r5, lsl #2]",
+        "ldr r6, [lr, r6, lsl #2]",
+        "ldr r7, [r12, r7, lsl #2]",
         // ... and lines by the lower ones. r2 holds tanh's fraction, zero around it.
         "mov r2, #0",
-        "ubfx r4, r4, #0, #{sigmoid_shift}",
-        "ubfx r5, r5, #0, #{sigmoid_shift}",
-        "bfi r2, r6, #{tanh_scale}, #{tanh_shift}",
-        "ubfx r7, r7, #0, #{sigmoid_shift}",
-        "smlabb r4, r4, r8, r8",
-        "smlabb r5, r5, r9, r9",
-        "smlabb r6, r2, r10, r10",
-        "smlabb r7, r7, r11, r11",
+        "ubfx r8, r8, #0, #{sigmoid_shift}",
+        "ubfx r9, r9, #0, #{sigmoid_shift}",
+        "bfi r2, r10, #{tanh_scale}, #{tanh_shift}",
+        "ubfx r11, r11, #0, #{sigmoid_shift}",
+        "smlabb r8, r8, r4, r4",
+        "smlabb r9, r9, r5, r5",
+        "smlabb r10, r2, r6, r6",
+        "smlabb r11, r11, r7, r7",
         // Cell state: c f + i g.
-        "ldrd r10, r11, [sp, #12]",
-        "ldr r8, [r10]",
-        "smultt r9, r4, r6",
-        "smulwt r8, r8, r5",
-        "asr r9, r9, #10",
-        "qdadd r8, r9, r8",
-        "str r8, [r10], #4",
+        "ldrd r6, r7, [sp, #12]",
+        "ldr r4, [r6]",
+        "smultt r5, r8, r10",
+        "smulwt r4, r4, r9",
+        "asr r5, r5, #10",
+        "qdadd r4, r5, r4",
+        "str r4, [r6], #4",
         // Hidden state: o tanh(c).
-        "ssat r8, #18, r8, asr #6",
-        "asr r9, r8, #{tanh_shift}",
-        "bfi r2, r8, #{tanh_scale}, #{tanh_shift}",
-        "ldr r9, [lr, r9, lsl #2]",
-        "smlabb r9, r2, r9, r9",
-        "smultt r9, r7, r9",
-        "add r9, r9, #0x80000",
-        "asr r9, r9, #20",
-        "strh r9, [r11], #2",
-        "strd r10, r11, [sp, #12]",
+        "ssat r4, #18, r4, asr #6",
+        "asr r5, r4, #{tanh_shift}",
+        "bfi r2, r4, #{tanh_scale}, #{tanh_shift}",
+        "ldr r5, [lr, r5, lsl #2]",
+        "smlabb r5, r2, r5, r5",
+        "smultt r5, r11, r5",
+        "add r5, r5, #0x80000",
+        "asr r5, r5, #20",
+        "strh r5, [r7], #2",
+        "strd r6, r7, [sp, #12]",
         "ldr r2, [sp, #20]",
-        "cmp r11, r2",
+        "cmp r7, r2",
         "bne.w 1b",
         "add sp, sp, #32",
         "pop {{r4-r11, pc}}",

@@ -4,7 +4,7 @@
 //! the matching columns copied beside each other, one multiply-add of halfword pairs does all
 //! four packed rows; the low rows take the same words with their low bytes sign-extended.
 
-use crate::nn::lstm::{Accumulators, Direction, update};
+use crate::nn::lstm::{Accumulators, Direction, Projection, update};
 use crate::nn::pack;
 use wide::{i16x8, i32x4};
 
@@ -62,10 +62,15 @@ fn accumulate<const STEPS: usize>(
 pub(in crate::nn) fn project<const U: usize>(
     direction: &Direction<'_>,
     x: &[u32],
-    projection: &mut [[Accumulators; U]; 2],
+    projection: &mut [Projection<U>],
 ) {
+    for (x, projection) in x.chunks_exact(direction.inputs().max(1)).zip(projection) {
+        project_pair(direction, x, projection);
+    }
+}
+
+fn project_pair<const U: usize>(direction: &Direction<'_>, x: &[u32], [first, second]: &mut Projection<U>) {
     let inputs = direction.inputs();
-    let [first, second] = projection;
     let (x_quads, x_tail) = x.as_chunks::<4>();
     // Units come in pairs, so that the columns are laid out once for two of them.
     let outputs = first.as_chunks_mut::<2>().0.iter_mut().zip(second.as_chunks_mut::<2>().0);

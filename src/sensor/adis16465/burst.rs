@@ -12,7 +12,7 @@
 //! Eighteen zeros have the sum zero: an all-zero burst, and an all-one burst, are refused, for
 //! that is what a part without power and a cut line look like.
 
-use crate::sample::ImuSample;
+use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, RangeError, STANDARD_GRAVITY, SpecificForce};
 
 /// Bytes of a burst behind its command.
@@ -199,13 +199,14 @@ impl Burst {
             SpecificForce::from_metre_per_sec2(f32::from(count) / model.counts_per_g() * STANDARD_GRAVITY)
         };
         let ([gx, gy, gz], [ax, ay, az]) = (self.rate, self.acceleration);
+        let at_the_end = [gx, gy, gz, ax, ay, az].iter().any(|count| count.unsigned_abs() >= 32_767);
         let converted = || {
             Ok(ImuSample {
                 time,
                 specific_force: [force(ax)?, force(ay)?, force(az)?],
                 angular_rate: [rate(gx)?, rate(gy)?, rate(gz)?],
                 temperature: self.temperature.checked_mul(10).map(CentiCelsius),
-                clipped: [gx, gy, gz, ax, ay, az].iter().any(|count| count.unsigned_abs() >= 32_767),
+                validity: Validity::reported(at_the_end),
             })
         };
         converted().map_err(BurstError::Reading)

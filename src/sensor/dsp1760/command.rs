@@ -16,7 +16,7 @@ pub const MAX_LINE: usize = 20;
 pub enum Command {
     /// Enters (true) or leaves configuration mode.
     Configure(bool),
-    /// Messages per second. Two invalid messages follow: [`super::Dsp1760::set_rate`].
+    /// Messages per second. The two messages after the change are invalid.
     Rate(OutputRate),
     /// Increments or rates.
     Rotation(Rotation),

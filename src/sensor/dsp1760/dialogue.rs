@@ -7,8 +7,8 @@
 //!   [`ATTEMPTS`] times in all.
 //! - Whatever stands before an answer in its line (messages that still come in) is passed over.
 //!
-//! No port, no clock: bytes and the time come in, lines to send come out. Afterwards tell the
-//! parser: [`super::Dsp1760::set_rate`].
+//! No port, no clock: bytes and the time come in, lines to send come out. Make the parser
+//! ([`super::Dsp1760::new`]) afterwards, with the rate that was set.
 
 use super::command::{Command, MAX_LINE, Reply, setup};
 use super::config::{Dsp1760Config, OutputRate};

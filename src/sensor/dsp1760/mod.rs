@@ -64,14 +64,10 @@ pub struct Dsp1760Counters {
     pub repeated: u32,
     /// Built-in-test messages passed over.
     pub self_tests: u32,
-    /// Messages dropped after a change of rate.
-    pub settling: u32,
     /// Rotations that were marked as good but that no gyro can measure.
     pub implausible: u32,
 }
 
-/// Messages without meaning after a change of rate.
-const SETTLING: u8 = 2;
 /// The fastest rotation that is believed, rad/s: the part itself ends at 490 deg/s.
 const MAX_RATE: f32 = 16.0;
 
@@ -85,7 +81,6 @@ pub struct Dsp1760 {
     messages: MessageClock,
     /// Of format B.
     stamps: StampClock,
-    settling: u8,
     counters: Dsp1760Counters,
 }
 
@@ -99,26 +94,8 @@ impl Dsp1760 {
             last_sequence: None,
             messages: MessageClock::START,
             stamps: StampClock::START,
-            settling: 0,
-            counters: Dsp1760Counters {
-                gaps: 0,
-                lost: 0,
-                repeated: 0,
-                self_tests: 0,
-                settling: 0,
-                implausible: 0,
-            },
+            counters: Dsp1760Counters { gaps: 0, lost: 0, repeated: 0, self_tests: 0, implausible: 0 },
         }
-    }
-
-    /// The part has been told another rate: the next two messages say nothing, and the count
-    /// of messages begins anew.
-    pub fn set_rate(&mut self, rate: OutputRate) {
-        self.config.rate = rate;
-        self.settling = SETTLING;
-        self.last_sequence = None;
-        self.messages = MessageClock::START;
-        self.stamps = StampClock::START;
     }
 
     /// Takes one byte. Call [`Dsp1760::next_sample`] until `None` before the next one.
@@ -127,11 +104,11 @@ impl Dsp1760 {
         self.framer.push(byte);
     }
 
-    /// The next sample, or why an intact frame is none. Built-in-test messages and those that
-    /// settle are passed over.
+    /// Returns the next sample, or the reason why an intact frame is none. Built-in-test messages are
+    /// skipped.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
-        // Of 36 bytes one ends a message: the others are not to pay for a call.
+        // One byte in 36 ends a message: the others do not pay for what the message takes.
         if self.framer.is_waiting() { None } else { self.next_message() }
     }
 
@@ -147,11 +124,6 @@ impl Dsp1760 {
                 Ok(message) => message,
                 Err(error) => return Some(Err(Dsp1760Error::Message(error))),
             };
-            if self.settling > 0 {
-                self.settling -= 1;
-                count(&mut self.counters.settling, 1);
-                continue;
-            }
             return Some(self.sample(&message));
         }
     }

@@ -5,19 +5,20 @@
 //! configuration is read back in turn, so that a part that has reset itself or lost a bit is
 //! noticed within [`SETTINGS`] reads, not never.
 
+mod clock;
 mod config;
 pub mod packet;
 pub mod registers;
 mod sample;
 
-pub use config::{Icm42688Config, OutputRate, SETTINGS};
+pub use config::{Bandwidth, Icm42688Config, OutputRate, SETTINGS};
 
 use crate::sample::ImuSample;
+use clock::Clock;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Operation, SpiDevice};
 use packet::{MAX_PACKET, Packet, PacketError};
 use registers::{self as reg, Register, Setting};
-use sample::Clock;
 
 /// Looks at the reset bit, 1 ms apart.
 const RESET_POLLS: u8 = 10;

@@ -6,7 +6,7 @@
 //! | 1 | i16 acceleration x, y, z | the same, bits 19-4 of 20 |
 //! | 7 | i16 rate x, y, z | the same, bits 19-4 of 20 |
 //! | 13 | i8 temperature, t / 2.07 + 25 deg C | i16 temperature, t / 132.48 + 25 deg C |
-//! | end | u16 time | u16 time, then bits 3-0 for x, y, z: acceleration high, rate low nibble |
+//! | end | u16 time, 32/30 us | u16 time, 32/30 us, then bits 3-0 for x, y, z: acceleration high, rate low nibble |
 //!
 //! Bit 7 of the header means that the FIFO was empty. A most negative reading is no reading;
 //! of 20 bits, -524288. There is no checksum: a bit that flips on the bus is a wrong reading,
@@ -91,7 +91,7 @@ pub struct Packet {
     pub rate: [Option<i32>; 3],
     /// 8 or 16 bits.
     pub temperature: Option<i16>,
-    /// Microseconds of the part, wraps.
+    /// The part's time stamp, counts of 32/30 us modulo 2^16.
     pub time: u16,
 }
 

@@ -49,6 +49,12 @@ pub const PWR_MGMT0: Register = bank0(0x4E);
 pub const GYRO_CONFIG0: Register = bank0(0x4F);
 /// Accelerometer range and rate.
 pub const ACCEL_CONFIG0: Register = bank0(0x50);
+/// Order of the gyro's last filter.
+pub const GYRO_CONFIG1: Register = bank0(0x51);
+/// Bandwidth of the last filters: accelerometer in the high nibble, gyro in the low one.
+pub const GYRO_ACCEL_CONFIG0: Register = bank0(0x52);
+/// Order of the accelerometer's last filter.
+pub const ACCEL_CONFIG1: Register = bank0(0x53);
 /// What goes into the FIFO.
 pub const FIFO_CONFIG1: Register = bank0(0x5F);
 /// [`IDENTITY`].
@@ -90,6 +96,10 @@ pub const LOW_NOISE: u8 = 0x0F;
 pub const GYRO_250_DPS: u8 = 3 << 5;
 /// [`ACCEL_CONFIG0`]: 16 g.
 pub const ACCEL_16_G: u8 = 0 << 5;
+/// [`GYRO_CONFIG1`]: GYRO_UI_FILT_ORD, bits 3-2.
+pub const GYRO_THIRD_ORDER: u8 = 2 << 2;
+/// [`ACCEL_CONFIG1`]: ACCEL_UI_FILT_ORD, bits 4-3.
+pub const ACCEL_THIRD_ORDER: u8 = 2 << 3;
 /// [`FIFO_CONFIG1`]: temperature, gyro, accelerometer.
 pub const FIFO_16_BIT: u8 = 0x07;
 /// [`FIFO_CONFIG1`]: the same with 20 bits.

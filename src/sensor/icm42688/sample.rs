@@ -1,8 +1,7 @@
-//! From a packet's counts to the pipeline's units, and from the part's clock to one that never
-//! wraps.
+//! A packet's counts in the pipeline's units.
 
 use super::packet::{Packet, Resolution};
-use crate::sample::ImuSample;
+use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, STANDARD_GRAVITY, SpecificForce};
 
 impl Resolution {
@@ -60,31 +59,18 @@ impl Packet {
                 // At most 27,000.
                 CentiCelsius(libm::roundf(f32::from(code) * (100.0 / per_degree) + 2500.0) as i16)
             }),
-            clipped: readings().any(|reading| clipped(self.resolution, *reading)),
+            validity: Validity::reported(readings().any(|reading| clipped(self.resolution, *reading))),
         })
     }
 }
 
-/// The ends of the range. The bits below 16 say nothing there.
+/// Tells whether a reading is an end of the range. With FIFO_HOLD_LAST_DATA_EN = 0, as after a
+/// reset, the lowest reading is -32,766 of 16 bits and -524,256 of 20, for those below mark what is no
+/// reading (DS-000347, 12.8).
 const fn clipped(resolution: Resolution, reading: i32) -> bool {
-    let high = match resolution {
-        Resolution::Bits16 => reading,
-        Resolution::Bits20 => reading >> 4,
-    };
-    high >= 32_767 || high <= -32_767
-}
-
-/// The part's 16-bit microseconds, unwrapped: right as long as two samples are less than
-/// 65 ms apart. A longer silence is told by the arrival times ([`crate::align`]).
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Clock {
-    last: Option<(u16, u64)>,
-}
-
-impl Clock {
-    pub(super) fn unwrap(&mut self, time: u16) -> Micros {
-        let now = self.last.map_or(u64::from(time), |(last, at)| at + u64::from(time.wrapping_sub(last)));
-        self.last = Some((time, now));
-        Micros(now)
+    match resolution {
+        Resolution::Bits16 => reading <= -32_766 || reading >= 32_767,
+        // Of 20 bits the lowest is always 0 in a rate, the lowest two in an acceleration.
+        Resolution::Bits20 => reading <= -524_256 || reading >= 524_284,
     }
 }

@@ -14,7 +14,7 @@ pub use xbus::{MAX_FRAME, Xbus};
 
 use super::framer::Framer;
 use super::unwrap::StampClock;
-use crate::sample::ImuSample;
+use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
 
@@ -45,7 +45,7 @@ impl Mti {
     /// The next sample, or why an intact data message is none. Other messages are passed over.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
-        // Of 54 bytes one ends a message: the others are not to pay for a call.
+        // One byte in 54 ends a message: the others do not pay for what the message takes.
         if self.framer.is_waiting() { None } else { self.next_message() }
     }
 
@@ -79,7 +79,7 @@ impl Mti {
             specific_force: [fx.map_err(a)?, fy.map_err(a)?, fz.map_err(a)?],
             angular_rate: [wx.map_err(r)?, wy.map_err(r)?, wz.map_err(r)?],
             temperature: message.temperature.and_then(centi_celsius),
-            clipped: message.status.is_some_and(|status| status & STATUS_CLIPPED != 0),
+            validity: Validity::reported(message.status.is_some_and(|status| status & STATUS_CLIPPED != 0)),
             time: Micros(self.stamps.unwrap(ticks) * 100),
         })
     }

@@ -15,8 +15,9 @@ use super::message::{
     AllCounters, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal, Reply,
     Request,
 };
+use super::standstill::StandstillGate;
 use crate::health::{Status, count};
-use crate::sample::ImuSample;
+use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Store};
 use embedded_storage::nor_flash::NorFlash;
@@ -56,6 +57,7 @@ pub struct Device<R: NorFlash, W> {
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
     uploading: Option<Uploading>,
+    standstill: StandstillGate,
     sensor: Option<SensorFault>,
     status: Status,
     tick: u32,
@@ -88,6 +90,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights_crc: None,
             refused_slots: [None; 2],
             uploading: None,
+            standstill: StandstillGate::new(),
             sensor: None,
             status: Status::Init,
             tick: 0,
@@ -125,9 +128,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.sensor = fault;
     }
 
-    /// Takes every sample of the sensor (`None` while it is silent), with the status of what was made of it.
-    pub fn observe(&mut self, sample: Option<&ImuSample>, tick: u32, status: Status) {
+    /// Takes every sample of the sensor (`None` while it is silent), with the status of what was made of it and
+    /// what the wheels show.
+    pub fn observe(&mut self, sample: Option<&ImuSample>, tick: u32, status: Status, wheels: Standstill) {
         self.tick = tick;
+        self.standstill.observe(sample, wheels, &self.configuration.static_init);
         if status != self.status {
             self.status = status;
             self.note(EventKind::Status(status));
@@ -201,6 +206,10 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Does what is asked.
     #[inline(never)]
     fn act(&mut self, request: &Request) -> Result<(), Refusal> {
+        // A board without a flash controller is emulated: nothing can be written, and nothing depends on it.
+        if self.writable && request.interrupts() && !self.standstill.is_open() {
+            return Err(Refusal::Moving);
+        }
         match request {
             Request::SetConfiguration { version, configuration } => {
                 self.set_configuration(*version, configuration)

@@ -19,7 +19,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             self.note(EventKind::Crashed(crash));
         }
         if let Some(records) = records {
-            match Store::open(records, 0) {
+            match Store::open(records, 0, !writable) {
                 Ok(store) => self.load(store),
                 Err(error) => self.flash = FlashState::Failed(error),
             }

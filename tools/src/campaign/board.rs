@@ -1,98 +1,60 @@
 //! The board on the host: bytes of its lines in, bytes of its line out, a millisecond at a time.
 //!
-//! What it does is the image's main loop with the library's parts: sensor, watch and pipeline,
-//! network, feeds, SLCAN port, wheel frames.
+//! It is the image's input and output around the library's [`Coprocessor`]: parsers of the part, SLCAN port, networks.
 
+use super::drive::START_US;
 use super::fault::Line;
 use super::input::{Delivered, Input};
+use super::networks::Networks;
 use super::part::Part;
 use super::wire::Message;
-use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
+use crate::wheel_frames;
+use embedded_can::{Frame, Id};
+use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::slcan::port::Port;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::guard::Guard;
-use gyronet::model::{Estimate, WindowNetwork};
+use gyronet::can::yaw::FOG_IDS;
+use gyronet::coprocessor::{Config, Coprocessor, TimedFrame};
 use gyronet::pipeline::PipelineConfig;
-use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sample::PERIOD_US;
 use gyronet::units::{AngularRate, Micros};
-use gyronet::vehicle::VehicleSample;
-use gyronet::window::{Features, WINDOW};
-use std::collections::HashMap;
-use std::sync::OnceLock;
 
 /// Frames that may wait, as in the image.
 const QUEUE: usize = 24;
-
-/// The windows of an undamaged drive, at whatever sample they end, and what the network says of
-/// each once it has been asked.
-pub type Known = HashMap<[Features; WINDOW], OnceLock<Estimate>>;
-
-/// A network that is asked once about what an undamaged drive shows it: of a run little is new.
-pub struct Remembering<'a, N> {
-    /// The network itself.
-    pub network: &'a mut N,
-    /// What it need not be asked twice.
-    pub known: &'a Known,
-}
-
-impl<N: WindowNetwork> WindowNetwork for Remembering<'_, N> {
-    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
-        let Self { network, known } = self;
-        match known.get(window) {
-            Some(answer) => *answer.get_or_init(|| network.estimate(window)),
-            None => network.estimate(window),
-        }
-    }
-}
 
 /// All state of a board.
 #[derive(Debug, Clone)]
 pub struct Board {
     input: Input,
-    guard: Guard,
-    feeds: Feeds,
+    coprocessor: Coprocessor,
     port: Port<QUEUE>,
-    wheels: WheelReceiver,
-    /// What parsers refused.
-    refused: u32,
-    /// Row that the board is told of.
+    /// Row of the newest sample.
     row: usize,
 }
 
 impl Board {
-    /// Before the first byte.
+    /// Begins before the first byte.
     #[must_use]
-    pub fn new(part: Part, config: PipelineConfig) -> Self {
+    pub fn new(part: Part, pipeline: PipelineConfig) -> Self {
+        let wheels = Some(wheel_frames::receiver());
+        let config = Config {
+            pipeline,
+            wheels,
+            fog_expected: part == Part::Dsp1760,
+            clock_ratio: Some(ClockRatioConfig::DEFAULT),
+            ..Config::DEFAULT
+        };
         Self {
             input: Input::new(part),
-            guard: Guard::new(config),
-            feeds: Feeds::new(Config::DEFAULT),
-            port: Port::new(Config::DEFAULT.settings().bits_per_second),
-            wheels: WheelReceiver::new(WheelSettings::TOYOTA).expect("settings that come with the library"),
-            refused: 0,
+            port: Port::new(config.can.settings().bits_per_second),
+            coprocessor: Coprocessor::new(config),
             row: 0,
         }
     }
 
-    /// The watch and the pipeline.
-    pub fn guard(&mut self) -> &mut Guard {
-        &mut self.guard
-    }
-
-    /// What makes frames of samples.
-    pub fn feeds(&mut self) -> &mut Feeds {
-        &mut self.feeds
-    }
-
-    /// What knows of the wheels.
-    pub fn wheels(&mut self) -> &mut WheelReceiver {
-        &mut self.wheels
-    }
-
     /// The gyro's static bias, zero before it is known.
-    pub fn gyro_bias(&mut self) -> [AngularRate; 3] {
-        self.guard.pipeline().gyro_bias().unwrap_or_default()
+    #[must_use]
+    pub fn gyro_bias(&self) -> [AngularRate; 3] {
+        self.coprocessor.pipeline().gyro_bias().unwrap_or_default()
     }
 
     /// Takes what comes at `now`; what goes out is appended.
@@ -100,113 +62,111 @@ impl Board {
         &mut self,
         message: &Message,
         now: Micros,
-        network: &mut impl WindowNetwork,
+        networks: &mut impl Networks,
         out: &mut Vec<Message>,
     ) {
         match message.line {
             Line::Sensor | Line::Gyro => {
-                self.row = message.row;
                 for delivered in self.input.receive(message, now) {
-                    self.take(delivered, now, network, out);
+                    match delivered {
+                        // The coprocessor counts what it refuses.
+                        Delivered::Imu(Some(sample)) => {
+                            self.row = message.row;
+                            let _ = self.coprocessor.imu(sample, now);
+                        }
+                        Delivered::Fog(Some(sample)) => {
+                            let _ = self.coprocessor.fog(sample, now);
+                        }
+                        Delivered::Imu(None) => self.coprocessor.imu_error(),
+                        Delivered::Fog(None) => self.coprocessor.fog_error(),
+                    }
+                    self.send(now, networks, out);
                 }
             }
             Line::Wheels => {
                 for byte in &message.bytes {
                     let Some(frame) = self.port.receive(*byte) else { continue };
-                    let taken = self.wheels.process(&frame, now);
-                    self.refused += u32::from(matches!(taken, Some(Err(_))));
+                    let _ = self.coprocessor.can(&frame, now);
                 }
             }
             Line::Out => {}
         }
     }
 
-    /// What is due at `now` without a byte.
-    pub fn poll(
-        &mut self,
-        now: Micros,
-        row: usize,
-        network: &mut impl WindowNetwork,
-        out: &mut Vec<Message>,
-    ) {
-        for delivered in self.input.poll(now) {
-            if let Delivered::Sample(sample) = delivered {
-                // The grid's time says which row it is.
-                let late = now.0.saturating_sub(sample.time.0) / PERIOD_US;
-                self.row = row.saturating_sub(late as usize);
-            }
-            self.take(delivered, now, network, out);
-        }
-        if let Some(silent) = self.guard.poll(now) {
+    /// Does what is due at `now` without a byte, in a row of the drive.
+    pub fn poll(&mut self, now: Micros, row: usize, networks: &mut impl Networks, out: &mut Vec<Message>) {
+        if let Ok(Some(_)) = self.coprocessor.poll(now) {
             self.row = row;
-            self.send(&silent, now, out);
         }
+        self.send(now, networks, out);
     }
 
-    /// Whatever the board counts of what went wrong.
-    pub fn events(&mut self) -> u64 {
-        let watch = *self.guard.counters();
-        let pipeline = *self.guard.pipeline().counters();
+    /// Everything that the board counts of what went wrong.
+    #[must_use]
+    pub fn events(&self) -> u64 {
+        let pipeline = self.coprocessor.pipeline().counters();
+        let monitor = self.coprocessor.monitor_counters();
+        let (fog, inputs) = (self.coprocessor.fog_counters(), self.coprocessor.input_counters());
         let all = [
-            self.refused,
             self.input.bad_frames(),
             self.port.refused(),
             self.port.dropped(),
-            watch.silences,
-            watch.stuck,
-            watch.held,
-            watch.wrong,
+            inputs.imu_errors,
+            inputs.fog_errors,
+            inputs.wheel_errors,
+            monitor.silences,
+            monitor.stuck,
+            monitor.held,
+            monitor.wrong,
+            monitor.clock_off,
             pipeline.missing,
             pipeline.misplaced,
             pipeline.clock_jumps,
-            pipeline.clipped,
+            pipeline.invalid,
             pipeline.moving,
             pipeline.implausible,
             pipeline.late,
             pipeline.contradicted,
+            fog.misplaced,
+            fog.gaps,
+            fog.stuck,
+            fog.late,
+            fog.implausible,
+            fog.broken,
         ];
         all.iter().map(|count| u64::from(*count)).sum()
     }
 
-    fn take(
-        &mut self,
-        delivered: Delivered,
-        now: Micros,
-        network: &mut impl WindowNetwork,
-        out: &mut Vec<Message>,
-    ) {
-        match delivered {
-            Delivered::Sample(sample) => self.process(sample, now, network, out),
-            Delivered::Error => self.refused += 1,
+    /// Sends the frames that there are, and runs the windows that are due.
+    fn send(&mut self, now: Micros, networks: &mut impl Networks, out: &mut Vec<Message>) {
+        while let Some(sent) = self.coprocessor.next_frame() {
+            let row = self.row_of(&sent);
+            self.port.push(sent.frame, now);
+            while let Some(line) = self.port.outgoing() {
+                let bytes = line.to_vec();
+                self.port.sent(bytes.len());
+                out.push(Message { line: Line::Out, row, at: now.0, bytes });
+            }
+        }
+        if let Some(due) = self.coprocessor.window() {
+            let estimate = networks.window(&due.features);
+            self.coprocessor.deliver(due.end, estimate).expect("the window that is due");
+        }
+        let estimate =
+            self.coprocessor.fog_window().map(|(number, window)| (number, networks.minute(&window)));
+        if let Some((number, estimate)) = estimate {
+            self.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
         }
     }
 
-    fn process(
-        &mut self,
-        sample: ImuSample,
-        now: Micros,
-        network: &mut impl WindowNetwork,
-        out: &mut Vec<Message>,
-    ) {
-        if let Some(known) = self.wheels.poll(now) {
-            self.guard.wheels(known);
-        }
-        // What has no place in time is counted and gives no frame.
-        let Ok(output) = self.guard.process(sample, now) else { return };
-        self.send(&output.vehicle, now, out);
-        if let Some(due) = output.window {
-            self.guard.pipeline().deliver(due.end, network.estimate(&due.features));
-        }
-    }
-
-    fn send(&mut self, vehicle: &VehicleSample, now: Micros, out: &mut Vec<Message>) {
-        for frame in &self.feeds.process(vehicle) {
-            self.port.push(*frame, now);
-        }
-        while let Some(line) = self.port.outgoing() {
-            let bytes = line.to_vec();
-            self.port.sent(bytes.len());
-            out.push(Message { line: Line::Out, row: self.row, at: now.0, bytes });
+    /// Row of the drive that a frame belongs to: the fibre-optic gyro's are of the grid of the board's clock.
+    fn row_of(&self, sent: &TimedFrame) -> usize {
+        let is_fog = |id: Id| FOG_IDS.iter().any(|own| matches!(id, Id::Standard(id) if id.as_raw() == *own));
+        match self.coprocessor.fog_estimate() {
+            Some(estimate) if is_fog(sent.frame.id()) => {
+                (u64::from(estimate.tick).saturating_sub(START_US / PERIOD_US + 1)) as usize
+            }
+            _ => self.row,
         }
     }
 }

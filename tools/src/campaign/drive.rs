@@ -1,12 +1,12 @@
 //! Drives to do faults to: what undamaged sensors say, row by row.
 
-use crate::recording::{Recording, Row, WHEEL_STANDS};
-use crate::wheel_rates;
+use crate::recording::Recording;
+use crate::wheel_frames::WheelFrames;
 use gyronet::sample::{ImuSample, PERIOD_US, WHEELS};
-use gyronet::units::Micros;
+use gyronet::units::{AngularRate, Micros};
 
 /// Board time of the step before the first row, microseconds.
-const START_US: u64 = 1_000_000;
+pub const START_US: u64 = 1_000_000;
 
 /// What is measured in one row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +15,10 @@ pub struct Reading {
     pub sample: ImuSample,
     /// When its bytes come, microseconds of the board's clock.
     pub at: u64,
+    /// What a fibre-optic gyro beside the part measures: the reference where there is one.
+    pub fog: [AngularRate; 3],
+    /// The fibre-optic gyro repeats itself: it has no noise.
+    pub fog_stuck: bool,
     /// What the part's time stamp is off by, microseconds.
     pub stamp_us: i64,
     /// Axes beyond the range: gyro, accelerometer.
@@ -43,18 +47,30 @@ impl Drive {
     pub fn new(recording: &Recording) -> Self {
         let mut readings = Vec::with_capacity(recording.rows.len());
         let (mut at, mut last) = (START_US, None);
-        let mut wheels = [None; WHEELS];
+        let mut frames = WheelFrames::new(recording);
         for row in &recording.rows {
             let time = row.sample.time.0;
             let steps = last.map_or(1, |last| (time - last + PERIOD_US / 2) / PERIOD_US);
             at += steps.max(1) * PERIOD_US;
             last = Some(time);
-            for (held, new) in wheels.iter_mut().zip(speeds(row)) {
-                *held = new.or(*held);
-            }
+            let wheels = frames.as_mut().map_or([None; WHEELS], |frames| frames.speeds(row));
             let sample = ImuSample { time: Micros(at), ..row.sample };
-            let reading = Reading { sample, at, stamp_us: 0, saturated: [false; 6], no_number: None, wheels };
-            readings.push(reading);
+            let mut fog = sample.angular_rate;
+            if let Some(reference) =
+                row.reference.and_then(|rate| AngularRate::from_rad_per_sec(rate as f32).ok())
+            {
+                fog[2] = reference;
+            }
+            readings.push(Reading {
+                sample,
+                at,
+                fog,
+                fog_stuck: false,
+                stamp_us: 0,
+                saturated: [false; 6],
+                no_number: None,
+                wheels,
+            });
         }
         let rates: Option<Vec<f64>> = recording.rows.iter().map(|row| row.reference).collect();
         let truth = rates.map(|rates| {
@@ -66,15 +82,4 @@ impl Drive {
         });
         Self { name: recording.name().to_owned(), readings, truth }
     }
-}
-
-/// What the vehicle's bus says of the wheels, km/h. A wheel that is too slow to tell from a
-/// standing one shows zero, as passive sensors do.
-fn speeds(row: &Row) -> [Option<f64>; WHEELS] {
-    let mut speeds = [None; WHEELS];
-    for (rate, place) in row.wheels.iter().zip(wheel_rates::PLACES) {
-        let shown = |rate: f64| if rate.abs() > WHEEL_STANDS { rate.abs() } else { 0.0 };
-        speeds[place] = rate.map(|rate| shown(rate) * wheel_rates::RADIUS * 3.6);
-    }
-    speeds
 }

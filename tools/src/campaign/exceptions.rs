@@ -50,7 +50,7 @@ pub const EXCEPTIONS: &[Exception] = &[
               tells; bound 0.7 rad/s times the jump",
         bound: |fault, part| {
             // An ICM's stamps wrap: a jump by nearly a whole turn of them is a small one.
-            let wraps = if part == Part::Icm42688 { WRAP_US as f64 } else { f64::INFINITY };
+            let wraps = if part == Part::Icm42688 { WRAP_US } else { f64::INFINITY };
             let turns = (fault.size / wraps).round();
             let jump = if turns == 0.0 { fault.size } else { fault.size - turns * wraps };
             (fault.kind == Kind::ClockJump && jump.abs() < 1e4).then(|| FASTEST * jump.abs() * 1e-6 + MARGIN)

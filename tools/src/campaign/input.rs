@@ -3,12 +3,9 @@
 use super::fault::Line;
 use super::part::{ADIS, Part};
 use super::wire::Message;
-use crate::via::dsp1760::BOTH;
-use crate::via::icm42688::{Bus, NoDelay, WRAP_US};
+use crate::via::icm42688::{Bus, NoDelay};
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
-use gyronet::align::resample::Quality::{Exact, Interpolated};
-use gyronet::align::streams::Streams;
-use gyronet::sample::ImuSample;
+use gyronet::sample::{FogSample, ImuSample};
 use gyronet::sensor::adis16465::{Adis16465, BURST};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
@@ -26,7 +23,7 @@ pub enum Input {
     /// Of [`Part::Xsens`].
     Xsens(Box<Mti>),
     /// Of [`Part::Dsp1760`].
-    Dsp1760(Box<(Dsp1760, Mti, Streams)>),
+    Dsp1760(Box<(Dsp1760, Mti)>),
     /// Of [`Part::Icm42688`].
     Icm42688(Fifo),
     /// Of [`Part::Adis16465`].
@@ -36,23 +33,19 @@ pub enum Input {
 /// What came of some bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delivered {
-    /// A sample.
-    Sample(ImuSample),
-    /// The parser says that something is wrong.
-    Error,
+    /// A sample of the inertial sensor, or bytes that were none.
+    Imu(Option<ImuSample>),
+    /// A sample of the fibre-optic gyro, or bytes that were none.
+    Fog(Option<FogSample>),
 }
 
 impl Input {
-    /// Nothing received yet.
+    /// Begins before the first byte.
     #[must_use]
     pub fn new(part: Part) -> Self {
         match part {
             Part::Xsens => Self::Xsens(Box::default()),
-            Part::Dsp1760 => Self::Dsp1760(Box::new((
-                Dsp1760::new(Dsp1760Config::DEFAULT),
-                Mti::new(),
-                Streams::new(BOTH),
-            ))),
+            Part::Dsp1760 => Self::Dsp1760(Box::new((Dsp1760::new(Dsp1760Config::DEFAULT), Mti::new()))),
             Part::Icm42688 => Self::Icm42688(Fifo::new(None)),
             Part::Adis16465 => Self::Adis16465(Bursts::new(None)),
         }
@@ -62,57 +55,19 @@ impl Input {
     pub fn receive(&mut self, message: &Message, now: Micros) -> Vec<Delivered> {
         let mut delivered = Vec::new();
         match self {
-            Self::Xsens(mti) => {
+            Self::Xsens(mti) => imu(mti, &message.bytes, &mut delivered),
+            Self::Dsp1760(parts) if message.line == Line::Gyro => {
                 for byte in &message.bytes {
-                    mti.push(*byte);
-                    delivered.extend(std::iter::from_fn(|| mti.next_sample()).map(Delivered::from));
+                    parts.0.push(*byte);
+                    let samples = std::iter::from_fn(|| parts.0.next_sample());
+                    delivered.extend(samples.map(|sample| Delivered::Fog(sample.ok())));
                 }
             }
-            Self::Dsp1760(parts) => {
-                let (gyro, mti, streams) = &mut **parts;
-                let mut wrong = 0;
-                for byte in &message.bytes {
-                    if message.line == Line::Gyro {
-                        gyro.push(*byte);
-                        for sample in std::iter::from_fn(|| gyro.next_sample()) {
-                            let taken = sample.is_ok_and(|sample| streams.push_fog(now, sample).is_ok());
-                            wrong += usize::from(!taken);
-                        }
-                    } else {
-                        mti.push(*byte);
-                        for sample in std::iter::from_fn(|| mti.next_sample()) {
-                            let taken = sample.is_ok_and(|sample| streams.push_imu(now, sample).is_ok());
-                            wrong += usize::from(!taken);
-                        }
-                    }
-                }
-                delivered.extend(std::iter::repeat_n(Delivered::Error, wrong));
-            }
+            Self::Dsp1760(parts) => imu(&mut parts.1, &message.bytes, &mut delivered),
             Self::Icm42688(fifo) => fifo.receive(&message.bytes, &mut delivered),
             Self::Adis16465(bursts) => delivered.push(bursts.receive(&message.bytes, now)),
         }
         delivered
-    }
-
-    /// What has become due by now.
-    pub fn poll(&mut self, now: Micros) -> Vec<Delivered> {
-        let Self::Dsp1760(parts) = self else { return Vec::new() };
-        let (_, _, streams) = &mut **parts;
-        let steps = std::iter::from_fn(|| streams.next_step(now));
-        let samples = steps.map(|step| {
-            // A rate is that of the fibre-optic gyro or none, and an acceleration was taken about then;
-            // what came too late for its step, or on the other side of a clock's jump, is missing in it.
-            let events = step.events;
-            let whole = events.increments.late + events.fog.jumps + events.imu.jumps == 0;
-            let [x, y, z] = [0, 1, 2].map(|axis| step.fog.rate(axis));
-            match (step.imu, x, y, z) {
-                (Some((sample, Exact | Interpolated)), Some(x), Some(y), Some(z)) if whole => {
-                    Delivered::Sample(ImuSample { time: step.time, angular_rate: [x, y, z], ..sample })
-                }
-                _ => Delivered::Error,
-            }
-        });
-        samples.collect()
     }
 
     /// Intact frames' opposites, as far as the parsers count them.
@@ -128,9 +83,10 @@ impl Input {
     }
 }
 
-impl<E> From<Result<ImuSample, E>> for Delivered {
-    fn from(sample: Result<ImuSample, E>) -> Self {
-        sample.map_or(Self::Error, Self::Sample)
+fn imu(mti: &mut Mti, bytes: &[u8], delivered: &mut Vec<Delivered>) {
+    for byte in bytes {
+        mti.push(*byte);
+        delivered.extend(std::iter::from_fn(|| mti.next_sample()).map(|sample| Delivered::Imu(sample.ok())));
     }
 }
 
@@ -150,14 +106,12 @@ impl Fifo {
     fn new(last: Option<(Vec<u8>, u64)>) -> Self {
         let bus = Bus::default();
         let driver = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay);
-        let mut fifo = Self {
-            driver: driver.expect("a simulated part that is well"),
-            bus,
-            last: None,
-            epoch: last.as_ref().map_or(0, |(_, time)| time - time % WRAP_US),
-        };
-        if let Some((packet, _)) = &last {
+        let mut fifo =
+            Self { driver: driver.expect("a simulated part that is well"), bus, last: None, epoch: 0 };
+        if let Some((packet, time)) = &last {
             fifo.receive(packet, &mut Vec::new());
+            let (_, began) = fifo.last.take().expect("a packet that was good before");
+            fifo.epoch = time - began;
         }
         fifo.last = last;
         fifo
@@ -171,9 +125,9 @@ impl Fifo {
                 Ok(Some(sample)) => {
                     let time = Micros(sample.time.0 + self.epoch);
                     self.last = Some((bytes.to_vec(), time.0));
-                    delivered.push(Delivered::Sample(ImuSample { time, ..sample }));
+                    delivered.push(Delivered::Imu(Some(ImuSample { time, ..sample })));
                 }
-                Err(_) => delivered.push(Delivered::Error),
+                Err(_) => delivered.push(Delivered::Imu(None)),
             }
         }
     }
@@ -209,7 +163,7 @@ impl Bursts {
         burst.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
         *self.answer.0.lock().unwrap_or_else(PoisonError::into_inner) = burst;
         self.last = Some(burst);
-        self.driver.read(now).into()
+        Delivered::Imu(self.driver.read(now).ok())
     }
 }
 

@@ -6,23 +6,46 @@ use serde::Serialize;
 
 /// Rows of the second over which yaw is compared.
 const SECOND: usize = RATE_HZ as usize;
+/// What is held against the truth, and what a fault may do unseen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// The most that yaw may move in a second before anything is reported, whatever expected error is sent, rad. It
+    /// bounds a build that states too large an error.
+    pub moved: f64,
+    /// The largest mean error of a second of an undamaged drive, rad.
+    pub mean: f64,
+    /// The largest error of a second of an undamaged drive, rad.
+    pub largest: f64,
+    /// The share of these errors that lies inside the stated error, where one is stated.
+    pub inside_sigma: [f64; 2],
+}
+
+impl Limits {
+    /// Limits of a MEMS part: `moved` is twice the expected error of a rate that the network has not corrected.
+    pub const INERTIAL: Self = Self { moved: 5e-4, mean: 5e-4, largest: 2.5e-3, inside_sigma: [0.25, 0.85] };
+    /// Limits of a fibre-optic gyro, which states no error: `moved` is twice the error of its undamaged drives.
+    pub const FIBRE_OPTIC: Self = Self { moved: 1e-4, mean: 1e-4, largest: 2e-4, inside_sigma: [0.0, 1.0] };
+}
+
 /// A sample that was sent as not good owes its estimate to the next ones; so many rows after the
 /// last telling that is paid.
 const PAID: usize = 20;
 const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
 
 /// What a receiver of the undamaged run has of each row.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Baseline {
     rows: Vec<Row>,
     /// True yaw at the sample that each row's message tells of, rad.
     truth: Option<Vec<f64>>,
+    limits: Limits,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Row {
     told: Told,
     yaw: Option<i32>,
+    sigma: Option<f64>,
     /// Rows in a row, up to this one, that were good.
     good: usize,
     events: u64,
@@ -37,13 +60,13 @@ pub struct Outcome {
     pub counted: bool,
     /// Largest yaw moved in a second all marked good, before anything was told, rad.
     pub moved: f64,
-    /// The same over the expected error that was sent with it.
-    pub moved_sigmas: f64,
+    /// The same over the limit: the smaller one of [`Limits::moved`] and the expected error that was sent with it.
+    pub moved_limits: f64,
     /// From 0.2 s after the last telling on: by how much the error of a good second is larger than
     /// that of the same second undamaged, rad; where there is no reference, how far it was moved.
     pub grown: f64,
-    /// The same over the expected error that was sent with it.
-    pub grown_sigmas: f64,
+    /// The same over the limit.
+    pub grown_limits: f64,
     /// Largest error against the true yaw in a second all marked good, rad.
     pub error: f64,
     /// From the end of the fault to the last that was told of it, s; 0 where that was before.
@@ -53,11 +76,10 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether the fault moved yaw by more than the expected error sent with it, and nothing
-    /// had told of it by then.
+    /// Whether the fault moved yaw by more than the limit, and nothing had been reported by then.
     #[must_use]
     pub fn is_undetected(&self) -> bool {
-        self.moved_sigmas > 1.0
+        self.moved_limits > 1.0
     }
 
     /// Nothing told of it, and it did nothing that counts.
@@ -65,6 +87,21 @@ impl Outcome {
     pub fn is_harmless(&self) -> bool {
         self.told_after.is_none() && !self.is_undetected()
     }
+}
+
+/// The errors of the undamaged run against the drive's reference, over whole good seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct AgainstTruth {
+    /// Seconds compared.
+    pub seconds: usize,
+    /// Mean error of a second, rad.
+    pub mean: f64,
+    /// Largest error of a second, rad.
+    pub largest: f64,
+    /// Share of the errors inside the expected error that was sent; `None` where none is sent.
+    pub inside_sigma: Option<f64>,
+    /// Whether all of that is within [`Limits`].
+    pub in_order: bool,
 }
 
 /// Of one run: where it begins, and when the fault is there.
@@ -85,7 +122,7 @@ pub struct Times {
 impl Baseline {
     /// From all that was seen of a run of so many rows; `events` after each of them.
     #[must_use]
-    pub fn new(count: usize, seen: &[Seen], events: &[u64], truth: Option<&[f64]>, lag: usize) -> Self {
+    pub fn new(count: usize, seen: &[Seen], events: &[u64], truth: Option<Vec<f64>>, limits: Limits) -> Self {
         let mut rows = vec![Row::default(); count];
         for (row, events) in rows.iter_mut().zip(events) {
             row.events = *events;
@@ -94,14 +131,14 @@ impl Baseline {
             let Some(set) = seen.set else { continue };
             rows[set.row].told = seen.told;
             rows[set.row].yaw = Some(set.yaw);
+            rows[set.row].sigma = set.sigma;
         }
         let mut good = 0;
         for row in &mut rows {
             good = if row.yaw.is_some() && row.told.is_nothing() { good + 1 } else { 0 };
             row.good = good;
         }
-        let truth = truth.map(|yaw| (0..count).map(|row| yaw[row.saturating_sub(lag)]).collect());
-        Self { rows, truth }
+        Self { rows, truth, limits }
     }
 
     /// What the board had counted when a row was over.
@@ -127,6 +164,36 @@ impl Baseline {
     pub fn good_share(&self) -> f64 {
         let good = self.rows.iter().filter(|row| row.good > SECOND).count();
         good as f64 / self.rows.len().max(1) as f64
+    }
+
+    /// Holds the undamaged run against the truth, second by second; `None` where there is no truth.
+    #[must_use]
+    pub fn against_truth(&self) -> Option<AgainstTruth> {
+        let truth = self.truth.as_ref()?;
+        let mut found = AgainstTruth::default();
+        let (mut stated, mut inside) = (0_usize, 0_usize);
+        for row in (SECOND..self.rows.len()).step_by(SECOND) {
+            let (now, then) = (&self.rows[row], &self.rows[row - SECOND]);
+            let (Some(to), Some(from)) = (now.yaw, then.yaw) else { continue };
+            if now.good <= SECOND {
+                continue;
+            }
+            let turned = f64::from(to.wrapping_sub(from)) * RADIANS;
+            let error = (turned - (truth[row] - truth[row - SECOND])).abs();
+            found.seconds += 1;
+            found.mean += error;
+            found.largest = found.largest.max(error);
+            if let Some(sigma) = now.sigma {
+                stated += 1;
+                inside += usize::from(error <= sigma);
+            }
+        }
+        found.mean /= found.seconds.max(1) as f64;
+        found.inside_sigma = (stated > 0).then(|| inside as f64 / stated as f64);
+        let Limits { mean, largest, inside_sigma: [least, most], .. } = self.limits;
+        let inside = found.inside_sigma.is_none_or(|share| (least..=most).contains(&share));
+        found.in_order = found.mean <= mean && found.largest <= largest && inside;
+        Some(found)
     }
 
     /// Judges what was seen of a damaged run.
@@ -177,19 +244,19 @@ impl Baseline {
             };
             let own = error([yaws[start], Some(set.yaw)]);
             outcome.error = outcome.error.max(own.unwrap_or_default());
-            let (Some(now), Some(then), Some(sigma)) = (moved[set.row], moved[start], set.sigma) else {
-                continue;
-            };
+            let (Some(now), Some(then)) = (moved[set.row], moved[start]) else { continue };
+            let most = self.limits.moved;
+            let limit = set.sigma.map_or(most, |sigma| sigma.min(most));
             let by = f64::from(now.wrapping_sub(then)).abs() * RADIANS;
             if outcome.told_after.is_none() {
                 outcome.moved = outcome.moved.max(by);
-                outcome.moved_sigmas = outcome.moved_sigmas.max(by / sigma);
+                outcome.moved_limits = outcome.moved_limits.max(by / limit);
             } else if start >= told_row.saturating_add(PAID) {
                 let undamaged = error([self.rows[start].yaw, self.rows[set.row].yaw]);
                 let grown =
                     own.zip(undamaged).map_or(by, |(own, undamaged)| (own - undamaged).clamp(0.0, by));
                 outcome.grown = outcome.grown.max(grown);
-                outcome.grown_sigmas = outcome.grown_sigmas.max(grown / sigma);
+                outcome.grown_limits = outcome.grown_limits.max(grown / limit);
             }
         }
         if let Some(last_told) = last_told {

@@ -26,13 +26,13 @@ pub fn disturb(
         match fault.kind {
             Kind::ClockDrift => drift(reading, &begin, fault.size * 1e-6, part, gyro_bias),
             Kind::ClockJump => reading.stamp_us += fault.size as i64,
-            Kind::Stuck => hold(reading, &begin, fault),
+            Kind::Stuck => hold(reading, &begin, fault, part),
             Kind::Saturation => {
                 for (axis, saturated) in reading.saturated.iter_mut().enumerate() {
                     *saturated |= fault.axes.contains(axis);
                 }
             }
-            Kind::BiasStep => shift(reading, fault),
+            Kind::BiasStep => shift(reading, fault, part),
             Kind::NotANumber => {
                 reading.no_number =
                     (0..6).find(|axis| fault.axes.contains(*axis)).map(|axis| (axis, fault.form));
@@ -81,11 +81,18 @@ fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bi
     }
 }
 
+/// The gyro of the part: the fibre-optic one where there is one.
+fn gyro(reading: &mut Reading, part: Part) -> &mut [AngularRate; 3] {
+    if part == Part::Dsp1760 { &mut reading.fog } else { &mut reading.sample.angular_rate }
+}
+
 /// The readings stay as they were when the fault began.
-fn hold(reading: &mut Reading, begin: &Reading, fault: &Fault) {
+fn hold(reading: &mut Reading, begin: &Reading, fault: &Fault, part: Part) {
+    let mut begin = *begin;
     for axis in 0..3 {
         if fault.axes.contains(axis) {
-            reading.sample.angular_rate[axis] = begin.sample.angular_rate[axis];
+            gyro(reading, part)[axis] = gyro(&mut begin, part)[axis];
+            reading.fog_stuck |= axis == 2;
         }
         if fault.axes.contains(3 + axis) {
             reading.sample.specific_force[axis] = begin.sample.specific_force[axis];
@@ -94,10 +101,10 @@ fn hold(reading: &mut Reading, begin: &Reading, fault: &Fault) {
 }
 
 /// Gyro axes by rad/s, accelerometer axes by m/s^2.
-fn shift(reading: &mut Reading, fault: &Fault) {
+fn shift(reading: &mut Reading, fault: &Fault, part: Part) {
     for axis in 0..3 {
         if fault.axes.contains(axis) {
-            let rate = &mut reading.sample.angular_rate[axis].0;
+            let rate = &mut gyro(reading, part)[axis].0;
             *rate = rate.saturating_add((fault.size * f64::from(AngularRate::PER_RAD_PER_SEC)) as i32);
         }
         if fault.axes.contains(3 + axis) {

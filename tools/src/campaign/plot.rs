@@ -61,9 +61,9 @@ fn draw(svg: &mut String, runs: &[Run]) -> Result<(), Failure> {
         dots.collect()
     };
     let told = dots(|run| run.outcome()?.told_after.map(|s| (1e3 * s).max(1.0)));
-    let moved = dots(|run| run.outcome().map(|outcome| outcome.moved_sigmas.max(1e-3)));
+    let moved = dots(|run| run.outcome().map(|outcome| outcome.moved_limits.max(1e-3)));
     panel(&left, "told after, ms", (0.8, 1.2e4), &told, None)?;
-    panel(&right, "moved in a second before that, stated sigmas", (8e-4, 1e4), &moved, Some(1.0))?;
+    panel(&right, "moved in a second before that, over the limit", (8e-4, 1e4), &moved, Some(1.0))?;
     root.present()
 }
 

@@ -1,15 +1,18 @@
-//! An ECU that reads our own yaw messages: what it is told, and what it takes for good.
+//! An ECU that reads our own yaw messages, of the inertial sensor or of the fibre-optic gyro: what is reported to it, and
+//! what it takes for good.
 //!
 //! It checks E2E, takes a set of rate, angle and detail only where all three carry the same
 //! sample counter, and takes silence for a fault.
 
 use super::fault::Line;
+use super::part::Part;
 use super::wire::Message;
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::config::Config;
 use gyronet::can::e2e::{Checker, Verdict};
+use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::slcan::assembler::LineAssembler;
-use gyronet::can::yaw::{AngleMessage, DetailMessage, Quality, RateMessage, SIGMA_UNKNOWN};
+use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Quality, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::{DataFrame, slcan};
 
 /// Without a whole set for so long the sender is taken for dead: three periods and a half.
@@ -83,15 +86,23 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Nothing received yet.
+    /// Begins before the first byte. The messages are those of the part.
     #[must_use]
-    pub fn new() -> Self {
-        let yaw = Config::DEFAULT.settings().yaw.into_iter().flat_map(|yaw| {
-            let ids = yaw.ids.map(|id| StandardId::new(id).map(Id::Standard));
-            let checkers = yaw.e2e.profiles().map(|profile| Checker::new(profile, MAX_DELTA));
-            ids.into_iter().flatten().zip(checkers)
+    pub fn new(part: Part) -> Self {
+        let own = || Config::DEFAULT.settings().yaw.map(|yaw| (yaw.ids, yaw.e2e.profiles()));
+        let fog = || Some((FOG_IDS, FogEncoder::profiles(FOG_IDS)));
+        let messages = if part == Part::Dsp1760 { fog() } else { own() };
+        let checked = messages.into_iter().flat_map(|(ids, profiles)| {
+            let ids = ids.map(|id| StandardId::new(id).map(Id::Standard));
+            ids.into_iter().flatten().zip(profiles.map(|profile| Checker::new(profile, MAX_DELTA)))
         });
-        Self { messages: yaw.collect(), assembler: LineAssembler::new(), rate: None, angle: None, last: None }
+        Self {
+            messages: checked.collect(),
+            assembler: LineAssembler::new(),
+            rate: None,
+            angle: None,
+            last: None,
+        }
     }
 
     /// Takes a line's bytes; what it notices is appended.
@@ -167,11 +178,5 @@ impl Receiver {
         let sigma = (detail.sigma != SIGMA_UNKNOWN).then(|| (f64::from(detail.sigma) * 1e-5).to_radians());
         seen.set = Some(Set { row, yaw: angle.yaw, sigma });
         Some(seen)
-    }
-}
-
-impl Default for Receiver {
-    fn default() -> Self {
-        Self::new()
     }
 }

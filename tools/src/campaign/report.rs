@@ -3,6 +3,8 @@
 use super::Run;
 use super::exceptions::EXCEPTIONS;
 use super::fault::{Fault, Kind};
+use super::judge::AgainstTruth;
+use super::scene::Scene;
 use serde::Serialize;
 use std::fmt;
 
@@ -44,14 +46,14 @@ pub struct Line {
     pub panics: usize,
     /// From the first effect to the telling, s.
     pub told_after: Spread,
-    /// Most that yaw was moved in a good second before anything was told, the named ones left
-    /// out, rad and stated sigmas.
+    /// The most that yaw was moved in a good second before anything was reported, the named ones left
+    /// out, rad.
     pub moved: f64,
-    /// In stated sigmas.
-    pub moved_sigmas: f64,
-    /// Most that the error of a good second has grown after the last telling, stated sigmas.
-    pub grown_sigmas: f64,
-    /// Runs in which that was more than one sigma.
+    /// The same over the limit.
+    pub moved_limits: f64,
+    /// The most that the error of a good second has grown after the last report, over the limit.
+    pub grown_limits: f64,
+    /// Runs in which that was more than the limit.
     pub grown: usize,
     /// Largest error against the reference in a good second, rad.
     pub error: f64,
@@ -74,6 +76,17 @@ pub struct Excepted {
     pub moved: f64,
 }
 
+/// An undamaged drive that every run is held against.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Undamaged {
+    /// The drive.
+    pub drive: String,
+    /// The part.
+    pub part: &'static str,
+    /// Its errors; `None` where the drive has no reference.
+    pub errors: Option<AgainstTruth>,
+}
+
 /// A run that must not be.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
@@ -94,6 +107,8 @@ pub struct Failure {
 pub struct Report {
     /// The seed.
     pub seed: u64,
+    /// The undamaged drives.
+    pub undamaged: Vec<Undamaged>,
     /// Single faults by kind, then pairs, then all.
     pub lines: Vec<Line>,
     /// The named list.
@@ -103,9 +118,19 @@ pub struct Report {
 }
 
 impl Report {
-    /// Sums up; `drives` are their names.
+    /// Undamaged drives whose errors are beyond their limits.
+    pub fn out_of_order(&self) -> impl Iterator<Item = &Undamaged> {
+        self.undamaged.iter().filter(|drive| drive.errors.is_some_and(|errors| !errors.in_order))
+    }
+
+    /// Sums up the runs of some scenes.
     #[must_use]
-    pub fn new(seed: u64, drives: &[String], runs: &[Run]) -> Self {
+    pub fn new(seed: u64, scenes: &[Scene<'_>], runs: &[Run]) -> Self {
+        let undamaged = scenes.iter().map(|scene| Undamaged {
+            drive: scene.drive.name.clone(),
+            part: scene.part.name(),
+            errors: scene.baseline.against_truth(),
+        });
         let single = |run: &&Run| run.faults.len() == 1;
         let of = |kind| runs.iter().filter(single).filter(move |run| run.faults[0].kind == kind);
         let mut lines: Vec<Line> = Kind::ALL.iter().map(|kind| line(kind.name(), of(*kind))).collect();
@@ -118,15 +143,23 @@ impl Report {
         });
         let failures = runs.iter().filter(|run| run.is_failure()).map(|run| Failure {
             run: run.number,
-            drive: drives[run.drive].clone(),
+            drive: run.drive.clone(),
             part: run.part.name(),
             faults: run.faults.clone(),
             what: match &run.outcome {
                 Err(panic) => format!("panic: {panic}"),
-                Ok(outcome) => format!("{:.2e} rad, {:.1} sigma", outcome.moved, outcome.moved_sigmas),
+                Ok(outcome) => {
+                    format!("{:.2e} rad, {:.1} times the limit", outcome.moved, outcome.moved_limits)
+                }
             },
         });
-        Self { seed, lines, exceptions: exceptions.collect(), failures: failures.collect() }
+        Self {
+            seed,
+            undamaged: undamaged.collect(),
+            lines,
+            exceptions: exceptions.collect(),
+            failures: failures.collect(),
+        }
     }
 }
 
@@ -148,10 +181,10 @@ fn line<'r>(name: &str, runs: impl Iterator<Item = &'r Run>) -> Line {
         line.undetected += usize::from(run.is_failure());
         if !excepted {
             line.moved = line.moved.max(outcome.moved);
-            line.moved_sigmas = line.moved_sigmas.max(outcome.moved_sigmas);
+            line.moved_limits = line.moved_limits.max(outcome.moved_limits);
         }
-        line.grown += usize::from(outcome.grown_sigmas > 1.0);
-        line.grown_sigmas = line.grown_sigmas.max(outcome.grown_sigmas);
+        line.grown += usize::from(outcome.grown_limits > 1.0);
+        line.grown_limits = line.grown_limits.max(outcome.grown_limits);
         line.error = line.error.max(outcome.error);
         if outcome.told_after.is_some() {
             recovery.push(outcome.recovery);
@@ -165,6 +198,22 @@ fn line<'r>(name: &str, runs: impl Iterator<Item = &'r Run>) -> Line {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Undamaged { drive, part, errors } in &self.undamaged {
+            match errors {
+                Some(AgainstTruth { seconds, mean, largest, inside_sigma, in_order }) => {
+                    let mark = if *in_order { "" } else { "NOT IN ORDER " };
+                    write!(
+                        f,
+                        "{mark}undamaged: {drive}, {part}: {seconds} s, error {mean:.1e} rad in 1 s, at most {largest:.1e}"
+                    )?;
+                    match inside_sigma {
+                        Some(share) => writeln!(f, ", {share:.2} inside the stated error")?,
+                        None => writeln!(f)?,
+                    }
+                }
+                None => writeln!(f, "undamaged: {drive}, {part}: no reference")?,
+            }
+        }
         writeln!(
             f,
             "{:<15} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6}  {:>13}  {:>7}  {:>8} {:>6}  {:>13} {:>5}",
@@ -176,8 +225,8 @@ impl fmt::Display for Report {
             "undetected",
             "panics",
             "told after ms",
-            "moved/s",
-            "grown/s",
+            "moved/l",
+            "grown/l",
             "runs",
             "recovery s",
             "never"
@@ -196,8 +245,8 @@ impl fmt::Display for Report {
                 line.panics,
                 ms(line.told_after.median),
                 ms(line.told_after.most),
-                line.moved_sigmas,
-                line.grown_sigmas,
+                line.moved_limits,
+                line.grown_limits,
                 line.grown,
                 line.recovery.median,
                 line.recovery.most,

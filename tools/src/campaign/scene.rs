@@ -1,29 +1,25 @@
 //! A drive with one part, undamaged: where every run begins, and what it is held against.
 
-use super::board::{Board, Known, Remembering};
+use super::board::Board;
 use super::drive::{Drive, Reading};
 use super::fault::{Fault, Line, Span};
-use super::judge::{Baseline, Outcome, Times};
+use super::judge::{Baseline, Limits, Outcome, Times};
 use super::motion::disturb;
+use super::networks::{Collecting, Known, Networks, Remembering};
 use super::part::Part;
 use super::receiver::Receiver;
 use super::wire::{Message, damage};
-use embedded_can::{Frame, StandardId};
-use gyronet::can::{DataFrame, slcan};
+use crate::wheel_frames;
+use gyronet::can::slcan;
 use gyronet::compensate::{CompensateConfig, Hop, Mode};
-use gyronet::model::{Estimate, SCALE_MIN, WindowNetwork};
 use gyronet::pipeline::PipelineConfig;
-use gyronet::sample::{PERIOD_US, RATE_HZ, WHEELS};
+use gyronet::sample::{PERIOD_US, RATE_HZ};
 use gyronet::units::{AngularRate, Micros};
-use gyronet::window::{Features, WINDOW};
 use std::ops::Range;
-use std::sync::OnceLock;
 
 /// Runs may begin so many rows apart.
 pub const STATE_EVERY: usize = RATE_HZ as usize;
-/// Wheel frames come with every second row.
-const WHEEL_ROWS: usize = 2;
-/// When in a row they do, microseconds before its end.
+/// When in a row wheel frames come, microseconds before its end.
 const WHEEL_BEFORE_US: u64 = 3_000;
 /// The board looks at its clock so often.
 const TURN_US: u64 = 1_000;
@@ -44,16 +40,6 @@ pub struct Scene<'d> {
     states: Vec<(Board, Receiver)>,
 }
 
-/// Says nothing and takes note of what it is asked.
-struct Collecting(Known);
-
-impl WindowNetwork for Collecting {
-    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
-        self.0.insert(*window, OnceLock::new());
-        Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 }
-    }
-}
-
 /// A window with every sample.
 const EVERY: PipelineConfig = PipelineConfig {
     compensate: CompensateConfig {
@@ -69,27 +55,33 @@ const EVERY: PipelineConfig = PipelineConfig {
 impl<'d> Scene<'d> {
     /// Runs the drive undamaged.
     #[must_use]
-    pub fn new(drive: &'d Drive, part: Part, network: &mut impl WindowNetwork) -> Self {
+    pub fn new(drive: &'d Drive, part: Part, networks: &mut impl Networks) -> Self {
         let messages = messages(&drive.readings, 0, part);
-        let mut collecting = Collecting(Known::new());
+        let mut collecting = Collecting::default();
         let mut board = Board::new(part, EVERY);
         whole(&mut board, drive, &messages, &mut collecting, |_, _| {});
         let Collecting(known) = collecting;
         let mut board = Board::new(part, PipelineConfig::DEFAULT);
-        let mut receiver = Receiver::new();
+        let mut receiver = Receiver::new(part);
         let (mut states, mut seen) = (vec![(board.clone(), receiver.clone())], Vec::new());
         let rows = drive.readings.len();
         let mut events = Vec::with_capacity(rows);
-        let mut network = Remembering { network, known: &known };
-        whole(&mut board, drive, &messages, &mut network, |board, out| {
+        let mut networks = Remembering { networks, known: &known };
+        whole(&mut board, drive, &messages, &mut networks, |board, out| {
             out.iter().for_each(|message| receiver.receive(message, &mut seen));
             events.push(board.events());
             if events.len() % STATE_EVERY == 0 {
                 states.push((board.clone(), receiver.clone()));
             }
         });
-        let lag = CompensateConfig::DEFAULT.lag.samples();
-        let baseline = Baseline::new(rows, &seen, &events, drive.truth.as_deref(), lag);
+        // A fibre-optic gyro's rate is that of its newest step.
+        let (lag, limits) = match part {
+            Part::Dsp1760 => (0, Limits::FIBRE_OPTIC),
+            _ => (CompensateConfig::DEFAULT.lag.samples(), Limits::INERTIAL),
+        };
+        let late = |yaw: &Vec<f64>| (0..rows).map(|row| yaw[row.saturating_sub(lag)]).collect();
+        let truth = drive.truth.as_ref().map(late);
+        let baseline = Baseline::new(rows, &seen, &events, truth, limits);
         Self { drive, part, gyro_bias: board.gyro_bias(), known, baseline, states }
     }
 
@@ -100,23 +92,11 @@ impl<'d> Scene<'d> {
     }
 
     /// Runs a stretch with faults; it begins where a state is kept.
-    pub fn run(&self, span: Span, faults: &[Fault], network: &mut impl WindowNetwork) -> Outcome {
-        self.run_on(span, faults, None, &mut Remembering { network, known: &self.known }, |_, _| {})
-    }
-
-    /// [`Scene::run`] on a network that is asked about every window; `upset`: when something else
-    /// than the faults is done, microseconds; `reach`: called before each row with its number.
-    pub fn run_on(
-        &self,
-        span: Span,
-        faults: &[Fault],
-        upset: Option<u64>,
-        network: &mut impl WindowNetwork,
-        mut reach: impl FnMut(usize, &mut Board),
-    ) -> Outcome {
+    pub fn run(&self, span: Span, faults: &[Fault], networks: &mut impl Networks) -> Outcome {
+        let mut networks = Remembering { networks, known: &self.known };
         let (mut board, mut receiver) = self.states[span.from / STATE_EVERY].clone();
         let mut readings = self.drive.readings[span.from..span.to].to_vec();
-        let mut begin = upset;
+        let mut begin = None;
         let mut began = |at: Option<u64>| begin = begin.into_iter().chain(at).min();
         for fault in faults {
             began(disturb(&mut readings, span.from, fault, self.part, self.gyro_bias));
@@ -130,8 +110,7 @@ impl<'d> Scene<'d> {
         let start = readings.first().map_or(0, |reading| reading.at - PERIOD_US);
         let mut last = start;
         for (row, reading) in (span.from..).zip(&readings) {
-            reach(row, &mut board);
-            turn(&mut board, &mut rest, row, last..reading.at, network, &mut out);
+            turn(&mut board, &mut rest, row, last..reading.at, &mut networks, &mut out);
             last = reading.at;
         }
         for fault in faults.iter().filter(|fault| fault.line == Line::Out) {
@@ -141,7 +120,7 @@ impl<'d> Scene<'d> {
         out.iter().for_each(|message| receiver.receive(message, &mut seen));
         receiver.time(last, &mut seen);
         let at = |row: usize| readings.get(row - span.from).map_or(last, |reading| reading.at);
-        let over = faults.iter().map(|fault| at(fault.from + fault.rows)).chain(upset);
+        let over = faults.iter().map(|fault| at(fault.from + fault.rows));
         let end = over.max().unwrap_or(last);
         let begin = begin.unwrap_or(last);
         let times = Times { from: span.from, to: span.to, begin, end, last };
@@ -156,13 +135,13 @@ fn whole(
     board: &mut Board,
     drive: &Drive,
     messages: &[Message],
-    network: &mut impl WindowNetwork,
+    networks: &mut impl Networks,
     mut sent: impl FnMut(&mut Board, &[Message]),
 ) {
     let mut rest = messages.iter().peekable();
     for (row, reading) in drive.readings.iter().enumerate() {
         let mut out = Vec::new();
-        turn(board, &mut rest, row, reading.at - PERIOD_US..reading.at, network, &mut out);
+        turn(board, &mut rest, row, reading.at - PERIOD_US..reading.at, networks, &mut out);
         sent(board, &out);
     }
 }
@@ -173,16 +152,16 @@ fn turn<'m>(
     rest: &mut std::iter::Peekable<impl Iterator<Item = &'m Message>>,
     row: usize,
     time: Range<u64>,
-    network: &mut impl WindowNetwork,
+    networks: &mut impl Networks,
     out: &mut Vec<Message>,
 ) {
     let mut now = time.start;
     while now < time.end {
         now = (now + TURN_US).min(time.end);
         while let Some(message) = rest.next_if(|message| message.at <= now) {
-            board.receive(message, Micros(now), network, out);
+            board.receive(message, Micros(now), networks, out);
         }
-        board.poll(Micros(now), row, network, out);
+        board.poll(Micros(now), row, networks, out);
     }
 }
 
@@ -190,7 +169,7 @@ fn turn<'m>(
 fn messages(readings: &[Reading], first_row: usize, part: Part) -> Vec<Message> {
     let mut messages = Vec::new();
     for (row, reading) in (first_row..).zip(readings) {
-        if row.is_multiple_of(WHEEL_ROWS) {
+        if row.is_multiple_of(wheel_frames::FRAME_ROWS) {
             messages.extend(wheel_frame(row, reading));
         }
         part.send(row, reading, &mut messages);
@@ -201,14 +180,6 @@ fn messages(readings: &[Reading], first_row: usize, part: Part) -> Vec<Message> 
 
 /// The vehicle's wheel frame as an SLCAN line; `None` where the drive has no wheels.
 fn wheel_frame(row: usize, reading: &Reading) -> Option<Message> {
-    let [front_left, front_right, rear_left, rear_right] = reading.wheels;
-    let mut data = [0; 8];
-    let places: [Option<f64>; WHEELS] = [front_right, front_left, rear_right, rear_left];
-    for (bytes, speed) in data.chunks_exact_mut(2).zip(places) {
-        // 0.01 km/h from -67.67.
-        bytes.copy_from_slice(&((libm::round((speed? + 67.67) * 100.0)) as u16).to_be_bytes());
-    }
-    let frame = DataFrame::new(StandardId::new(0xAA)?, &data)?;
-    let line = slcan::emit(&frame)?;
+    let line = slcan::emit(&wheel_frames::frame(reading.wheels)?)?;
     Some(Message { line: Line::Wheels, row, at: reading.at - WHEEL_BEFORE_US, bytes: line.to_vec() })
 }

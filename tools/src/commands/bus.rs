@@ -3,7 +3,7 @@
 use super::{Common, print_json};
 use embedded_can::Id;
 use gyronet::can::config::{Config, Settings, Vdc2Settings};
-use gyronet::can::fog_feed::FogFeed;
+use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::load::{Periodic, per_mille};
 use gyronet::can::yaw::FOG_IDS;
 use std::io::{self, Write};
@@ -47,7 +47,7 @@ pub fn run(_: &Args, common: Common) -> super::Result {
     let all = Config::new(Settings { vdc2, ..Settings::DEFAULT })?;
     let traffics = [
         Traffic::new("default", &Config::DEFAULT, &[]),
-        Traffic::new("default, a fibre-optic gyro heard", &Config::DEFAULT, &FogFeed::messages(FOG_IDS)),
+        Traffic::new("default, a fibre-optic gyro heard", &Config::DEFAULT, &FogEncoder::messages(FOG_IDS)),
         Traffic::new("for SLCAN at 115200 bit/s", &Config::SLCAN_115200, &[]),
         Traffic::new("default and J1939 VDC2", &all, &[]),
     ];

@@ -2,14 +2,14 @@
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
-use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::model::{Blob, weights};
 use gyronet_tools::bundled;
 use gyronet_tools::campaign::drive::Drive;
+use gyronet_tools::campaign::networks::Integer;
 use gyronet_tools::campaign::part::Part;
 use gyronet_tools::campaign::report::Report;
 use gyronet_tools::campaign::scene::Scene;
-use gyronet_tools::campaign::upsets::handed_over::{Place, flip};
-use gyronet_tools::campaign::upsets::weights::WeightUpsets;
+use gyronet_tools::campaign::weight_upsets::WeightUpsets;
 use gyronet_tools::campaign::{self, Plan, plot};
 use gyronet_tools::recording::Recording;
 use std::fs;
@@ -26,7 +26,7 @@ use std::path::PathBuf;
 Examples:
   gyronet campaign --quick                              # half a minute
   gyronet campaign trial08_100hz.csv --plot faults.svg  # 20,000 runs, a recording beside the simulated drive
-  gyronet campaign --upsets                             # flipped bits instead")]
+  gyronet campaign --upsets                             # flipped bits of the weights instead")]
 pub struct Args {
     /// Recordings to damage beside the simulated drive.
     #[arg(value_name = "DRIVE.csv")]
@@ -40,8 +40,7 @@ pub struct Args {
     /// A small part of it: 320 runs.
     #[arg(long)]
     quick: bool,
-    /// Flip bits of weights, windows and estimates instead: every bit of the weight file's header,
-    /// and so many of the weights.
+    /// Flip bits of the weight file instead: every bit of its header, and so many of the weights.
     #[arg(long, value_name = "BITS", num_args = 0..=1, default_missing_value = "100000")]
     upsets: Option<usize>,
     /// Draw the runs of single faults as SVG here.
@@ -68,8 +67,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let bar = progress::bar(common, plan.runs, "faults");
     let runs = campaign::run(plan, &scenes, &blob, || bar.inc(1));
     bar.finish_and_clear();
-    let names: Vec<String> = drives.iter().map(|drive| drive.name.clone()).collect();
-    let report = Report::new(plan.seed, &names, &runs);
+    let report = Report::new(plan.seed, &scenes, &runs);
     let mut out = std::io::stdout().lock();
     if common.json {
         print_json(&mut out, &report)?;
@@ -79,40 +77,31 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if let Some(path) = &args.plot {
         fs::write(path, plot::svg(&runs)?).map_err(WriteError::to(path))?;
     }
-    match report.failures.len() {
-        0 => Ok(()),
-        count => Err(format!("{count} of {} runs must not be", plan.runs).into()),
+    match (report.failures.len(), report.out_of_order().count()) {
+        (0, 0) => Ok(()),
+        (0, drives) => Err(format!("{drives} undamaged drives are beyond their limits").into()),
+        (count, _) => Err(format!("{count} of {} runs must not be", plan.runs).into()),
     }
 }
 
 /// Windows that each damaged network is asked about.
 const WINDOWS: usize = 2;
-/// Bits of windows and of estimates, as a part of those of weights.
-const HANDED_OVER: usize = 50;
 
 fn upset(bits: usize, args: &Args, drive: &Drive, common: Common) -> super::Result {
     let file = &weights::DEFAULT.0;
     let blob = Blob::new_checked(file)?;
-    let mut network = GyroNet::new(blob);
-    let scene = Scene::new(drive, Part::Xsens, &mut network);
-    let mut windows: Vec<_> = scene.known.keys().copied().collect();
+    let scene = Scene::new(drive, Part::Xsens, &mut Integer::new(blob));
+    let mut windows: Vec<_> = scene.known.windows.keys().copied().collect();
     windows.sort_unstable();
     let windows: Vec<_> = windows.iter().step_by(windows.len() / WINDOWS).copied().take(WINDOWS).collect();
-    let bar = progress::bar(common, bits + 2 * bits / HANDED_OVER, "upsets");
-    let drawn = (bits, args.seed);
-    let weights = WeightUpsets::new(file, &blob, &windows, drawn, || bar.inc(1));
-    let drawn = (bits / HANDED_OVER, args.seed);
-    let window = flip(Place::Window, &scene, &mut network, drawn, || bar.inc(1));
-    let estimate = flip(Place::Estimate, &scene, &mut network, drawn, || bar.inc(1));
+    let bar = progress::bar(common, bits, "upsets");
+    let weights = WeightUpsets::new(file, &blob, &windows, (bits, args.seed), || bar.inc(1));
     bar.finish_and_clear();
     let mut out = std::io::stdout().lock();
     if common.json {
-        let all = serde_json::json!({ "weights": weights, "window": window, "estimate": estimate });
-        print_json(&mut out, &all)?;
+        print_json(&mut out, &weights)?;
     } else {
         write!(out, "{weights}")?;
-        writeln!(out, "a window in RAM: {window}")?;
-        writeln!(out, "an estimate in RAM: {estimate}")?;
     }
     let accepted =
         weights.header_bits - weights.header_refused + weights.weight_bits - weights.weight_refused;

@@ -2,7 +2,6 @@
 
 use super::{Common, WriteError, paint, print_json, progress, replay, weights};
 use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
 use gyronet_tools::demo::Demo;
 use gyronet_tools::demo::board::{Agreement, BoardError, Difference, Figures, Outcome};
@@ -68,7 +67,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let folder = args.out.clone().unwrap_or_else(default_folder);
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
-    let frames = replay::write_file(&rates.drive, &mut Feeds::new(Config::DEFAULT), &log)?;
+    let frames = replay::write_file(&rates.drive, &log)?;
     std::fs::write(&picture, plot::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
     let board = board(args, common, &recording, &mut integer)?;
     let simulated = args.file.is_none();

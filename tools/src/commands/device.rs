@@ -136,7 +136,11 @@ fn print_info(info: &Info) -> io::Result<()> {
         None => writeln!(out, "part          does not say (the emulator)")?,
     }
     writeln!(out, "clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6)?;
-    writeln!(out, "bus           {}", if identity.can { "CAN, SLCAN" } else { "SLCAN alone" })?;
+    let bus = match identity.can_fault {
+        None => "CAN, SLCAN".to_owned(),
+        Some(fault) => format!("SLCAN alone: {fault}"),
+    };
+    writeln!(out, "bus           {bus}")?;
     writeln!(out, "started by    {}", identity.reset)?;
     if let Some(crash) = identity.crash {
         writeln!(out, "crashed       {crash}")?;

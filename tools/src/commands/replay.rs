@@ -2,15 +2,13 @@
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
-use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::drive::Drive;
 use gyronet_tools::recording::Recording;
 use gyronet_tools::via::compare::{Bound, Difference, STAND_INS};
 use gyronet_tools::via::{Part, Via};
-use gyronet_tools::wheel_rates::WheelRates;
+use gyronet_tools::wheel_frames::WheelFrames;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -58,10 +56,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let replayed = replay(&recording, args.via, &mut network, || bar.inc(1));
     bar.finish_and_clear();
     let (drive, detour) = replayed?;
-    let mut feeds = Feeds::new(Config::DEFAULT);
     let frames = match &args.out {
-        Some(path) => write_file(&drive, &mut feeds, path)?,
-        None => drive.log(&mut feeds, BufWriter::new(io::stdout().lock()))?,
+        Some(path) => write_file(&drive, path)?,
+        None => drive.log(BufWriter::new(io::stdout().lock()))?,
     };
     if common.json {
         let summary = serde_json::json!({
@@ -69,7 +66,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             "seconds": recording.seconds(),
             "frames": frames,
             "status": drive.status_counts().map(|(status, count)| (format!("{status:?}").to_lowercase(), count)).into_iter().collect::<BTreeMap<_, _>>(),
-            "events": events(&drive, &feeds).into_iter().collect::<BTreeMap<_, _>>(),
+            "events": events(&drive).into_iter().collect::<BTreeMap<_, _>>(),
             "via": detour.as_ref().map(Detour::json),
         });
         match args.out {
@@ -83,7 +80,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             drive.status_counts().map(|(status, count)| format!("{status:?} {count}").to_lowercase());
         writeln!(err, "status: {}", statuses.join(", "))?;
         let events: Vec<String> =
-            events(&drive, &feeds).iter().map(|(name, count)| format!("{name} {count}")).collect();
+            events(&drive).iter().map(|(name, count)| format!("{name} {count}")).collect();
         writeln!(err, "events: {}", events.join(", "))?;
         if let Some(detour) = &detour {
             write!(err, "{detour}")?;
@@ -105,10 +102,10 @@ fn replay(
     mut tick: impl FnMut(),
 ) -> Result<(Drive, Option<Detour>), Box<dyn std::error::Error>> {
     let config = PipelineConfig::DEFAULT;
-    let direct = Drive::run(recording, &config, WheelRates::new(recording), network, &mut tick)?;
+    let direct = Drive::run(recording, &config, WheelFrames::new(recording), network, &mut tick)?;
     let Some(part) = part else { return Ok((direct, None)) };
     let via = part.send(recording)?;
-    let drive = Drive::run(&via.recording, &config, WheelRates::new(recording), network, &mut tick)?;
+    let drive = Drive::run(&via.recording, &config, WheelFrames::new(recording), network, &mut tick)?;
     let bound = Bound::new(via.quantisation, recording, &direct, network, &mut tick)?;
     let difference = Difference::of_rates(&direct, &drive);
     Ok((drive, Some(Detour { part, via, difference, bound })))
@@ -172,14 +169,14 @@ impl std::fmt::Display for Detour {
 }
 
 /// Writes a drive's frames to a file.
-pub(super) fn write_file(drive: &Drive, feeds: &mut Feeds, path: &Path) -> Result<u64, WriteError> {
+pub(super) fn write_file(drive: &Drive, path: &Path) -> Result<u64, WriteError> {
     let error = WriteError::to(path);
     let file = File::create(path).map_err(&error)?;
-    drive.log(feeds, BufWriter::new(file)).map_err(&error)
+    drive.log(BufWriter::new(file)).map_err(&error)
 }
 
 /// All counters that are not zero.
-fn events(drive: &Drive, feeds: &Feeds) -> Vec<(&'static str, u32)> {
+fn events(drive: &Drive) -> Vec<(&'static str, u32)> {
     let c = &drive.counters;
     let all = [
         ("samples", c.samples),
@@ -187,12 +184,12 @@ fn events(drive: &Drive, feeds: &Feeds) -> Vec<(&'static str, u32)> {
         ("missing", c.missing),
         ("misplaced", c.misplaced),
         ("clock jumps", c.clock_jumps),
-        ("clipped", c.clipped),
+        ("invalid", c.invalid),
         ("moving", c.moving),
         ("clamped inputs", c.clamped_inputs),
         ("implausible", c.implausible),
         ("late", c.late),
-        ("out of range", feeds.out_of_range()),
+        ("out of range", drive.out_of_range),
     ];
     all.into_iter().filter(|(_, count)| *count > 0).collect()
 }

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 /// Measure the firmware image: flash, static RAM and the worst stack, bytes.
 ///
+/// Static RAM is SRAM: statics, and the code that runs from there, which counts as flash too.
 /// The stack is an upper bound from the machine code: handlers of all priorities, one inside the
 /// other. Exit status 1 when a budget is exceeded.
 #[derive(Debug, clap::Args)]

@@ -12,8 +12,6 @@ use crate::recording::Recording;
 use crate::target_bench::{self, BenchError};
 use crate::via::{self, Part, ViaError};
 use embedded_can::Frame;
-use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
@@ -155,9 +153,7 @@ impl Agreement {
         let bytes = via::mti_bytes(&recording).concat();
         let sent = Part::Xsens.send(&recording)?.recording;
         let drive = Drive::run(&sent, &PipelineConfig::DEFAULT, None, network, || {})?;
-        let mut feeds = Feeds::new(Config::DEFAULT);
-        let frames: Vec<DataFrame> =
-            drive.steps.iter().flat_map(|step| feeds.process::<DataFrame>(&step.vehicle)).collect();
+        let frames: Vec<DataFrame> = drive.frames().map(|sent| sent.frame).collect();
 
         let start = Instant::now();
         let mut board = emulator::Board::boot(image, SLCAN, &[])?;
@@ -200,7 +196,7 @@ impl Figures {
             static_ram,
             stack: stack.worst().into(),
             window_instructions: window.map(|count| count.instructions),
-            window_cycles: window.and_then(|count| count.cycles),
+            window_cycles: window.and_then(|count| count.cycles_5ws),
         })
     }
 }

@@ -4,7 +4,6 @@ use crate::drive::Drive;
 use embedded_can::{Frame, Id};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
-use gyronet::can::feeds::Feeds;
 use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::{DataFrame, j1939::Vdc2};
 use serde::Serialize;
@@ -27,17 +26,11 @@ pub struct Message {
 /// The messages that go out when the vehicle turns fastest.
 #[must_use]
 pub fn fastest_turn(drive: &Drive, config: Config) -> Vec<Message> {
-    let rate = |index: &usize| drive.steps[*index].prompt.rate.0.unsigned_abs();
+    let rate = |index: &usize| drive.steps[*index].vehicle.prompt.rate.0.unsigned_abs();
     let Some(chosen) = drive.compared().max_by_key(rate) else { return Vec::new() };
     let first = drive.steps.first().map_or(0, |step| step.time.0);
-    let mut feeds = Feeds::new(config);
-    // What rounding left over from all that went before is in the codes.
-    for step in &drive.steps[..chosen] {
-        let _ = feeds.process::<DataFrame>(&step.vehicle);
-    }
     let step = &drive.steps[chosen];
     let time = format!("{:.2}", (step.time.0 - first) as f64 * 1e-6);
-    let frames = feeds.process::<DataFrame>(&step.vehicle);
     let message = |frame: &DataFrame| {
         let (name, says) = read(frame, &config)?;
         let id = match frame.id() {
@@ -47,7 +40,7 @@ pub fn fastest_turn(drive: &Drive, config: Config) -> Vec<Message> {
         let data: Vec<String> = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
         Some(Message { time: time.clone(), name, id, data: data.join(" "), says })
     };
-    frames.iter().filter_map(message).collect()
+    step.frames.iter().filter_map(|sent| message(&sent.frame)).collect()
 }
 
 /// Name and content of a message.
@@ -118,8 +111,10 @@ mod tests {
             names,
             ["MM5_10_TX1", "MM5_10_TX2", "MM5_10_TX3", "GyroNet_Rate", "GyroNet_Angle", "GyroNet_Detail"]
         );
-        let fastest =
-            drive.steps[drive.compared()].iter().map(|step| step.prompt.rate).max_by_key(|r| r.0.abs());
+        let fastest = drive.steps[drive.compared()]
+            .iter()
+            .map(|step| step.vehicle.prompt.rate)
+            .max_by_key(|r| r.0.abs());
         let degrees = fastest.unwrap().rad_per_sec().to_degrees();
         let said: f64 = messages[0].says.split(' ').nth(2).unwrap().parse().unwrap();
         assert!((said - degrees).abs() < 0.01, "{said} {degrees}");

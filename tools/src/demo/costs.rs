@@ -118,7 +118,10 @@ fn of_image(figures: &Figures) -> Vec<Cost> {
         costs.push(Cost {
             what: "the same in time",
             figure: format!("{:.1} ms", cycles as f64 / (CLOCK_MHZ * 1e3)),
-            how: format!("{} cycles, modelled (zero wait states), at {CLOCK_MHZ:.0} MHz", grouped(cycles)),
+            how: format!(
+                "{} cycles, modelled (flash at 5 wait states), at {CLOCK_MHZ:.0} MHz",
+                grouped(cycles)
+            ),
         });
     }
     costs

@@ -4,7 +4,7 @@ use crate::methods::{Method, Rates};
 use crate::metrics::DT;
 use crate::recording::Recording;
 use crate::trajectory_error::{Point, TrajectoryError};
-use crate::wheel_rates::Speeds;
+use crate::wheel_frames::Speeds;
 use gyronet::odometry::Track;
 use serde::Serialize;
 

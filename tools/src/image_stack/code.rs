@@ -50,7 +50,7 @@ impl Code {
                 Ok(".vector_table") => code.vectors.handlers = words().map(begins).collect(),
                 Ok(priority::SECTION) => code.vectors.prioritise(bytes)?,
                 Ok(".rodata" | ".data") => code.taken.extend(words().filter_map(begins)),
-                Ok(".text") => {
+                Ok(".text" | ".ram_code") => {
                     let data = (start..).step_by(4).zip(words()).filter(|(at, _)| is_data(*at));
                     code.taken.extend(data.filter_map(|(_, value)| begins(value)));
                     for (address, (size, name)) in &ranges {
@@ -86,13 +86,28 @@ impl Code {
             Some(u16::from_le_bytes(*bytes))
         };
         let (mut at, mut low, mut aligned) = (address, [0u32; 16], [0u32; 16]);
+        // A function's address that the instruction before has put together. The linker's way from flash
+        // to RAM jumps there at once: a call. Anything else takes the address.
+        let mut made: Option<(u8, u32)> = None;
         while let Some(first) = halfword(at) {
             if is_data(at) {
                 at += 2;
                 continue;
             }
             let second = thumb::is_wide(first).then(|| halfword(at + 2)).flatten();
-            match thumb::effect(first, second, at) {
+            let effect = thumb::effect(first, second, at);
+            match (made.take(), effect) {
+                (Some((register, target)), Effect::Indirect { register: to }) if register == to => {
+                    function.calls.insert(target);
+                    at += 2;
+                    continue;
+                }
+                (Some((_, target)), _) => {
+                    self.taken.insert(target);
+                }
+                (None, _) => {}
+            }
+            match effect {
                 Effect::None => {}
                 Effect::Push(bytes) => function.own += bytes,
                 Effect::Align { register, bytes } => aligned[usize::from(register)] = bytes,
@@ -101,7 +116,7 @@ impl Code {
                     function.own += std::mem::take(&mut aligned[usize::from(register)]);
                 }
                 Effect::Dynamic => return Err(StackError::Dynamic { function: function.name, address: at }),
-                Effect::Indirect => function.indirect += 1,
+                Effect::Indirect { .. } | Effect::Loaded => function.indirect += 1,
                 // Inside, a branch is a loop or a condition; to the outside, a call at the end.
                 Effect::Branch(target) if (address..end).contains(&target) => {}
                 Effect::Call(target) | Effect::Branch(target) => {
@@ -109,11 +124,13 @@ impl Code {
                 }
                 Effect::MoveLow { register, value } => low[usize::from(register)] = value,
                 Effect::MoveHigh { register, value } => {
-                    self.taken.extend(begins(low[usize::from(register)] | value << 16));
+                    let target = begins(low[usize::from(register)] | value << 16);
+                    made = target.map(|target| (register, target));
                 }
             }
             at += if second.is_some() { 4 } else { 2 };
         }
+        self.taken.extend(made.map(|(_, target)| target));
         Ok(function)
     }
 

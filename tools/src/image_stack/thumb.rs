@@ -21,7 +21,9 @@ pub enum Effect {
     /// A jump to an address.
     Branch(u32),
     /// A call or jump to a register's value.
-    Indirect,
+    Indirect { register: u8 },
+    /// A jump to an address that lies in memory.
+    Loaded,
     /// The lower half of a register.
     MoveLow { register: u8, value: u32 },
     /// The upper half of a register; the lower one stays.
@@ -54,9 +56,11 @@ fn narrow(code: u16, address: u32) -> Effect {
         // MOV sp, Rm
         _ if code & 0xFF87 == 0x4685 => Effect::MoveSp { register: (code >> 3 & 0xF) as u8 },
         // BLX Rm
-        _ if code & 0xFF87 == 0x4780 => Effect::Indirect,
+        _ if code & 0xFF87 == 0x4780 => Effect::Indirect { register: (code >> 3 & 0xF) as u8 },
         // BX Rm; BX lr returns
-        _ if code & 0xFF87 == 0x4700 && code != 0x4770 => Effect::Indirect,
+        _ if code & 0xFF87 == 0x4700 && code != 0x4770 => {
+            Effect::Indirect { register: (code >> 3 & 0xF) as u8 }
+        }
         // B; the condition of BLX, UDF and SVC is none.
         _ if code & 0xF800 == 0xE000 => branch(sign(u32::from(code & 0x7FF) << 1, 12)),
         _ if code & 0xF000 == 0xD000 && code >> 8 & 0xF < 0xE => branch(sign(u32::from(code & 0xFF) << 1, 9)),
@@ -89,7 +93,7 @@ fn wide(first: u16, second: u16, address: u32) -> Effect {
             Effect::Align { register: rd as u8, bytes: 1 << ((second & 0x1F) + 1).min(10) }
         }
         // LDR pc, [Rn, ...]; from the stack it is a return
-        _ if first & 0xFF70 == 0xF850 && rt == PC && rn != SP => Effect::Indirect,
+        _ if first & 0xFF70 == 0xF850 && rt == PC && rn != SP => Effect::Loaded,
         // BL, B.W
         _ if first & 0xF800 == 0xF000 && second & 0x9000 == 0x9000 => {
             let target = branch(long_offset(first, second));
@@ -166,8 +170,9 @@ mod tests {
         assert_eq!(narrow(0xB5F0), Effect::Push(20)); // push {r4, r5, r6, r7, lr}
         assert_eq!(narrow(0xB084), Effect::Push(16)); // sub sp, #16
         assert_eq!(narrow(0xB004), Effect::None); // add sp, #16
-        assert_eq!(narrow(0x4798), Effect::Indirect); // blx r3
+        assert_eq!(narrow(0x4798), Effect::Indirect { register: 3 }); // blx r3
         assert_eq!(narrow(0x4770), Effect::None); // bx lr
+        assert_eq!(narrow(0x4760), Effect::Indirect { register: 12 }); // bx r12
         assert_eq!(narrow(0x46A5), Effect::MoveSp { register: 4 }); // mov sp, r4
         assert_eq!(wide(0xF36F, 0x0402), Effect::Align { register: 4, bytes: 8 }); // bfc r4, #0, #3
         assert_eq!(narrow(0xE7FE), Effect::Branch(0x0801_0000)); // b .
@@ -185,7 +190,7 @@ mod tests {
         assert_eq!(wide(0xF040, 0x8002), Effect::Branch(0x0801_0008)); // bne.w .+8
         assert_eq!(wide(0xF641, 0x2334), Effect::MoveLow { register: 3, value: 0x1A34 }); // movw r3
         assert_eq!(wide(0xF6C0, 0x0301), Effect::MoveHigh { register: 3, value: 0x0801 }); // movt r3
-        assert_eq!(wide(0xF8D0, 0xF004), Effect::Indirect); // ldr.w pc, [r0, #4]
+        assert_eq!(wide(0xF8D0, 0xF004), Effect::Loaded); // ldr.w pc, [r0, #4]
         assert_eq!(wide(0xF85D, 0xFB04), Effect::None); // ldr pc, [sp], #4
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{RecordingError, Row, ValueError, WHEELS};
 use csv::StringRecord;
-use gyronet::sample::ImuSample;
+use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 use std::str::FromStr;
 
@@ -100,7 +100,7 @@ impl<R: std::io::Read> Reader<R> {
             specific_force: [fx?, fy?, fz?],
             angular_rate: [wx?, wy?, wz?],
             temperature: None,
-            clipped: false,
+            validity: Validity::Good,
         };
         let reference = optional(reference)?;
         let wheels = [w1?, w2?, w3?, w4?];

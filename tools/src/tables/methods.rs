@@ -14,14 +14,14 @@ use crate::metrics::DT;
 use crate::recording::Recording;
 use crate::sequence::Sequence;
 use crate::simulate::world::EARTH_RATE;
-use crate::wheel_rates::WheelRates;
+use crate::wheel_frames::WheelFrames;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
 use gyronet::fog::FogConfig;
+use gyronet::fog::seconds::Padding;
 use gyronet::model::WindowNetwork;
 use gyronet::model::fognet::MinuteNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
-use gyronet::seconds::Padding;
 use gyronet::units::AngularRate;
 use std::time::Instant;
 
@@ -158,7 +158,7 @@ impl Estimates {
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
         let drive = Drive::run(recording, &config, None, network, &mut tick);
         let run_time = started.elapsed().as_secs_f64();
-        let wheels = WheelRates::new(recording);
+        let wheels = WheelFrames::new(recording);
         let looped = Drive::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
         self.add(RAW, || constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {
@@ -167,7 +167,7 @@ impl Estimates {
                 self.add(STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
                 for (method, rates) in [
                     (GYRONET, corrected(&drive, &gyro, |step| step.settled)),
-                    (GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.prompt.rate)),
+                    (GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.vehicle.prompt.rate)),
                     // The last steps of the drive have not gone out yet.
                     (
                         GYRONET_LOOP,

@@ -36,9 +36,11 @@ fn exact() -> Sequence {
         let turned = if k < 400 { 0.0 } else { 0.003 * (k as f64 * 0.002).sin() };
         let way = if k < 400 { 0.0 } else { 0.1 };
         track.step([way; 2], turned);
+        // Every axis flickers as a sensor does, with mean zero over three steps: equal readings are stuck ones.
+        let noise = 1e-4 * ((k % 3) as f32 - 1.0);
         Step {
-            specific_force: [0.0, 0.0, 9.8],
-            angular_rate: [0.0, 0.0, (turned / 0.01 + 0.002) as f32],
+            specific_force: [10.0 * noise, 10.0 * noise, 9.8 + 10.0 * noise],
+            angular_rate: [noise, noise, (turned / 0.01 + 0.002) as f32 + noise],
             imu_gap: false,
             fog: turned,
             wheels: [way; 2],

@@ -42,10 +42,15 @@ pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
         }
         let numbers = GYRO_MESSAGES * k..GYRO_MESSAGES * (k + 1);
         let messages: Vec<u8> = numbers.flat_map(|number| increment(number, &sample).emit()).collect();
+        // First what the gyro has sent in ten milliseconds, then the sample: the schedule adds up the turn
+        // that takes the one and the turn that takes the other.
         board.send(GYRO, &messages, TURN)?;
+        told.wait(&mut board, "the gyro's messages", |told| {
+            told.messages as usize >= GYRO_MESSAGES * (k + 1)
+        })?;
         board.send(IMU, &message(k, &sample).emit(), TURN)?;
         ask(&mut board, [&info, &configuration, &log][k % 3])?;
-        told.wait(&mut board, k as u32 + 1)?;
+        told.wait(&mut board, "the sample", |told| told.samples as usize > k)?;
     }
     if told.windows < WINDOWS {
         return Err(board.failed(format!("only {} windows were used", told.windows)));
@@ -66,33 +71,47 @@ struct Told {
     read: usize,
     samples: u32,
     windows: u32,
+    /// Of the fibre-optic gyro.
+    messages: u32,
 }
 
 impl Told {
-    /// Asks until so many samples have been processed, however slow the host is.
-    fn wait(&mut self, board: &mut Board, samples: u32) -> Result<(), EmulatorError> {
+    /// Asks until it is so far, however slow the host is.
+    fn wait(
+        &mut self,
+        board: &mut Board,
+        what: &str,
+        is_done: impl Fn(&Self) -> bool,
+    ) -> Result<(), EmulatorError> {
         let counters = emit(1, &Request::Counters).unwrap_or_default();
         let until = Instant::now() + TURN;
-        while self.samples < samples {
+        while !is_done(self) {
             if Instant::now() > until {
-                return Err(board.failed(format!("sample {samples} of {SAMPLES} was not processed")));
+                let Self { samples, messages, .. } = self;
+                let so_far = format!("{samples} samples and {messages} messages of the gyro were");
+                return Err(board.failed(format!("{what} was not processed; {so_far}")));
             }
             ask(board, &counters)?;
             // No answer in time: it is asked again.
-            let _ = board.await_sent(SERVICE, ASK, |bytes| self.read(bytes) >= samples);
+            let _ = board.await_sent(SERVICE, ASK, |bytes| {
+                self.read(bytes);
+                is_done(self)
+            });
         }
         Ok(())
     }
 
-    /// Samples by the newest of all answers.
-    fn read(&mut self, bytes: &[u8]) -> u32 {
+    /// Takes the newest of all answers.
+    fn read(&mut self, bytes: &[u8]) {
         for byte in bytes.get(self.read..).unwrap_or_default() {
-            if let Some(Ok((_, Reply::Counters(AllCounters { pipeline, .. })))) = self.deframer.push(*byte) {
-                (self.samples, self.windows) = (pipeline.samples, pipeline.windows);
+            if let Some(Ok((_, Reply::Counters(AllCounters { pipeline, fog, .. })))) =
+                self.deframer.push(*byte)
+            {
+                (self.samples, self.windows, self.messages) =
+                    (pipeline.samples, pipeline.windows, fog.samples);
             }
         }
         self.read = bytes.len();
-        self.samples
     }
 }
 

@@ -1,16 +1,20 @@
 //! Where an image's handlers lie, for the plugin that counts them.
 
-use super::{Handler, KINDS};
+use super::{Handler, KINDS, Least};
 use crate::image_stack;
 use object::{Object, ObjectSymbol};
 use std::path::Path;
 
 /// The function that a turn of the output task runs for each sample.
-const WATCHED: &str = "output::Output::process";
+const WATCHED: &str = "gyronet::coprocessor::Coprocessor::imu";
+/// The function that it runs to look at every line.
+const LOOKING: &str = "output::Output::look";
 /// Exception numbers of the handlers (RM0090, table 62), and the data register that a serial line's
 /// handler reads and writes (RM0090, table 1 and 30.6.2).
-const VECTORS: [(usize, &str, u32); 8] = [
+const VECTORS: [(usize, &str, u32); 10] = [
     (15, "SysTick", 0),
+    (16 + 1, "PVD", 0),
+    (16 + 19, "CAN1_TX", 0),
     (16 + 20, "CAN1_RX0", 0),
     (16 + 37, "USART1", 0x4001_1004),
     (16 + 38, "USART2", 0x4000_4404),
@@ -20,10 +24,11 @@ const VECTORS: [(usize, &str, u32); 8] = [
     (16 + 71, "USART6", 0x4001_1404),
 ];
 
-/// Handlers, each with what the plugin is told of it, and where the watched function is.
+/// Handlers, each with what the plugin is told of it, and where the watched functions are.
 pub struct Symbols {
     pub handlers: Vec<(Handler, String)>,
     pub watched: u32,
+    pub looking: u32,
 }
 
 impl Symbols {
@@ -47,14 +52,18 @@ impl Symbols {
                 name: (*name).to_owned(),
                 priority,
                 activations: [None; KINDS],
-                least: 0,
+                least: Least::default(),
+                looking: Least::default(),
                 code: (u64::from(len) + body) / 2,
             };
             handlers.push((handler, format!(",handler={name}:{start:x}:{:x}:{data:x}", start + len)));
         }
-        let is_watched = |mangled| format!("{:#}", rustc_demangle::demangle(mangled)).contains(WATCHED);
-        let watched = elf.symbols().find(|symbol| symbol.name().is_ok_and(is_watched));
-        let watched = watched.ok_or_else(|| bad(&format!("no {WATCHED}")))?.address() as u32 & !1;
-        Ok(Self { handlers, watched })
+        let address = |function: &str| {
+            let is_it = |mangled| format!("{:#}", rustc_demangle::demangle(mangled)).ends_with(function);
+            let symbol = elf.symbols().find(|symbol| symbol.name().is_ok_and(is_it));
+            symbol.map(|symbol| symbol.address() as u32 & !1).ok_or_else(|| bad(&format!("no {function}")))
+        };
+        let (watched, looking) = (address(WATCHED)?, address(LOOKING)?);
+        Ok(Self { handlers, watched, looking })
     }
 }

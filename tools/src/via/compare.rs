@@ -19,7 +19,7 @@
 use super::Quantisation;
 use crate::drive::{Drive, DriveError, Step};
 use crate::recording::Recording;
-use crate::wheel_rates::WheelRates;
+use crate::wheel_frames::WheelFrames;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
@@ -53,12 +53,12 @@ impl Difference {
     /// Of the rates that were sent at once.
     #[must_use]
     pub fn of_rates(direct: &Drive, via: &Drive) -> Self {
-        Self::of(direct, via, |step| step.prompt.rate)
+        Self::of(direct, via, |step| step.vehicle.prompt.rate)
     }
 
     /// Of the corrections in them.
     fn of_corrections(direct: &Drive, via: &Drive) -> Self {
-        Self::of(direct, via, |step| step.prompt.correction)
+        Self::of(direct, via, |step| step.vehicle.prompt.correction)
     }
 
     /// From the first step after both have been initialised.
@@ -125,7 +125,7 @@ impl Bound {
         let bias = SIGMAS * sigma / f64::from(STATIC_SAMPLES).sqrt();
         let mut answer = Difference::default();
         for seed in 0..STAND_INS {
-            let (config, wheels) = (PipelineConfig::DEFAULT, WheelRates::new(recording));
+            let (config, wheels) = (PipelineConfig::DEFAULT, WheelFrames::new(recording));
             let stand_in = stand_in(recording, quantisation, seed);
             let drive = Drive::run(&stand_in, &config, wheels, network, &mut tick)?;
             let one = Difference::of_corrections(direct, &drive);

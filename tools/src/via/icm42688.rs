@@ -21,10 +21,12 @@ pub const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
 /// Counts of a 20-bit reading in one step.
 const RATE_COUNTS: f64 = 2.0;
 const FORCE_COUNTS: f64 = 4.0;
-/// The largest reading; the most negative one would be "no reading".
-pub const LARGEST: f64 = 524_287.0;
-/// The part's 16-bit clock wraps.
-pub const WRAP_US: u64 = 1 << 16;
+/// The ends of an acceleration's range; what would be lower means "no reading".
+pub const ENDS: [f64; 2] = [-524_256.0, 524_284.0];
+/// The part's counter of 16 bits wraps.
+const WRAP: u64 = 1 << 16;
+/// Microseconds of a turn of the counter, which counts 32/30 us.
+pub const WRAP_US: f64 = WRAP as f64 * 32.0 / 30.0;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let bus = Bus::default();
@@ -37,20 +39,30 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
         bus.fill(packet(&row.sample).emit());
         let sample = part.next_sample().map_err(|e| error(e.to_string()))?;
         let sample = sample.ok_or_else(|| error("its FIFO seems empty".to_owned()))?;
-        // The part's clock begins anywhere, and a silence longer than its 65 ms is told by the
-        // arrival alone; less than that it says itself.
-        let behind = row.sample.time.0 - row.sample.time.0.min(sample.time.0);
-        let time = Micros(sample.time.0 + behind / WRAP_US * WRAP_US);
-        samples.push(ImuSample { time, ..sample });
+        // The part's clock begins anywhere, and the turns that it makes in a silence show in the
+        // arrival alone.
+        let (sent, read) = (counts(row.sample.time), counts(sample.time));
+        let turns = sent.saturating_sub(read) / WRAP;
+        samples.push(ImuSample { time: micros(read + turns * WRAP), ..sample });
     }
     let bytes = bus.part().bytes;
     Ok((samples, bytes))
 }
 
+/// Returns the nearest count of the part's counter at a time, as if it never wrapped.
+const fn counts(time: Micros) -> u64 {
+    (time.0 * 30 + 16) / 32
+}
+
+/// Returns the nearest microsecond.
+const fn micros(counts: u64) -> Micros {
+    Micros((counts * 32 + 15) / 30)
+}
+
 /// The packet of a sample, its readings rounded to the part's steps and clipped at its ends.
 pub fn packet(sample: &ImuSample) -> Packet {
     let reading = |value: f64, step: f64, counts: f64| {
-        Some((libm::round(value / step) * counts).clamp(-LARGEST, LARGEST) as i32)
+        Some((libm::round(value / step) * counts).clamp(ENDS[0], ENDS[1]) as i32)
     };
     Packet {
         resolution: Resolution::Bits20,
@@ -59,7 +71,7 @@ pub fn packet(sample: &ImuSample) -> Packet {
             .map(|force| reading(force.metre_per_sec2(), FORCE_STEP, FORCE_COUNTS)),
         rate: sample.angular_rate.map(|rate| reading(rate.rad_per_sec(), RATE_STEP, RATE_COUNTS)),
         temperature: sample.temperature.map(|code| (f32::from(code.0) * 1.3248 - 3312.0).round() as i16),
-        time: (sample.time.0 % WRAP_US) as u16,
+        time: (counts(sample.time) % WRAP) as u16,
     }
 }
 

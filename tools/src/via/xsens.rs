@@ -44,6 +44,6 @@ fn message(number: usize, sample: &ImuSample) -> MtData2 {
         acceleration: Some(sample.specific_force.map(|force| force.metre_per_sec2() as f32)),
         rate_of_turn: Some(sample.angular_rate.map(|rate| rate.rad_per_sec() as f32)),
         temperature: sample.temperature.map(|code| f32::from(code.0) / 100.0),
-        status: Some(GOOD | if sample.clipped { CLIPPED } else { 0 }),
+        status: Some(GOOD | if !sample.validity.is_good() { CLIPPED } else { 0 }),
     }
 }

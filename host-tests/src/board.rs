@@ -1,0 +1,285 @@
+//! The virtual STM32F405 for tests: the image as it is flashed, on a model of the chip in Python (`board/README.md`).
+//!
+//! The model runs in a process of its own. Its time passes only in [`Board::run`] and [`Board::run_until`], so a test sees the
+//! same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its clock) is a panic with the
+//! model's own words.
+
+pub mod event;
+pub mod line;
+mod link;
+
+use crate::require;
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+pub use event::{Counts, Event};
+use gyronet::can::DataFrame;
+use line::Line;
+use link::{Link, hex, unhex};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::time::Duration;
+
+/// Packages that the model needs.
+pub const PACKAGES: &[&str] = &["unicorn"];
+
+/// A place in memory.
+#[derive(Debug, Clone, Copy)]
+pub enum At<'a> {
+    /// An address.
+    Address(u32),
+    /// A symbol of the image: its full name, or a part that fits only one, such as `app::idle`.
+    Symbol(&'a str),
+}
+
+/// A board in the model.
+#[derive(Debug)]
+pub struct Board {
+    link: Link,
+}
+
+impl Board {
+    /// A board without power, with the image in its flash. `None` (aloud) where the model's packages are missing.
+    #[must_use]
+    pub fn unpowered(test: &str, image: &Path) -> Option<Self> {
+        let python = require::python(test, PACKAGES)?;
+        Some(Self { link: Link::open(&python, image) })
+    }
+
+    /// A board that has just been switched on.
+    #[must_use]
+    pub fn boot(test: &str, image: &Path) -> Option<Self> {
+        let mut board = Self::unpowered(test, image)?;
+        board.power_on();
+        Some(board)
+    }
+
+    #[track_caller]
+    fn ask(&mut self, command: &str, arguments: Value) -> Value {
+        self.link.ask(command, arguments).unwrap_or_else(|error| panic!("{command}: {error}"))
+    }
+
+    /// Applies power. RAM then holds noise.
+    pub fn power_on(&mut self) {
+        self.ask("power_on", json!({}));
+    }
+
+    /// Removes power. Flash stays as it is, and an operation under way in it is left half done.
+    pub fn power_off(&mut self) {
+        self.ask("power_off", json!({}));
+    }
+
+    /// Removes power for a time.
+    pub fn power_cycle(&mut self, off: Duration) {
+        self.power_off();
+        self.run(off);
+        self.power_on();
+    }
+
+    /// Pulls the reset pin for a moment.
+    pub fn reset_pin(&mut self) {
+        self.ask("reset_pin", json!({}));
+    }
+
+    /// Lets board time pass, and returns the time since the first power-on.
+    pub fn run(&mut self, time: Duration) -> Duration {
+        let answer = self.ask("run", json!({ "us": micros(time) }));
+        duration(&answer["time_us"])
+    }
+
+    /// What [`Board::run`] returns, or the model's refusal: for a test that expects one.
+    ///
+    /// # Errors
+    /// The model's words.
+    pub fn try_run(&mut self, time: Duration) -> Result<Duration, String> {
+        let answer = self.link.ask("run", json!({ "us": micros(time) }))?;
+        Ok(duration(&answer["time_us"]))
+    }
+
+    /// Lets board time pass until an event of this kind, and returns its time; `None` after the limit.
+    #[must_use]
+    pub fn run_until(&mut self, event: &str, limit: Duration) -> Option<Duration> {
+        self.run_until_any(&[json!({ "event": event })], limit).map(|(_, time)| time)
+    }
+
+    /// Lets board time pass until the board has so many bytes unread on a line; returns whether it has.
+    #[must_use]
+    pub fn run_until_sent(&mut self, usart: usize, bytes: usize, limit: Duration) -> bool {
+        self.run_until_any(&[json!({ "usart": usart, "bytes": bytes })], limit).is_some()
+    }
+
+    /// Lets board time pass until the board has got so many frames onto the bus that were not taken; returns whether it has.
+    #[must_use]
+    pub fn run_until_frames(&mut self, frames: usize, limit: Duration) -> bool {
+        self.run_until_any(&[json!({ "can": frames })], limit).is_some()
+    }
+
+    /// Lets board time pass until one of the model's conditions holds; returns which and when.
+    #[must_use]
+    pub fn run_until_any(&mut self, conditions: &[Value], limit: Duration) -> Option<(usize, Duration)> {
+        let answer = self.ask("run", json!({ "until": conditions, "limit_us": micros(limit) }));
+        let met = usize::try_from(answer["met"].as_u64()?).ok()?;
+        Some((met, duration(&answer["time_us"])))
+    }
+
+    /// Sends bytes to the board, from now on at the pace of the line.
+    pub fn send(&mut self, usart: usize, bytes: &[u8]) {
+        self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes) }));
+    }
+
+    /// Sends bytes to the board, not before a time.
+    pub fn send_at(&mut self, usart: usize, bytes: &[u8], time: Duration) {
+        self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes), "at_us": micros(time) }));
+    }
+
+    /// Takes what the board has sent.
+    #[must_use]
+    pub fn sent(&mut self, usart: usize) -> Vec<u8> {
+        self.sent_chunks(usart).into_iter().flat_map(|(_, bytes)| bytes).collect()
+    }
+
+    /// Takes what the board has sent, in pieces without a gap, with the time of each first byte.
+    #[must_use]
+    pub fn sent_chunks(&mut self, usart: usize) -> Vec<(Duration, Vec<u8>)> {
+        let answer = self.ask("usart_take", json!({ "usart": usart }));
+        list(&answer["chunks"])
+            .iter()
+            .map(|chunk| (duration(&chunk["time_us"]), unhex(&chunk["hex"])))
+            .collect()
+    }
+
+    /// A line of the board, for code that reads and writes.
+    pub fn line(&mut self, usart: usize) -> Line<'_> {
+        Line::new(self, usart)
+    }
+
+    /// Puts a frame of another node on the bus.
+    pub fn can_send(&mut self, frame: &DataFrame) {
+        self.ask("can_send", foreign(frame));
+    }
+
+    /// Puts a frame of another node on the bus, not before a time.
+    pub fn can_send_at(&mut self, frame: &DataFrame, time: Duration) {
+        let mut arguments = foreign(frame);
+        arguments["at_us"] = micros(time).into();
+        self.ask("can_send", arguments);
+    }
+
+    /// Takes the frames that the board got onto the bus whole, with the time of their end.
+    #[must_use]
+    pub fn can_frames(&mut self) -> Vec<(Duration, DataFrame)> {
+        let answer = self.ask("can_take", json!({}));
+        let own = |entry: &&Value| entry["source"] == "board" && entry["error"].is_null();
+        let frames = list(&answer["frames"]).iter().filter(own);
+        frames.map(|entry| (duration(&entry["time_us"]), frame(entry))).collect()
+    }
+
+    /// Sets a fault or a condition of the surroundings, such as `"RCC.crystal_hz"` to `null`.
+    pub fn configure(&mut self, name: &str, value: impl Into<Value>) {
+        self.ask("set", json!({ "values": { name: value.into() } }));
+    }
+
+    /// Takes the event log.
+    #[must_use]
+    pub fn events(&mut self) -> Vec<Event> {
+        let answer = self.ask("events_take", json!({}));
+        list(&answer["events"]).iter().map(Event::new).collect()
+    }
+
+    /// Puts the register accesses of a peripheral into the event log.
+    pub fn trace(&mut self, peripheral: &str, on: bool) {
+        self.ask("trace", json!({ "peripheral": peripheral, "on": on }));
+    }
+
+    /// Reads flash or RAM.
+    #[must_use]
+    pub fn read(&mut self, at: At, length: usize) -> Vec<u8> {
+        let answer = self.ask("memory_read", place(at, json!({ "length": length })));
+        unhex(&answer["hex"])
+    }
+
+    /// Changes flash or RAM: a stored record, or an instruction (`FEE7` is a branch to itself).
+    pub fn patch(&mut self, at: At, bytes: &[u8]) {
+        self.ask("memory_write", place(at, json!({ "hex": hex(bytes) })));
+    }
+
+    /// Where a symbol is, and its size in bytes.
+    #[must_use]
+    pub fn symbol(&mut self, name: &str) -> (u32, u32) {
+        let answer = self.ask("symbol", json!({ "name": name }));
+        (word(&answer["address"]), word(&answer["size"]))
+    }
+
+    /// A register of the processor: `r0` to `r12`, `sp`, `lr`, `pc`, `xpsr`, `msp`, `psp`, `primask`, ...
+    #[must_use]
+    pub fn register(&mut self, name: &str) -> u32 {
+        let answer = self.ask("registers", json!({}));
+        word(&answer["registers"][name])
+    }
+
+    /// Changes a register of the processor.
+    pub fn set_register(&mut self, name: &str, value: u32) {
+        self.ask("registers", json!({ "set": { name: value } }));
+    }
+
+    /// Cuts the power after so many accesses to the flash controller's registers or the flash array, then some time later.
+    pub fn cut_after(&mut self, accesses: usize, delay: Duration) {
+        self.ask("cut_after", json!({ "accesses": accesses, "delay_us": micros(delay) }));
+    }
+
+    /// Instructions, board time, time asleep, and the state of power and core.
+    #[must_use]
+    pub fn counts(&mut self) -> Counts {
+        Counts::new(&self.ask("counts", json!({})))
+    }
+
+    /// Keeps the state of the whole board under a name.
+    pub fn snapshot(&mut self, name: &str) {
+        self.ask("snapshot", json!({ "name": name }));
+    }
+
+    /// Puts a kept state back.
+    pub fn restore(&mut self, name: &str) {
+        self.ask("restore", json!({ "name": name }));
+    }
+}
+
+fn micros(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e6
+}
+
+fn duration(micros: &Value) -> Duration {
+    Duration::from_secs_f64(micros.as_f64().expect("the model gives a time") * 1e-6)
+}
+
+fn word(value: &Value) -> u32 {
+    value.as_u64().and_then(|value| u32::try_from(value).ok()).expect("the model gives a word")
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().expect("the model gives a list")
+}
+
+fn foreign(frame: &DataFrame) -> Value {
+    let (id, extended) = match frame.id() {
+        Id::Standard(id) => (u32::from(id.as_raw()), false),
+        Id::Extended(id) => (id.as_raw(), true),
+    };
+    json!({ "id": id, "ext": extended, "data": hex(frame.data()) })
+}
+
+fn frame(entry: &Value) -> DataFrame {
+    let id = word(&entry["id"]);
+    let id = if entry["ext"] == true {
+        Id::from(ExtendedId::new(id).expect("29 bits"))
+    } else {
+        Id::from(StandardId::new(id as u16).expect("11 bits"))
+    };
+    DataFrame::new(id, &unhex(&entry["data"])).expect("at most eight bytes")
+}
+
+fn place(at: At, mut arguments: Value) -> Value {
+    match at {
+        At::Address(address) => arguments["address"] = address.into(),
+        At::Symbol(name) => arguments["symbol"] = name.into(),
+    }
+    arguments
+}

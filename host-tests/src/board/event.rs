@@ -1,0 +1,72 @@
+//! What the model notes: events with their board time, and counts of a run.
+
+use serde_json::Value;
+use std::time::Duration;
+
+/// An entry of the event log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// Board time.
+    pub time: Duration,
+    /// Such as `reset`, `fault`, `lockup`, `flash_erase`, `cut`.
+    pub kind: String,
+    fields: Value,
+}
+
+impl Event {
+    pub(super) fn new(entry: &Value) -> Self {
+        Self {
+            time: super::duration(&entry["time_us"]),
+            kind: entry["kind"].as_str().unwrap_or_default().to_owned(),
+            fields: entry.clone(),
+        }
+    }
+
+    /// A further field, as text: the `cause` of a `reset`. Empty when there is none.
+    #[must_use]
+    pub fn text(&self, name: &str) -> &str {
+        self.fields[name].as_str().unwrap_or_default()
+    }
+
+    /// A further field, as a list of whole numbers: the `sectors` of a `flash_erase`.
+    #[must_use]
+    pub fn numbers(&self, name: &str) -> Vec<u64> {
+        self.fields[name].as_array().into_iter().flatten().filter_map(Value::as_u64).collect()
+    }
+
+    /// A further field, as a number.
+    #[must_use]
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.fields[name].as_f64()
+    }
+}
+
+/// What a board has done since its first power-on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counts {
+    /// Instructions that ran.
+    pub instructions: u64,
+    /// Board time.
+    pub time: Duration,
+    /// Part of it that the core slept.
+    pub asleep: Duration,
+    /// Whether there is power.
+    pub powered: bool,
+    /// Whether the core has locked up after a fault in a fault handler.
+    pub locked_up: bool,
+    /// Accesses to the flash that [`super::Board::cut_after`] still waits for.
+    pub accesses_left: usize,
+}
+
+impl Counts {
+    pub(super) fn new(answer: &Value) -> Self {
+        Self {
+            instructions: answer["instructions"].as_u64().expect("the model counts"),
+            time: super::duration(&answer["time_us"]),
+            asleep: super::duration(&answer["asleep_us"]),
+            powered: answer["powered"] == true,
+            locked_up: answer["locked_up"] == true,
+            accesses_left: answer["accesses_left"].as_u64().expect("the model counts") as usize,
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! The process of the model: a JSON object a line goes in, and one comes back.
+
+use crate::recordings::workspace;
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+/// The model's process and its pipes. It ends with this value.
+#[derive(Debug)]
+pub struct Link {
+    child: Child,
+    input: ChildStdin,
+    output: BufReader<ChildStdout>,
+}
+
+impl Link {
+    /// Starts the model with an image in its flash.
+    ///
+    /// # Panics
+    /// When the process cannot be started.
+    pub fn open(python: &str, image: &Path) -> Self {
+        let mut child = Command::new(python)
+            .args(["-m", "virtual_board", "--elf"])
+            .arg(image)
+            .current_dir(workspace().join("host-tests/board"))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap_or_else(|error| panic!("{python}: {error}"));
+        let input = child.stdin.take().expect("piped");
+        let output = BufReader::new(child.stdout.take().expect("piped"));
+        Self { child, input, output }
+    }
+
+    /// Asks for one command.
+    ///
+    /// # Errors
+    /// The model's words.
+    pub fn ask(&mut self, command: &str, mut arguments: Value) -> Result<Value, String> {
+        arguments["command"] = command.into();
+        let gone = |error| format!("the model has ended: {error}");
+        writeln!(self.input, "{arguments}").and_then(|()| self.input.flush()).map_err(gone)?;
+        let mut line = String::new();
+        self.output.read_line(&mut line).map_err(gone)?;
+        let answer: Value = serde_json::from_str(&line).map_err(|error| format!("{line:?}: {error}"))?;
+        match answer.get("error").and_then(Value::as_str) {
+            Some(error) => Err(error.to_owned()),
+            None => Ok(answer),
+        }
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        // It may have ended by itself, and nothing depends on how it ends.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Bytes from hexadecimal digits of the model.
+///
+/// # Panics
+/// When these are no digits.
+pub fn unhex(digits: &Value) -> Vec<u8> {
+    let digits = digits.as_str().expect("the model gives digits");
+    let byte = |at| u8::from_str_radix(digits.get(at..at + 2).expect("two digits"), 16).expect("digits");
+    (0..digits.len()).step_by(2).map(byte).collect()
+}

@@ -1,0 +1,108 @@
+//! The bring-up image on the virtual board: every line of its output, on a board in order and on one that is not.
+
+use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, SLOTS};
+use gyronet_host_tests::board::{At, Board};
+use gyronet_host_tests::image;
+use std::time::Duration;
+
+const REPORT: usize = 6;
+const SECOND: Duration = Duration::from_secs(1);
+/// The last sector of the flash.
+const SPARE: u32 = FLASH_BASE + SLOTS.start + SLOT_SIZE as u32;
+
+/// Runs the image to its end and gives its lines, without the cycles that the model counts.
+fn lines(test: &str, prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
+    let elf = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "bringup")?;
+    let mut board = Board::unpowered(test, &elf)?;
+    board.configure("USART2.baud", 921_600);
+    board.configure("USART3.baud", 921_600);
+    prepare(&mut board);
+    board.power_on();
+    let mut text = String::new();
+    for _ in 0..12 {
+        board.run(SECOND);
+        text += &String::from_utf8(board.sent(REPORT)).expect("text");
+        if text.contains("checks failed") {
+            break;
+        }
+    }
+    println!("{text}");
+    let lines = text.lines().map(str::to_owned).filter(|line| !line.is_empty()).collect();
+    Some((board, lines))
+}
+
+/// The verdict and the text on a check.
+fn check<'l>(lines: &'l [String], name: &str) -> (&'l str, &'l str) {
+    let line =
+        lines.iter().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("no line on {name}"));
+    let rest = line[name.len()..].trim_start();
+    rest.split_once("  ").unwrap_or((rest, ""))
+}
+
+#[test]
+fn board_in_order() {
+    let Some((mut board, lines)) = lines("board_in_order", |_| ()) else { return };
+    assert!(
+        lines[0].starts_with("gyronet bringup") && lines[0].ends_with("started by power on"),
+        "{}",
+        lines[0]
+    );
+    for (name, verdict, text) in [
+        ("LED", "----", "it has blinked twice"),
+        ("clock", "PASS", "168 MHz; the crystal has 25.00 MHz by the internal oscillator"),
+        ("supply", "PASS", "above 3.0 V"),
+        ("brown-out", "PASS", "set to level 3 (2.8 V) from the next power-on"),
+        ("CAN", "PASS", "2 frames in loopback, the filter stops a third"),
+        ("SPI1", "PASS", "an ICM-42688-P answers"),
+        ("USART1", "----", "sends at 115200 baud; connect TX with RX to see it receive"),
+        ("USART2", "----", "sends at 921600 baud; connect TX with RX to see it receive"),
+        ("USART3", "----", "sends at 921600 baud; connect TX with RX to see it receive"),
+        ("USART6", "PASS", "you read this"),
+    ] {
+        assert_eq!(check(&lines, name), (verdict, text), "{name}");
+    }
+    for (name, verdict, end) in [
+        ("flash", "PASS", " ms"),
+        ("GyroNet", "PASS", "cycles a window"),
+        ("FoGNet", "PASS", "cycles a window"),
+    ] {
+        let (found, text) = check(&lines, name);
+        assert!(found == verdict && text.ends_with(end), "{name}: {found} {text}");
+    }
+    // The second start.
+    let restarted =
+        lines.iter().position(|line| line.ends_with("started by watchdog")).expect("it starts twice");
+    assert_eq!(check(&lines[restarted..], "watchdog"), ("PASS", "reset the chip after 100 ms (60 to 200)"));
+    assert_eq!(lines.last().map(String::as_str), Some("0 checks failed"));
+    // No register was used before its clock had come, and no pin is too slow for its bit rate.
+    let wrong = |kind: &str| ["early_access", "slow_pin", "ignored_write"].contains(&kind);
+    let wrong: Vec<_> = board.events().into_iter().filter(|event| wrong(&event.kind)).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+    assert_eq!(board.read(At::Address(SPARE), SLOT_SIZE), vec![0xFF; SLOT_SIZE], "the sector is left blank");
+    // From the next power-on the brown-out reset is at its level.
+    board.power_cycle(SECOND);
+    board.run(2 * SECOND);
+    let text = String::from_utf8(board.sent(REPORT)).expect("text");
+    assert!(text.contains("brown-out    PASS  level 3 (2.8 V)"), "{text}");
+}
+
+#[test]
+fn crystal_that_is_not_the_board_s() {
+    let wrong = |board: &mut Board| board.configure("RCC.crystal_hz", 16_000_000);
+    let Some((_, lines)) = lines("crystal_that_is_not_the_board_s", wrong) else { return };
+    assert_eq!(check(&lines, "clock"), ("FAIL", "16 MHz: the crystal has 16.000 MHz"));
+    assert_eq!(check(&lines, "CAN"), ("FAIL", "the clock is not exact enough"));
+    assert_eq!(lines.last().map(String::as_str), Some("2 checks failed"));
+}
+
+#[test]
+fn sensor_missing_and_sector_in_use() {
+    let prepare = |board: &mut Board| {
+        board.configure("SPI1.fitted", false);
+        board.patch(At::Address(SPARE), b"weights");
+    };
+    let Some((_, lines)) = lines("sensor_missing_and_sector_in_use", prepare) else { return };
+    let (verdict, text) = check(&lines, "SPI1");
+    assert!(verdict == "----" && text.starts_with("no ICM-42688-P answers"), "{verdict} {text}");
+    assert_eq!(check(&lines, "flash"), ("----", "sector 11 holds a weight file: not tried"));
+}

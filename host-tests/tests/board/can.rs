@@ -1,0 +1,266 @@
+//! CAN on the virtual board: what goes out is what the host makes, what comes in is heard, and a bus that is
+//! away gets nothing old when it is back.
+
+use crate::common::{self, SAMPLE, SET, START, boot, counters, drive, frames, host, resets};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::yaw::{AngleMessage, RateMessage};
+use gyronet::health::{Faults, Quality};
+use gyronet::service::Request;
+use gyronet::service::frame::emit;
+use gyronet::store::{Configuration, Record};
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::require;
+use std::io::Write;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const MS: Duration = Duration::from_millis(1);
+/// Age at which a frame no longer goes out, with the time that the frames before it take.
+const STALE: Duration = Duration::from_millis(25);
+const ANGLE: u16 = 0x1A1;
+
+fn id(id: u16) -> Id {
+    Id::Standard(StandardId::new(id).expect("11 bits"))
+}
+
+fn flags(frames: &[DataFrame]) -> Vec<Faults> {
+    let angles = frames.iter().filter(|frame| frame.id() == id(ANGLE));
+    angles.map(|frame| AngleMessage::parse(frame.data()).expect("eight bytes").faults).collect()
+}
+
+fn has(faults: Faults, fault: Faults) -> bool {
+    faults.0 & fault.0 != 0
+}
+
+/// Frames that went out when their sample was older than [`STALE`], with their place among the host's. An angle
+/// message with the fault bit BUS is none of the host's, which has no bus.
+fn stale(sent: &[(Duration, DataFrame)], made: &[DataFrame]) -> Vec<(Duration, usize)> {
+    let sample = |time: Duration| (time.saturating_sub(START).as_millis() / SAMPLE.as_millis()) as usize;
+    let oldest = |time: Duration| sample(time.saturating_sub(STALE)) * SET;
+    let newest = |time: Duration| ((sample(time) + 1) * SET).min(made.len());
+    let fresh = |time: Duration, frame| made[oldest(time).min(newest(time))..newest(time)].contains(frame);
+    sent.iter()
+        .filter(|(_, frame)| frame.id() != id(ANGLE) || !has(flags(&[*frame])[0], Faults::BUS))
+        .filter(|(time, frame)| !fresh(*time, frame))
+        .map(|(time, frame)| (*time, made.iter().position(|made| made == frame).unwrap_or(usize::MAX)))
+        .collect()
+}
+
+/// Runs a drive, with something done to the bus from one time to another.
+struct Disturbed {
+    board: Board,
+    before: Vec<(Duration, DataFrame)>,
+    during: Vec<(Duration, DataFrame)>,
+    after: Vec<(Duration, DataFrame)>,
+    made: Vec<DataFrame>,
+}
+
+fn disturbed(
+    test: &str,
+    lasts: Duration,
+    set: (&str, serde_json::Value),
+    back: serde_json::Value,
+) -> Option<Disturbed> {
+    let mut board = boot(test)?;
+    let span = Duration::from_secs(1);
+    let samples = drive(((span + lasts + span).as_millis() / SAMPLE.as_millis()) as usize);
+    common::send(&mut board, &samples, START);
+    board.run(START + span);
+    let before = board.can_frames();
+    board.configure(set.0, set.1);
+    board.run(lasts);
+    let during = board.can_frames();
+    board.configure(set.0, back);
+    board.run(span);
+    let after = board.can_frames();
+    Some(Disturbed { board, before, during, after, made: host(&samples) })
+}
+
+#[test]
+fn frames_are_those_of_the_host_byte_for_byte() {
+    const TEST: &str = "frames_are_those_of_the_host_byte_for_byte";
+    const SAMPLES: usize = 600;
+    let Some(mut board) = boot(TEST) else { return };
+    let samples = drive(SAMPLES);
+    common::send(&mut board, &samples, START);
+    board.run(START + SAMPLE * SAMPLES as u32);
+    let sent = board.can_frames();
+    let made = host(&samples);
+    println!("{TEST}: first frame {:?} after the first sample began", sent[0].0 - START);
+    assert!(sent[0].0 - START < 10 * MS);
+    assert!(sent.len() >= SET * (SAMPLES - 1), "{} frames", sent.len());
+    assert!(frames(&sent) == made[..sent.len()], "in order, and the same");
+    // A sample's six frames are out before the next sample comes, one behind the other.
+    for (k, set) in sent.chunks_exact(SET).enumerate() {
+        let began = START + SAMPLE * k as u32;
+        assert!(set[SET - 1].0 - began < SAMPLE, "sample {k}: {:?}", set[SET - 1].0 - began);
+        assert!(
+            set[SET - 1].0 - set[0].0 < 2 * MS,
+            "sample {k}: {:?} for six frames",
+            set[SET - 1].0 - set[0].0
+        );
+    }
+    let counters = counters(&mut board);
+    assert_eq!((counters.lines.unsent, counters.lines.line_errors, counters.lines.overruns), (0, 0, 0));
+    sums(TEST, &sent);
+}
+
+/// cantools reads the log: the sum of the rates is the accumulated angle.
+fn sums(test: &str, sent: &[(Duration, DataFrame)]) {
+    let Some(python) = require::python(test, &["cantools"]) else { return };
+    let folder = workspace().join("host-tests/tests/clients");
+    let mut child = Command::new(python)
+        .args([folder.join("log_sums.py"), workspace().join("tools/gyronet.dbc")])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("Python runs");
+    let mut input = child.stdin.take().expect("piped");
+    for (time, frame) in sent {
+        let Id::Standard(id) = frame.id() else { panic!("11 bits") };
+        let data: String = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
+        writeln!(input, "({:.6}) can0 {:03X}#{data}", time.as_secs_f64(), id.as_raw()).expect("it reads");
+    }
+    drop(input);
+    let output = child.wait_with_output().expect("it ends");
+    let text = String::from_utf8_lossy(&output.stdout);
+    println!("{test}: {}", text.trim());
+    let off: f64 = text.split_whitespace().last().and_then(|word| word.parse().ok()).expect("a difference");
+    assert!(output.status.success() && off < 1e-6, "{text}");
+}
+
+#[test]
+fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
+    let Some(mut board) = boot("wheel_frames_come_in_through_the_filters") else { return };
+    let wheel =
+        |id: u16| DataFrame::new(StandardId::new(id).expect("11 bits"), &[0x1A, 0x6F].repeat(4)).expect("8");
+    // From power-on: wheels at 0xAA, and a neighbour that the filter must stop.
+    let samples = drive(200);
+    common::send(&mut board, &samples, START);
+    for _ in 0..220 {
+        board.can_send(&wheel(0xAA));
+        board.can_send(&wheel(0xAB));
+        board.run(SAMPLE);
+    }
+    let counters = counters(&mut board);
+    assert_eq!((counters.lines.frames_lost, counters.lines.unsent), (0, 0));
+    let sent = frames(&board.can_frames());
+    let faults = flags(&sent);
+    assert!(!has(faults[0], Faults::BUS), "the first 0x1A1 tells of a bus without faults");
+    // The wheels stand (67.67 km/h is their zero), which holds the rate at zero after initialisation; that
+    // the drive turns meanwhile is contradicted. Without wheels neither is known.
+    assert!(counters.pipeline.zero_rate_updates + counters.pipeline.contradicted == 0 || !faults.is_empty());
+    let silent = faults.iter().filter(|faults| has(**faults, Faults::WHEELS)).count();
+    board.run(Duration::from_millis(500));
+    let later = flags(&frames(&board.can_frames()));
+    println!("wheels: {} of {} sets without wheels; then {}", silent, faults.len(), later.len());
+    assert!(silent < 3, "{silent} of {} sets miss the wheels", faults.len());
+}
+
+#[test]
+fn no_acknowledgement_for_a_while() {
+    let lasts = Duration::from_millis(200);
+    let set = ("CAN1.acknowledge", false.into());
+    let Some(run) = disturbed("no_acknowledgement_for_a_while", lasts, set, true.into()) else { return };
+    assert!(frames(&run.before)[..] == run.made[..run.before.len()]);
+    assert_eq!(run.during.len(), 0, "nothing is acknowledged");
+    assert_eq!(stale(&run.after, &run.made), [], "nothing old goes out");
+    let faults = flags(&frames(&run.after));
+    assert!(has(faults[0], Faults::BUS), "the first angle message tells of frames that were dropped");
+    assert!(!has(faults[faults.len() - 1], Faults::BUS), "and the last one of a bus in order");
+    let mut board = run.board;
+    let dropped = counters(&mut board).lines.unsent as usize;
+    let missing = run.made.len() - run.before.len() - run.after.len();
+    assert!(dropped.abs_diff(missing) <= SET, "{dropped} counted, {missing} missing");
+}
+
+#[test]
+fn bus_off_and_back() {
+    let lasts = Duration::from_millis(400);
+    let set = ("CAN1.short", "recessive".into());
+    let Some(run) = disturbed("bus_off_and_back", lasts, set, serde_json::Value::Null) else { return };
+    let mut board = run.board;
+    let times = |kind: &str, events: &[gyronet_host_tests::board::Event]| -> Vec<Duration> {
+        events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect()
+    };
+    let off = times("bus_off", &board.events());
+    println!("bus-off at {off:?}");
+    assert!(off.len() >= 3, "{off:?}");
+    // Each restart waits twice as long as the one before.
+    let waits: Vec<Duration> = off.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(waits.windows(2).all(|pair| pair[1] > pair[0]), "{waits:?}");
+    assert_eq!(stale(&run.after, &run.made), []);
+    assert!(!run.after.is_empty() && has(flags(&frames(&run.after))[0], Faults::BUS));
+    // Sent again as soon as the controller's wait is over.
+    let back = START + Duration::from_secs(1) + lasts;
+    assert!(run.after[0].0 - back < Duration::from_millis(700), "{:?}", run.after[0].0 - back);
+}
+
+#[test]
+fn babbling_bus() {
+    let lasts = Duration::from_millis(200);
+    let set = ("CAN1.babble", true.into());
+    let Some(run) = disturbed("babbling_bus", lasts, set, false.into()) else { return };
+    assert_eq!(run.during.len(), 0, "the other node always wins");
+    assert_eq!(stale(&run.after, &run.made), []);
+    assert!(has(flags(&frames(&run.after))[0], Faults::BUS));
+    let last = frames(&run.after);
+    assert!(
+        last.len() > 90 * SET && last.ends_with(&run.made[run.made.len() - SET..][..SET])
+            || last.len() > 95 * SET
+    );
+}
+
+#[test]
+fn bus_back_after_ten_seconds() {
+    let lasts = Duration::from_secs(10);
+    let set = ("CAN1.connected", false.into());
+    let Some(run) = disturbed("bus_back_after_ten_seconds", lasts, set, true.into()) else { return };
+    assert_eq!(run.during.len(), 0);
+    assert_eq!(stale(&run.after, &run.made), [], "no old frame goes out");
+    let back = START + Duration::from_secs(11);
+    println!("first frame {:?} after the bus is back", run.after[0].0 - back);
+    assert!(run.after[0].0 - back < 30 * MS);
+}
+
+#[test]
+fn an_erase_is_announced_and_costs_no_time() {
+    const TEST: &str = "an_erase_is_announced_and_costs_no_time";
+    let Some(mut board) = boot(TEST) else { return };
+    // Wheels that stand prove that the vehicle does, whatever the gyro says.
+    let still = DataFrame::new(StandardId::new(0xAA).expect("11 bits"), &[0x1A, 0x6F].repeat(4))
+        .expect("eight bytes");
+    let samples = drive(400);
+    common::send(&mut board, &samples, START);
+    for _ in 0..300 {
+        board.can_send(&still);
+        board.run(SAMPLE);
+    }
+    let _ = (board.can_frames(), board.events());
+    let configuration = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
+    let request = Request::SetConfiguration { version: Configuration::VERSION, configuration };
+    board.send(common::SERVICE, &emit(1, &request).expect("it fits"));
+    board.run(Duration::from_millis(900));
+    let erased = board.events().into_iter().find(|event| event.kind == "flash_erase").expect("an erase");
+    let sent = board.can_frames();
+    let (before, after): (Vec<_>, Vec<_>) = sent.into_iter().partition(|(time, _)| *time < erased.time);
+    let rates = |frames: &[(Duration, DataFrame)]| -> Vec<Quality> {
+        let rates = frames.iter().filter(|(_, frame)| frame.id() == id(0x1A0));
+        rates.map(|(_, frame)| RateMessage::parse(frame.data()).expect("eight bytes").quality).collect()
+    };
+    let silence = after[0].0 - before[before.len() - 1].0;
+    println!(
+        "{TEST}: silent for {silence:?}, the erase began {:?} after the last frame",
+        erased.time - before[before.len() - 1].0
+    );
+    assert!(silence > 200 * MS, "an erase of 16 KiB takes 250 ms");
+    assert_eq!(rates(&before).last(), Some(&Quality::Unusable), "the silence is announced");
+    // The processor stood still, and board time did not: samples that were lost are a gap, not a delay.
+    let stale = stale(&after, &host(&samples));
+    assert!(resets(&mut board).is_empty() && rates(&after).len() > 10, "{} frames, {stale:?}", after.len());
+    let ticks = |frames: &[(Duration, DataFrame)]| frames.iter().filter(|(_, f)| f.id() == id(0x174)).count();
+    let missing = ((after[after.len() - 1].0 - before[0].0).as_millis() / SAMPLE.as_millis()) as usize;
+    assert!(missing - ticks(&before) - ticks(&after) >= 20, "the samples of 250 ms are missing");
+}

@@ -1,0 +1,95 @@
+//! The board of these tests: an MTi on USART1, SLCAN on USART2 at 921600, the service line on USART6, CAN.
+
+use gyronet::can::{DataFrame, slcan};
+use gyronet::service::message::{AllCounters, Info};
+use gyronet::service::{Reply, Request};
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::recordings::{self, workspace};
+use gyronet_host_tests::{image, replay};
+use gyronet_tools::device::Device;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Lines of the board.
+pub const IMU: usize = 1;
+pub const SLCAN: usize = 2;
+pub const SERVICE: usize = 6;
+/// Time from one sample of the sensor to the next.
+pub const SAMPLE: Duration = Duration::from_millis(10);
+/// Time from power-on until the image listens to all lines.
+pub const START: Duration = Duration::from_millis(200);
+/// Frames of a sample.
+pub const SET: usize = 6;
+
+/// The image that is flashed, for a test that is skipped (aloud) where it cannot be built.
+pub fn elf(test: &str) -> Option<PathBuf> {
+    image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")
+}
+
+/// A board with the image in its flash and without power.
+pub fn unpowered(test: &str) -> Option<Board> {
+    let mut board = Board::unpowered(test, &elf(test)?)?;
+    board.configure("USART2.baud", 921_600);
+    board.configure("USART3.baud", 921_600);
+    Some(board)
+}
+
+/// A board that has just been switched on.
+pub fn boot(test: &str) -> Option<Board> {
+    let mut board = unpowered(test)?;
+    board.power_on();
+    Some(board)
+}
+
+/// Samples of the simulated drive, as the sensor sends them.
+pub fn drive(samples: usize) -> Vec<Vec<u8>> {
+    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
+    rows.iter().take(samples).enumerate().map(|(k, row)| replay::message(k, row).emit().to_vec()).collect()
+}
+
+/// Sends samples, one every 10 ms, from a time on.
+pub fn send(board: &mut Board, samples: &[Vec<u8>], from: Duration) {
+    for (k, sample) in samples.iter().enumerate() {
+        board.send_at(IMU, sample, from + SAMPLE * k as u32);
+    }
+}
+
+/// The frames that the host's replay makes of samples.
+pub fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
+    let lines = replay::lines(&samples.concat());
+    lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect()
+}
+
+/// The frames alone.
+pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
+    timed.iter().map(|(_, frame)| *frame).collect()
+}
+
+fn ask(board: &mut Board, request: &Request) -> Reply {
+    // A zero ends whatever the line has brought before.
+    board.send(SERVICE, &[0]);
+    Device::new(board.line(SERVICE), "the virtual board").ask(request).expect("an answer")
+}
+
+/// What the board reports of itself.
+pub fn info(board: &mut Board) -> Info {
+    match ask(board, &Request::Info) {
+        Reply::Info(info) => info,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The board's counters.
+pub fn counters(board: &mut Board) -> AllCounters {
+    match ask(board, &Request::Counters) {
+        Reply::Counters(counters) => counters,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Times and causes of resets.
+pub fn resets(board: &mut Board) -> Vec<(Duration, String)> {
+    let events = board.events();
+    let resets = events.iter().filter(|event| event.kind == "reset");
+    resets.map(|event| (event.time, event.text("cause").to_owned())).collect()
+}

@@ -1,0 +1,117 @@
+//! Crashes and hangs on the virtual board: each resets the chip within the watchdog's limit at the latest, and
+//! leaves its reason.
+
+use crate::common::{self, START, boot, drive, info, resets};
+use gyronet::service::crash::{Crash, CrashKind};
+use gyronet::service::event::ResetCause;
+use gyronet_host_tests::board::{At, Board};
+use std::time::Duration;
+
+/// `b .`: a branch to itself.
+const HANG: &[u8] = &[0xFE, 0xE7];
+const SECOND: Duration = Duration::from_secs(1);
+const MS: Duration = Duration::from_millis(1);
+
+fn crash_of(board: &mut Board) -> Option<Crash> {
+    let identity = info(board).identity;
+    assert_eq!(identity.clock_fault, None, "the board runs again");
+    identity.crash
+}
+
+#[test]
+fn hang_of_each_task() {
+    // The vectors' functions; idle's own; the output task's, which the watchdog wants, too.
+    let tasks = [
+        "USART1",
+        "USART2",
+        "USART3",
+        "SysTick",
+        "UART4",
+        "UART5",
+        "idle::Idle::turn",
+        "output::Output::turn",
+    ];
+    let Some(mut board) = boot("hang_of_each_task") else { return };
+    let samples = drive(40);
+    common::send(&mut board, &samples, START);
+    board.run(START + 50 * MS);
+    board.snapshot("running");
+    for task in tasks {
+        board.restore("running");
+        let original = board.read(At::Symbol(task), 2);
+        board.patch(At::Symbol(task), HANG);
+        if task == "USART3" {
+            board.send(3, &[0]);
+        }
+        let began = board.run(Duration::ZERO);
+        let reset = board.run_until("reset", SECOND);
+        let reset = reset.unwrap_or_else(|| panic!("a hang of {task} goes unnoticed"));
+        println!("hang of {task}: reset after {:?}", reset - began);
+        // 100 ms at 32 kHz, and what was left of the period.
+        assert!(reset - began <= 110 * MS, "{task}: {:?}", reset - began);
+        board.patch(At::Symbol(task), &original);
+        board.run(START);
+        let identity = info(&mut board).identity;
+        assert_eq!((identity.reset, identity.crash), (ResetCause::Watchdog, None), "{task}");
+    }
+}
+
+#[test]
+fn hang_of_the_start() {
+    let Some(mut board) = boot("hang_of_the_start") else { return };
+    let original = board.read(At::Symbol("idle::Idle::new"), 2);
+    board.patch(At::Symbol("idle::Idle::new"), HANG);
+    board.run(8 * SECOND);
+    let resets = resets(&mut board);
+    assert!(resets.len() >= 2 && resets.iter().skip(1).all(|(_, cause)| cause == "iwdg"), "{resets:?}");
+    board.patch(At::Symbol("idle::Idle::new"), &original);
+    board.run(5 * SECOND);
+    assert_eq!(crash_of(&mut board), None);
+}
+
+#[test]
+fn watchdog_at_the_ends_of_its_oscillator() {
+    for hz in [17_000, 47_000] {
+        let Some(mut board) = common::unpowered("watchdog_at_the_ends_of_its_oscillator") else { return };
+        board.configure("RCC.lsi_hz", hz);
+        board.power_on();
+        let samples = drive(150);
+        common::send(&mut board, &samples, START);
+        board.run(START + 2 * SECOND);
+        assert_eq!(resets(&mut board).len(), 1, "{hz} Hz: a board that runs is not reset");
+    }
+}
+
+/// Runs the board, changes a register while it sleeps or idles, and gives the crash that follows.
+fn provoked(test: &str, register: &str, value: u32) -> Option<Crash> {
+    let mut board = boot(test)?;
+    board.run(START);
+    board.set_register(register, value);
+    let reset = board.run_until("reset", SECOND);
+    assert!(reset.is_some(), "no reset");
+    board.run(START);
+    let crash = crash_of(&mut board);
+    // Asked once more after another start, there is none.
+    board.reset_pin();
+    board.run(START);
+    assert_eq!(crash_of(&mut board), None);
+    println!("{test}: {}", crash.expect("a reason"));
+    crash
+}
+
+#[test]
+fn stack_overflow() {
+    // The lowest words of the RAM: the next exception frame does not fit.
+    let Some(crash) = provoked("stack_overflow", "sp", 0x2000_0008) else { return };
+    assert_eq!((crash.kind, crash.count), (CrashKind::HardFault, 1));
+    // STKERR: a bus fault on stacking for exception entry (PM0214 4.4.10).
+    assert_ne!(crash.status & 1 << 12, 0, "CFSR {:#010x}", crash.status);
+}
+
+#[test]
+fn hard_fault() {
+    let Some(crash) = provoked("hard_fault", "pc", 0x3000_0000) else { return };
+    assert_eq!((crash.kind, crash.count), (CrashKind::HardFault, 1));
+    assert_eq!(crash.place & !1, 0x3000_0000, "{crash}");
+    assert_ne!(crash.status, 0);
+}

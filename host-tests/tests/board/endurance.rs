@@ -1,0 +1,261 @@
+//! All lines busy at once: every frame is the host's, none is missing, nothing overruns, and the stack does not grow.
+//!
+//! | line | traffic |
+//! |---|---|
+//! | USART1 | MTi, 100 messages a second, a simulated drive |
+//! | USART3 | DSP-1760, 1000 messages a second at 921600 |
+//! | USART2 | all frames as SLCAN at 921600 |
+//! | CAN | the board's 900 frames a second; wheel frames at 50 Hz, and three identifiers at 50 Hz that the filters stop |
+//! | USART6 | a question every 100 ms |
+
+use crate::common::{self, IMU, SAMPLE, SERVICE, SET, SLCAN, START};
+use embedded_can::{Frame, StandardId};
+use gyronet::can::fog_encoder::FogEncoder;
+use gyronet::can::yaw::FOG_IDS;
+use gyronet::can::{DataFrame, config::Config, slcan};
+use gyronet::health::InputCounters;
+use gyronet::service::frame::{Deframer, emit};
+use gyronet::service::message::{AllCounters, LineCounters};
+use gyronet::service::{Reply, Request};
+use gyronet_host_tests::board::{At, Board};
+use gyronet_host_tests::connected::Step;
+use gyronet_host_tests::recordings::Row;
+use gyronet_host_tests::replay;
+use gyronet_tools::monitor::{Counts, Monitor};
+use gyronet_tools::simulate::{self, Simulation};
+use std::time::{Duration, Instant};
+
+const FOG: usize = 3;
+const SECOND: Duration = Duration::from_secs(1);
+const MS: Duration = Duration::from_millis(1);
+/// Samples in a second, and messages of the fibre-optic gyro in a sample.
+const SAMPLES: usize = 100;
+const MESSAGES: usize = 10;
+/// Bytes of one in format A.
+const MESSAGE_BYTES: usize = 36;
+/// Frames of the fibre-optic gyro in a sample.
+const FOG_SET: usize = 3;
+/// Time after the begin of a sample's message at which wheel frames come: the message has ended, and the next has not
+/// begun.
+const WHEELS_AFTER: Duration = Duration::from_millis(8);
+/// Identifiers on the bus that are none of the board's business.
+const OTHERS: [u16; 3] = [0x0AB, 0x2C1, 0x3D0];
+/// Samples between two questions on the service line.
+const QUESTION: usize = 10;
+/// The end and the size of the stack's region (memory.x), the bytes that may be used of it, and what the rest is filled with.
+const STACK_END: u32 = 0x2000_8000;
+const STACK_SIZE: u32 = 0x8000;
+const STACK_BUDGET: usize = 12 << 10;
+const PAINT: u8 = 0xA5;
+
+/// What the outside sends, and what the host makes of it.
+struct Outside {
+    drive: Simulation,
+    number: usize,
+    host: replay::Board,
+    questions: [Vec<u8>; 4],
+}
+
+impl Outside {
+    fn new() -> Self {
+        let question = |request: Request| emit(0, &request).expect("it fits").to_vec();
+        let all = [Request::Info, Request::GetConfiguration, Request::Log { after: 0 }, Request::Counters];
+        Self {
+            drive: Simulation::new(&simulate::Config::DEFAULT),
+            number: 0,
+            host: replay::Board::new(),
+            questions: all.map(question),
+        }
+    }
+
+    /// Sends a sample's 10 ms of everything.
+    fn sample(&mut self, board: &mut Board) {
+        let number = self.number;
+        self.number += 1;
+        let sample = self.drive.next().expect("it is without end");
+        let row = Row {
+            time: number as f64 * 0.01,
+            acceleration: sample.specific_force.map(|force| force as f32),
+            rate_of_turn: sample.angular_rate.map(|rate| rate as f32),
+            reference: sample.reference[2],
+        };
+        let Step { wheels, imu, fog } = Step::of(number, &row);
+        let begin = START + SAMPLE * number as u32;
+        let message = imu.emit();
+        board.send_at(IMU, &message, begin);
+        self.host.push(&message);
+        let messages = fog.chunks(MESSAGE_BYTES);
+        let first = MESSAGES - messages.len();
+        for (place, message) in messages.enumerate() {
+            board.send_at(FOG, message, begin + MS * (first + place) as u32);
+        }
+        if let Some(wheels) = wheels {
+            board.can_send_at(&wheels, begin + WHEELS_AFTER);
+            self.host.wheel(&wheels);
+            for id in OTHERS {
+                let id = StandardId::new(id).expect("11 bits");
+                let other = DataFrame::new(id, &[number as u8; 8]).expect("eight bytes");
+                board.can_send_at(&other, begin + WHEELS_AFTER);
+            }
+        }
+        if number.is_multiple_of(QUESTION) {
+            board.send_at(SERVICE, &self.questions[number / QUESTION % self.questions.len()], begin);
+        }
+    }
+}
+
+/// What the board has sent, checked as it comes.
+struct Received {
+    can: Vec<DataFrame>,
+    slcan: Vec<u8>,
+    deframer: Deframer,
+    monitor: Monitor,
+    /// Frames of the inertial sensor's samples that were the host's, and frames of the fibre-optic gyro.
+    own: usize,
+    fog: usize,
+    answers: usize,
+    counters: Option<AllCounters>,
+}
+
+impl Received {
+    fn new() -> Self {
+        Self {
+            can: Vec::new(),
+            slcan: Vec::new(),
+            deframer: Deframer::new(),
+            monitor: Monitor::new(&Config::DEFAULT),
+            own: 0,
+            fog: 0,
+            answers: 0,
+            counters: None,
+        }
+    }
+
+    /// Takes what has come, and holds it against the host's frames, which are used up.
+    fn take(&mut self, board: &mut Board, host: &mut replay::Board) {
+        let fog_ids = FogEncoder::messages(FOG_IDS);
+        let mut expected = 0;
+        for (time, frame) in board.can_frames() {
+            self.monitor.take(&frame, time.as_secs_f64());
+            self.can.push(frame);
+            if fog_ids.iter().any(|message| message.id == frame.id()) {
+                self.fog += 1;
+                continue;
+            }
+            let wanted =
+                host.lines.get(expected).map(|line| slcan::parse::<DataFrame>(line).expect("a frame"));
+            assert_eq!(Some(frame), wanted, "frame {} on CAN at {time:?}", self.own);
+            expected += 1;
+            self.own += 1;
+        }
+        host.lines.drain(..expected);
+        self.slcan.extend(board.sent(SLCAN));
+        let whole = self.slcan.iter().rposition(|byte| *byte == b'\r').map_or(0, |at| at + 1);
+        let text: Vec<u8> = self.slcan.drain(..whole).collect();
+        let lines = text.split(|byte| *byte == b'\r').filter(|line| !line.is_empty());
+        let lines: Vec<DataFrame> = lines.map(|line| slcan::parse(line).expect("a frame")).collect();
+        let both = lines.len().min(self.can.len());
+        assert!(lines[..both] == self.can[..both], "SLCAN and CAN carry the same frames");
+        assert!(lines.len() <= self.can.len() + 2 * SET, "CAN keeps up");
+        self.can.drain(..both);
+        let ahead: Vec<u8> =
+            lines[both..].iter().flat_map(|frame| slcan::emit(frame).expect("a data frame")).collect();
+        self.slcan.splice(..0, ahead);
+        for byte in board.sent(SERVICE) {
+            match self.deframer.push(byte) {
+                Some(Ok((_, Reply::Counters(counters)))) => {
+                    self.answers += 1;
+                    self.counters = Some(counters);
+                }
+                Some(Ok((_, Reply::Refused(refusal)))) => panic!("{refusal}"),
+                Some(Ok(_)) => self.answers += 1,
+                Some(Err(error)) => panic!("an answer is damaged: {error}"),
+                None => {}
+            }
+        }
+    }
+}
+
+/// Paints what the stack does not use at present.
+fn paint_stack(board: &mut Board) {
+    let free = board.register("sp") - (STACK_END - STACK_SIZE);
+    board.patch(At::Address(STACK_END - STACK_SIZE), &vec![PAINT; free as usize]);
+}
+
+/// Bytes of the stack that have been used since it was painted.
+fn stack_used(board: &mut Board) -> usize {
+    let stack = board.read(At::Address(STACK_END - STACK_SIZE), STACK_SIZE as usize);
+    stack.len() - stack.iter().position(|byte| *byte != PAINT).unwrap_or(stack.len())
+}
+
+fn run(test: &str, seconds: usize) {
+    let Some(mut board) = common::boot(test) else { return };
+    let (mut outside, mut received) = (Outside::new(), Received::new());
+    let (begun, mut early) = (Instant::now(), None);
+    board.run(START);
+    paint_stack(&mut board);
+    for second in 1..=seconds {
+        (0..SAMPLES).for_each(|_| outside.sample(&mut board));
+        board.run(SECOND);
+        received.take(&mut board, &mut outside.host);
+        let events = board.events();
+        let started = |kind: &str, cause: &str| second == 1 && kind == "reset" && cause == "por";
+        let wrong = events.iter().find(|event| !started(&event.kind, event.text("cause")));
+        assert_eq!(wrong, None, "in second {second}");
+        if second == seconds.div_ceil(10) {
+            early = Some(stack_used(&mut board));
+        }
+        if second % 60 == 0 || second == seconds {
+            println!(
+                "{test}: {second} s of board time in {:.0?}; {} + {} frames are right, {} answers, stack {} bytes",
+                begun.elapsed(),
+                received.own,
+                received.fog,
+                received.answers,
+                stack_used(&mut board)
+            );
+        }
+    }
+    // What is under way comes out.
+    board.run(SAMPLE * 2 - MS);
+    received.take(&mut board, &mut outside.host);
+    let samples = seconds * SAMPLES;
+    assert_eq!(outside.host.lines, Vec::<Vec<u8>>::new(), "frames that did not come");
+    assert_eq!(received.own, samples * SET);
+    assert!((samples - 2..=samples + 1).contains(&(received.fog / FOG_SET)), "{} fog frames", received.fog);
+    let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } =
+        received.monitor.counts;
+    assert_eq!([foreign, lost, repeated, out_of_sequence, damaged, unreadable], [0; 6]);
+    assert_eq!(frames as usize, received.own + received.fog);
+    assert_eq!(received.answers, samples / QUESTION);
+    // The last question for them is one of the last four.
+    let AllCounters { lines, pipeline, watch, fog, inputs } = received.counters.expect("they were asked for");
+    assert_eq!((lines, inputs), (LineCounters::NONE, InputCounters::default()));
+    let taken = pipeline.samples as usize;
+    assert!(samples - taken <= 4 * QUESTION, "{taken} of {samples} samples");
+    assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, pipeline.late], [0; 4]);
+    assert_eq!([watch.silences, watch.stuck, watch.wrong, watch.clock_off], [0; 4]);
+    assert!(
+        fog.samples as usize + 2 * MESSAGES > taken * MESSAGES,
+        "{} messages at sample {taken}",
+        fog.samples
+    );
+    // The first message does not fill the step that it begins in.
+    assert!(fog.gaps <= 1, "{} gaps", fog.gaps);
+    assert_eq!([fog.misplaced, fog.stuck, fog.late], [0; 3]);
+    let (early, late) = (early.expect("a tenth has passed"), stack_used(&mut board));
+    println!("{test}: {early} bytes of stack after a tenth, {late} at the end; {pipeline:?}; {fog:?}");
+    assert!(late <= STACK_BUDGET, "{late} bytes of stack");
+}
+
+#[test]
+fn all_lines_busy_for_seconds() {
+    run("all_lines_busy_for_seconds", 8);
+}
+
+/// `cargo test -p gyronet-host-tests --test board endurance -- --ignored --nocapture`
+#[test]
+#[ignore = "an hour of board time"]
+fn all_lines_busy_for_an_hour() {
+    run("all_lines_busy_for_an_hour", 3_600);
+}

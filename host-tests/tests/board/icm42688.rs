@@ -1,0 +1,262 @@
+//! An ICM-42688-P on SPI1, from the stored configuration to the frames on CAN.
+
+use crate::common::{self, SLCAN, START};
+use crate::service;
+use embedded_can::{Frame, Id};
+use gyronet::can::yaw::{AngleMessage, RateMessage};
+use gyronet::service::Reply;
+use gyronet::service::Request;
+use gyronet::service::event::{EventKind, SensorFault};
+use gyronet::service::message::AllCounters;
+use gyronet::store::{Configuration, ImuPart};
+use gyronet::units::AngularRate;
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::stored::Stored;
+use gyronet_tools::monitor::line::parse_line;
+use serde_json::json;
+use std::time::Duration;
+
+const SECOND: Duration = Duration::from_secs(1);
+const MS: Duration = Duration::from_millis(1);
+const RATE: u16 = 0x1A0;
+const ANGLE: u16 = 0x1A1;
+/// The axis of yaw, as the model numbers them.
+const Z: u32 = 2;
+/// Acceleration of a level part, g.
+const LEVEL: [f64; 3] = [0.0, 0.0, 1.0];
+/// Events that a driver in order does not cause.
+const FAULTS: [&str; 12] = [
+    "slow_pin",
+    "spi_unreadable",
+    "mode_fault",
+    "overrun",
+    "deselected_in_transfer",
+    "disabled_in_transfer",
+    "changed_in_transfer",
+    "sensor_in_reset",
+    "sensor_reserved",
+    "sensor_write_too_early",
+    "fifo_partial_read",
+    "iwdg_expired",
+];
+
+/// A board whose stored configuration names the part; without power.
+fn equipped(test: &str, configuration: Configuration) -> Option<Board> {
+    let mut board = common::unpowered(test)?;
+    Stored::default().record(&Configuration { imu: ImuPart::Icm42688, ..configuration }).lay(&mut board);
+    Some(board)
+}
+
+/// Rates in deg/s, `None` where there is none, with the time of their frame.
+fn rates(board: &mut Board) -> Vec<(Duration, Option<f64>)> {
+    let frames = of(board, RATE);
+    let rate = |data: &[u8]| RateMessage::parse(data).expect("eight bytes").deg_per_sec();
+    frames.iter().map(|(time, data)| (*time, rate(data))).collect()
+}
+
+/// Data of the frames with an identifier.
+fn of(board: &mut Board, id: u16) -> Vec<(Duration, Vec<u8>)> {
+    let frames = board.can_frames().into_iter();
+    let own = frames.filter(|(_, frame)| matches!(frame.id(), Id::Standard(found) if found.as_raw() == id));
+    own.map(|(time, frame)| (time, frame.data().to_vec())).collect()
+}
+
+fn counters(board: &mut Board) -> AllCounters {
+    match service::ask(board, &Request::Counters) {
+        Ok(Reply::Counters(counters)) => counters,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn assert_driven_well(board: &mut Board) {
+    let events = board.events();
+    let fault = events.iter().find(|event| FAULTS.contains(&event.kind.as_str()));
+    assert_eq!(fault, None);
+}
+
+/// Runs for whole seconds and checks that each sample became a message set and that the time stamps are 10 ms apart.
+/// Gives the number of samples in each second.
+fn on_the_grid(board: &mut Board, seconds: usize) -> Vec<usize> {
+    // Time stamps of the samples, ms, modulo a minute.
+    board.send(SLCAN, b"Z1\r");
+    board.run(30 * MS);
+    let _ = (board.sent(SLCAN), board.can_frames());
+    let (mut text, mut stamps) = (Vec::new(), Vec::new());
+    let per_second = (0..seconds)
+        .map(|_| {
+            board.run(SECOND);
+            text.extend(board.sent(SLCAN));
+            of(board, RATE).len()
+        })
+        .collect();
+    for line in String::from_utf8(text).expect("ASCII").split('\r') {
+        if let Ok((Some(stamp), frame)) = parse_line(line)
+            && matches!(frame.id(), Id::Standard(id) if id.as_raw() == RATE)
+        {
+            stamps.push((stamp * 1e3).round() as i64);
+        }
+    }
+    assert!(stamps.len() >= seconds * 99, "{} stamps", stamps.len());
+    for (k, pair) in stamps.windows(2).enumerate() {
+        assert_eq!((pair[1] - pair[0]).rem_euclid(60_000), 10, "after sample {k}");
+    }
+    per_second
+}
+
+/// A part in order for so many seconds: each sample is a message set, on the grid, and nothing is counted that should not be.
+fn in_order(test: &str, seconds: usize) {
+    let Some(mut board) = equipped(test, Configuration::DEFAULT) else { return };
+    board.power_on();
+    board.run(START);
+    assert_eq!(service::info(&mut board).sensor, None);
+    let per_second = on_the_grid(&mut board, seconds);
+    assert!(per_second.iter().all(|samples| (99..=101).contains(samples)), "{per_second:?}");
+    let AllCounters { pipeline, watch, inputs, .. } = counters(&mut board);
+    println!("{test}: {} samples in {seconds} s", per_second.iter().sum::<usize>());
+    assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, inputs.imu_errors], [0; 4]);
+    assert_eq!([watch.silences, watch.stuck, watch.clock_off], [0; 3]);
+    assert_driven_well(&mut board);
+}
+
+#[test]
+fn samples_come_at_their_rate_and_on_the_grid() {
+    in_order("samples_come_at_their_rate_and_on_the_grid", 4);
+}
+
+/// `cargo test -p gyronet-host-tests --test board icm42688 -- --ignored --nocapture`
+#[test]
+#[ignore = "a minute of board time takes two"]
+fn samples_come_for_a_minute() {
+    in_order("samples_come_for_a_minute", 60);
+}
+
+#[test]
+fn vibration_above_the_bandwidth_does_not_become_a_turn() {
+    const TEST: &str = "vibration_above_the_bandwidth_does_not_become_a_turn";
+    /// Amplitude of both tones, deg/s.
+    const AMPLITUDE: f64 = 5.0;
+    let Some(mut board) = equipped(TEST, Configuration::DEFAULT) else { return };
+    board.power_on();
+    board.run(START);
+    let set = board.events().into_iter().filter(|event| event.kind == "sensor_bandwidth");
+    let set: Vec<_> = set.filter_map(|event| event.number("hz")).collect();
+    // A sixteenth of 400 Hz (DS-000347, 5.5).
+    assert_eq!(set, [25.0]);
+    let mut swing = |hz: f64| {
+        board.configure("SPI1.imu_tones", json!([[Z, hz, AMPLITUDE]]));
+        board.run(30 * MS);
+        let _ = board.can_frames();
+        board.run(700 * MS);
+        let rates = rates(&mut board).into_iter().filter_map(|(_, rate)| rate);
+        rates.fold(0.0, |most: f64, rate| most.max(rate.abs()))
+    };
+    // 80 Hz would fold to 20 Hz.
+    let (folded, slow) = (swing(80.0), swing(3.0));
+    println!("{TEST}: {AMPLITUDE} deg/s at 80 Hz become {folded:.3} deg/s, at 3 Hz {slow:.3} deg/s");
+    assert!((slow - AMPLITUDE).abs() < 0.02 * AMPLITUDE, "{slow}");
+    // A Butterworth filter of the third order: 1 / sqrt(1 + (80 / 25)^6).
+    assert!(folded < 0.04 * AMPLITUDE, "{folded}");
+    assert_driven_well(&mut board);
+}
+
+#[test]
+fn part_that_falls_silent_comes_back() {
+    const TEST: &str = "part_that_falls_silent_comes_back";
+    let Some(mut board) = equipped(TEST, Configuration::DEFAULT) else { return };
+    board.configure("SPI1.imu_rates_dps", json!([0.0, 0.0, 10.0]));
+    board.power_on();
+    board.run(START + SECOND / 2);
+    let known = |rates: &[(Duration, Option<f64>)]| rates.iter().filter(|(_, rate)| rate.is_some()).count();
+    assert!(known(&rates(&mut board)) > 40);
+    board.configure("SPI1.fitted", false);
+    let silent = board.counts().time;
+    board.run(SECOND / 2);
+    let without = rates(&mut board);
+    let first = without.iter().find(|(_, rate)| rate.is_none()).expect("silence is told").0;
+    println!("{TEST}: silence is told after {:?}", first - silent);
+    assert!(first - silent < 45 * MS, "{:?}", first - silent);
+    assert!(known(&without) <= 2, "no rate is made up");
+    assert!(without.len() >= 44, "{} message sets", without.len());
+    assert!(service::info(&mut board).sensor.is_some());
+    board.configure("SPI1.fitted", true);
+    let fitted = board.counts().time;
+    // It is looked for every second, and its time stamps begin at zero again: samples count once they have passed the
+    // newest one from before.
+    board.run(3 * SECOND);
+    let back = rates(&mut board);
+    let first = back.iter().find(|(_, rate)| rate.is_some()).expect("it comes back").0;
+    println!("{TEST}: the first rate comes {:?} after the part", first - fitted);
+    let turning = back.iter().rev().take(5).map(|(_, rate)| rate.expect("a rate"));
+    turning.for_each(|rate| assert!((rate - 10.0).abs() < 0.2, "{rate} deg/s"));
+    assert_eq!(service::info(&mut board).sensor, None);
+    assert_eq!(counters(&mut board).watch.silences, 1);
+}
+
+#[test]
+fn wrong_part_is_named_and_gives_no_rate() {
+    const OTHER: u8 = 0x42;
+    let Some(mut board) = equipped("wrong_part_is_named_and_gives_no_rate", Configuration::DEFAULT) else {
+        return;
+    };
+    board.configure("SPI1.imu_who_am_i", OTHER);
+    board.power_on();
+    board.run(START + SECOND);
+    assert_eq!(service::info(&mut board).sensor, Some(SensorFault::Identity(OTHER)));
+    // Silence is told from two seconds on.
+    board.run(SECOND * 3 / 2);
+    let told = rates(&mut board);
+    assert!(told.len() > 30 && told.iter().all(|(_, rate)| rate.is_none()), "{told:?}");
+    let Ok(Reply::Log(log)) = service::ask(&mut board, &Request::Log { after: 0 }) else { panic!("no log") };
+    let named = |kind: &EventKind| *kind == EventKind::Sensor(Some(SensorFault::Identity(OTHER)));
+    // It is tried again every second, and told once.
+    assert_eq!(log.events.iter().filter(|event| named(&event.kind)).count(), 1);
+    board.configure("SPI1.imu_who_am_i", 0x47);
+    board.run(SECOND + SECOND / 5);
+    assert_eq!(service::info(&mut board).sensor, None);
+    assert!(rates(&mut board).iter().any(|(_, rate)| rate.is_some()));
+    assert_driven_well(&mut board);
+}
+
+/// Turned angle by the angle messages, deg.
+fn turned(angles: &[(Duration, Vec<u8>)]) -> f64 {
+    let codes = angles.iter().map(|(_, data)| AngleMessage::parse(data).expect("eight bytes").yaw);
+    let codes: Vec<i32> = codes.collect();
+    let steps = codes.windows(2).map(|pair| i64::from(pair[1].wrapping_sub(pair[0])));
+    steps.sum::<i64>() as f64 * 360.0 / 4_294_967_296.0
+}
+
+#[test]
+fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off() {
+    const TEST: &str = "yaw_is_right_though_the_parts_oscillator_is_one_percent_off";
+    /// Deg/s, and seconds of it.
+    const RATE: f64 = 30.0;
+    const LASTS: f64 = 4.0;
+    /// Seconds after the start at which the turn begins: the ratio of the clocks is known after ten.
+    const BEGINS: f64 = 12.0;
+    // Without corrections by the network: what is integrated is the part's rate less its static bias.
+    let none = AngularRate(0);
+    let mut configuration = Configuration::DEFAULT;
+    (configuration.compensate.max_mean, configuration.compensate.max_single) = (none, none);
+    let Some(mut board) = equipped(TEST, configuration) else { return };
+    let row = |seconds: f64, rate: f64| json!([seconds * 1e6, [0.0, 0.0, rate], LEVEL]);
+    let turn = [
+        row(BEGINS - 0.1, 0.0),
+        row(BEGINS + 0.1, RATE),
+        row(BEGINS + LASTS - 0.1, RATE),
+        row(BEGINS + LASTS + 0.1, 0.0),
+    ];
+    board.configure("SPI1.imu_motion", json!(turn));
+    board.configure("SPI1.imu_oscillator_error_percent", 1.0);
+    board.power_on();
+    board.run(Duration::from_secs_f64(BEGINS) - SECOND / 2);
+    let _ = board.can_frames();
+    board.run(Duration::from_secs_f64(LASTS) + SECOND);
+    let angles = of(&mut board, ANGLE);
+    let (turned, expected) = (turned(&angles), RATE * LASTS);
+    let per_second = angles.len() as f64 / (LASTS + 1.0);
+    println!("{TEST}: {turned:.4} deg of {expected}, {per_second} samples a second");
+    assert!((100.5..=101.5).contains(&per_second), "{per_second}");
+    assert!((turned / expected - 1.0).abs() < 1e-3, "{turned} deg of {expected}");
+    assert_eq!(counters(&mut board).watch.clock_off, 0);
+    assert_driven_well(&mut board);
+}

@@ -1,0 +1,14 @@
+//! The images as they are flashed, on the virtual board: hardware that QEMU does not have, and its faults.
+
+mod bringup;
+mod can;
+mod clock;
+mod common;
+mod crash;
+mod endurance;
+mod icm42688;
+mod model;
+mod power_cut;
+mod service;
+mod stored;
+mod supply;

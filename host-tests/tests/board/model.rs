@@ -1,0 +1,112 @@
+//! The model of the STM32F405 itself: its own tests, and the image as it is flashed running on it.
+
+use gyronet::service::event::ResetCause;
+use gyronet::service::message::{FlashState, Identity, Info, Origin};
+use gyronet::service::{Reply, Request};
+use gyronet_host_tests::board::{At, Board, PACKAGES};
+use gyronet_host_tests::recordings::{self, workspace};
+use gyronet_host_tests::{image, replay, require};
+use gyronet_tools::device::Device;
+use std::process::Command;
+use std::time::Duration;
+
+const IMU: usize = 1;
+const SLCAN: usize = 2;
+const SERVICE: usize = 6;
+/// Of the SLCAN line.
+const BAUD: u32 = 921_600;
+const SAMPLE: Duration = Duration::from_millis(10);
+/// From power-on until the image listens to all lines.
+const START: Duration = Duration::from_millis(200);
+/// One second of a drive.
+const SAMPLES: usize = 100;
+
+fn boot(test: &str) -> Option<Board> {
+    let elf = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")?;
+    let mut board = Board::boot(test, &elf)?;
+    board.configure(&format!("USART{SLCAN}.baud"), BAUD);
+    Some(board)
+}
+
+fn info(board: &mut Board) -> Info {
+    match Device::new(board.line(SERVICE), "the virtual board").ask(&Request::Info) {
+        Ok(Reply::Info(info)) => info,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn model_passes_its_own_tests() {
+    let Some(python) = require::python("model_passes_its_own_tests", PACKAGES) else { return };
+    let output = Command::new(python)
+        .args(["-m", "unittest", "discover", "--start-directory", "tests", "--top-level-directory", "."])
+        .current_dir(workspace().join("host-tests/board"))
+        .output()
+        .expect("Python runs");
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && words.contains("Ran "), "{words}");
+    println!("{}", words.lines().rev().take(3).collect::<Vec<_>>().join(" "));
+}
+
+#[test]
+fn image_sends_over_slcan_what_the_host_sends() {
+    let Some(mut board) = boot("image_sends_over_slcan_what_the_host_sends") else { return };
+    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
+    let messages: Vec<_> =
+        rows.iter().take(SAMPLES).enumerate().map(|(k, row)| replay::message(k, row).emit()).collect();
+    for (number, message) in messages.iter().enumerate() {
+        board.send_at(IMU, message, START + SAMPLE * number as u32);
+    }
+    board.run(START + SAMPLE * (SAMPLES as u32 + 2));
+    let sent = board.sent(SLCAN);
+    let lines: Vec<_> =
+        sent.split(|byte| *byte == b'\r').filter(|line| !line.is_empty()).map(<[u8]>::to_vec).collect();
+    let mut host = replay::Board::new().beside(lines.clone());
+    host.push(&messages.concat());
+    let text =
+        |lines: &[Vec<u8>]| lines.iter().map(|line| line.escape_ascii().to_string()).collect::<Vec<_>>();
+    assert!(host.lines.len() > 5 * SAMPLES, "{} lines", host.lines.len());
+    assert_eq!(text(&lines[..host.lines.len()]), text(&host.lines));
+}
+
+#[test]
+fn image_answers_on_the_service_line_and_restarts_on_request() {
+    let Some(mut board) = boot("image_answers_on_the_service_line_and_restarts_on_request") else { return };
+    board.run(START);
+    let about = info(&mut board);
+    assert_eq!((about.flash, about.writable), (FlashState::Ready, true));
+    assert_eq!(about.configuration, Origin::BuiltIn);
+    let restart = Device::new(board.line(SERVICE), "the virtual board").ask(&Request::Restart);
+    assert_eq!(restart.expect("an answer"), Reply::Done);
+    board.run(START);
+    let causes: Vec<_> = board
+        .events()
+        .iter()
+        .filter(|event| event.kind == "reset")
+        .map(|event| event.text("cause").to_owned())
+        .collect();
+    assert_eq!(causes, ["por", "software"]);
+    let identity = Identity { reset: ResetCause::Software, ..about.identity };
+    assert_eq!(info(&mut board), Info { identity, ..about });
+}
+
+#[test]
+fn board_does_the_same_again_after_a_snapshot_is_restored() {
+    let Some(mut board) = boot("board_does_the_same_again_after_a_snapshot_is_restored") else { return };
+    board.run(START);
+    board.snapshot("started");
+    let mut runs = Vec::new();
+    for _ in 0..2 {
+        board.restore("started");
+        board.send(IMU, &replay::turning(0, 0.1));
+        board.send(SERVICE, &[0]);
+        board.run(Duration::from_millis(50));
+        runs.push((
+            board.counts(),
+            board.sent(SLCAN),
+            board.register("pc"),
+            board.read(At::Address(0x2000_0000), 1 << 17),
+        ));
+    }
+    assert_eq!(runs[0], runs[1]);
+}

@@ -1,0 +1,266 @@
+//! The power is cut at each access to the flash controller or the array, while the image stores a configuration or takes a
+//! weight file over the service line. After each cut the board comes up with the old or the new value, whole.
+//!
+//! All that outlives a cut is the flash. Cuts that leave the same flash are therefore one case: the board is started once for it.
+
+use crate::common::{self, SLCAN, START};
+use crate::service::{self, ANSWER, storing};
+use gyronet::model::weights;
+use gyronet::service::message::{BLOCK, FlashState, Info, Origin};
+use gyronet::service::{Reply, Request};
+use gyronet::store::layout::{FLASH_BASE, SLOTS, STORE};
+use gyronet::store::slots::WeightSource;
+use gyronet::store::{Calibration, Configuration, Mounting, Slot};
+use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet_host_tests::board::{At, Board};
+use gyronet_host_tests::stored::{Stored, other_weights};
+use std::collections::HashSet;
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash, Hasher};
+use std::time::{Duration, Instant};
+
+/// More accesses than anything here takes.
+const MANY: usize = 1 << 30;
+/// Board time until nothing can happen any more: an erase of a slot.
+const LIMIT: Duration = Duration::from_secs(3);
+/// Times into a word's 16 us and into an erase of 250 ms (1 s for a slot) at which the power fails.
+const INTO_WORD: [Duration; 1] = [Duration::from_micros(8)];
+const INTO_ERASE: [Duration; 3] =
+    [Duration::from_millis(1), Duration::from_millis(125), Duration::from_millis(240)];
+
+/// A configuration that differs from another one at both ends of its record.
+fn configuration(k: usize) -> Configuration {
+    let mounting = Mounting { yaw_deg: k as f32 * 0.5, ..Mounting::default() };
+    Configuration { latitude_deg: Some(k as f32 * 0.25), mounting, ..Configuration::DEFAULT }
+}
+
+fn calibration() -> Calibration {
+    let mut calibration = Calibration::default();
+    calibration.add_bias([AngularRate(5), AngularRate(-6), AngularRate(7)], Some(CentiCelsius(2_000)));
+    calibration
+}
+
+fn crc(file: &[u8]) -> u32 {
+    u32::from_le_bytes(*file.last_chunk().expect("a checksum"))
+}
+
+/// A board with accepted weights in slot A, a calibration, and so many configurations in its records, the last one in force.
+fn used(test: &str, configurations: usize) -> Option<Board> {
+    let mut board = common::unpowered(test)?;
+    let stored = Stored::default().weights(Slot::A, &other_weights(2)).record(&calibration());
+    (1..=configurations).fold(stored, |stored, k| stored.record(&configuration(k))).lay(&mut board);
+    board.power_on();
+    board.run(START);
+    let _ = board.events();
+    Some(board)
+}
+
+/// Keeps the board's state. What it has sent of the sensor's silence is not kept with it: it would be copied with every cut.
+fn keep(board: &mut Board, name: &str) {
+    let _ = (board.sent(SLCAN), board.can_frames());
+    board.snapshot(name);
+}
+
+/// What a board says after a cut.
+struct After {
+    configuration: Configuration,
+    info: Info,
+}
+
+/// How many cuts were tried, and how many different contents of the flash they left.
+#[derive(Debug, Default)]
+struct Tried {
+    cuts: usize,
+    seen: HashSet<u64>,
+}
+
+impl Tried {
+    /// Cuts the power at an access of what a request starts, then at places inside the operation that the access began.
+    fn at(
+        &mut self,
+        board: &mut Board,
+        before: &str,
+        request: &Request,
+        access: usize,
+        check: &impl Fn(&mut Board, After),
+    ) {
+        let began = self.cut(board, before, request, (access, Duration::ZERO), check);
+        let inside = match began.as_deref() {
+            Some("erase") => &INTO_ERASE[..],
+            Some(_) => &INTO_WORD[..],
+            None => &[],
+        };
+        for delay in inside {
+            self.cut(board, before, request, (access, *delay), check);
+        }
+    }
+
+    /// Cuts the power once; the operation that it has interrupted.
+    fn cut(
+        &mut self,
+        board: &mut Board,
+        before: &str,
+        request: &Request,
+        (access, delay): (usize, Duration),
+        check: &impl Fn(&mut Board, After),
+    ) -> Option<String> {
+        board.restore(before);
+        board.cut_after(access, delay);
+        service::send(board, request);
+        let off = board.run_until("power_off", LIMIT);
+        assert!(off.is_some(), "{request:?} has no access {access}");
+        self.cuts += 1;
+        let events = board.events();
+        let interrupted = events.iter().find(|event| event.kind == "flash_interrupted");
+        let interrupted = interrupted.map(|event| event.text("operation").to_owned());
+        let mut content = DefaultHasher::new();
+        for range in [STORE, SLOTS] {
+            board.read(At::Address(FLASH_BASE + range.start), range.len()).hash(&mut content);
+        }
+        if self.seen.insert(content.finish()) {
+            board.power_on();
+            board.run(START);
+            let after = After { configuration: service::configuration(board), info: service::info(board) };
+            check(board, after);
+        }
+        interrupted
+    }
+}
+
+/// The accesses that a request takes, from a kept state on; the state after it is kept as `after`.
+fn accesses(board: &mut Board, before: &str, request: &Request, after: &str) -> usize {
+    board.restore(before);
+    board.cut_after(MANY, Duration::ZERO);
+    service::send(board, request);
+    let reply = service::answer(board, LIMIT);
+    assert!(
+        reply.as_ref().is_some_and(|reply| !matches!(reply, Reply::Refused(_))),
+        "{request:?}: {reply:?}"
+    );
+    let count = MANY - board.counts().accesses_left;
+    keep(board, after);
+    count
+}
+
+/// Cuts a store of configuration `k` at each access, from a kept state on.
+fn store(test: &str, board: &mut Board, k: usize) {
+    let request = storing(configuration(k));
+    let (mut tried, begun) = (Tried::default(), Instant::now());
+    let count = accesses(board, "before", &request, "after");
+    let check = |board: &mut Board, After { configuration: found, info }: After| {
+        assert!(found == configuration(k - 1) || found == configuration(k), "{found:?}");
+        assert_eq!((info.configuration, info.calibration), (Origin::Stored, Origin::Stored));
+        assert_eq!(info.weights_crc, Some(crc(&other_weights(2))));
+        assert!(matches!(info.flash, FlashState::Ready | FlashState::Damaged), "{:?}", info.flash);
+        // The next attempt works.
+        service::send(board, &request);
+        assert_eq!(service::answer(board, ANSWER), Some(Reply::Done));
+    };
+    for access in 1..=count {
+        tried.at(board, "before", &request, access, &check);
+    }
+    let Tried { cuts, seen } = tried;
+    println!(
+        "{test}: {cuts} cuts at {count} accesses, {} contents of the flash, {:.0?}",
+        seen.len(),
+        begun.elapsed()
+    );
+}
+
+#[test]
+fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_append() {
+    const TEST: &str = "configuration_is_the_old_or_the_new_one_after_a_cut_of_an_append";
+    let Some(mut board) = used(TEST, 5) else { return };
+    keep(&mut board, "before");
+    store(TEST, &mut board, 6);
+}
+
+#[test]
+fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy() {
+    const TEST: &str = "configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy";
+    // The records' sector is nearly full.
+    const NEARLY: usize = 175;
+    let Some(mut board) = used(TEST, NEARLY) else { return };
+    for k in NEARLY + 1.. {
+        keep(&mut board, "before");
+        service::send(&mut board, &storing(configuration(k)));
+        assert_eq!(service::answer(&mut board, ANSWER), Some(Reply::Done));
+        if board.events().iter().any(|event| event.kind == "flash_erase") {
+            // The board is still the one that was started with an older configuration.
+            return store(TEST, &mut board, k);
+        }
+    }
+}
+
+/// Cuts an upload at the accesses of each request that `chosen` picks by the request's number, the number of requests, and
+/// the accesses that it takes.
+fn upload(test: &str, chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
+    let Some(mut board) = used(test, 3) else { return };
+    let (old, new) = (crc(&other_weights(2)), other_weights(1));
+    let block = |(offset, bytes): (usize, &[u8])| Request::WeightsBlock {
+        offset: (offset * BLOCK) as u32,
+        bytes: bytes.try_into().expect("a block"),
+    };
+    let mut requests = vec![Request::WeightsBegin { length: new.len() as u32 }];
+    requests.extend(new.chunks(BLOCK).enumerate().map(block));
+    requests.extend([Request::WeightsVerify, Request::WeightsActivate]);
+    let (mut tried, begun, mut total) = (Tried::default(), Instant::now(), 0);
+    keep(&mut board, "before");
+    for (number, request) in requests.iter().enumerate() {
+        let activates = *request == Request::WeightsActivate;
+        let check = |_: &mut Board, After { configuration: found, info }: After| {
+            let running = (info.weights, info.weights_crc);
+            let before = (WeightSource::Slot(Slot::A), Some(old));
+            let activated = (WeightSource::Slot(Slot::B), Some(crc(&new)));
+            assert!(
+                running == before || activates && running == activated,
+                "{running:?} in request {number}"
+            );
+            assert_eq!(
+                (found, info.configuration),
+                (configuration(3), Origin::Stored),
+                "in request {number}"
+            );
+        };
+        let count = accesses(&mut board, "before", request, "after");
+        total += count;
+        for access in chosen(number, requests.len(), count) {
+            tried.at(&mut board, "before", request, access, &check);
+        }
+        board.restore("after");
+        keep(&mut board, "before");
+    }
+    board.power_cycle(Duration::from_millis(10));
+    board.run(START);
+    assert_eq!(service::info(&mut board).weights_crc, Some(crc(&new)), "without a cut");
+    assert_ne!(crc(&new), crc(&weights::DEFAULT.0));
+    let Tried { cuts, seen } = tried;
+    println!(
+        "{test}: {cuts} cuts in {total} accesses, {} contents of the flash, {:.0?}",
+        seen.len(),
+        begun.elapsed()
+    );
+}
+
+#[test]
+fn old_weights_stay_usable_until_the_new_ones_are_activated() {
+    /// Blocks from one sample to the next.
+    const EVERY: usize = 16;
+    upload("old_weights_stay_usable_until_the_new_ones_are_activated", |number, requests, accesses| {
+        let edge = number <= 1 || number + 3 >= requests;
+        if edge {
+            (1..=accesses).collect()
+        } else if number % EVERY == 0 {
+            vec![1 + number * 37 % accesses]
+        } else {
+            Vec::new()
+        }
+    });
+}
+
+/// `cargo test -p gyronet-host-tests --test board each_access -- --ignored --nocapture`
+#[test]
+#[ignore = "a cut at each access of an upload takes hours"]
+fn old_weights_stay_usable_after_a_cut_at_each_access() {
+    upload("old_weights_stay_usable_after_a_cut_at_each_access", |_, _, accesses| (1..=accesses).collect());
+}

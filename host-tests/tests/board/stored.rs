@@ -1,0 +1,202 @@
+//! What is stored, through the service line and the flash controller: records over used sectors, weight files, and
+//! what an erase does to the rest of the board.
+
+use crate::common::{self, IMU, SERVICE, START};
+use crate::service::{self, ask, storing};
+use gyronet::can::{DataFrame, slcan};
+use gyronet::model::{Blob, weights};
+use gyronet::service::message::{FlashState, Origin, Refusal};
+use gyronet::service::{Reply, Request};
+use gyronet::store::layout::{FLASH_BASE, STORE};
+use gyronet::store::slots::WeightSource;
+use gyronet::store::{Configuration, Field, FieldError, Slot, StoreError};
+use gyronet_host_tests::board::{At, Board};
+use gyronet_host_tests::replay;
+use gyronet_host_tests::stored::other_weights;
+use gyronet_tools::device::Device;
+use gyronet_tools::device::upload::{Uploaded, upload};
+use std::time::Duration;
+
+const MS: Duration = Duration::from_millis(1);
+/// Typical time of an erase of 16 KiB (DS8626 table 39), and what the rest of a store may take.
+const ERASE: Duration = Duration::from_millis(250);
+const STORE_TIME: Duration = Duration::from_millis(70);
+/// Half a period of the LED, which the image takes from its board time; the LED's pin.
+const BLINK: Duration = Duration::from_millis(512);
+const LED: u32 = 10;
+
+fn latitude(k: usize) -> Configuration {
+    Configuration { latitude_deg: Some(k as f32 * 0.125), ..Configuration::DEFAULT }
+}
+
+/// Board time that something takes.
+fn timed<T>(board: &mut Board, work: impl FnOnce(&mut Board) -> T) -> (T, Duration) {
+    let begin = board.counts().time;
+    let result = work(board);
+    (result, board.counts().time - begin)
+}
+
+fn restart(board: &mut Board) {
+    assert_eq!(ask(board, &Request::Restart), Ok(Reply::Done));
+    board.run(START);
+}
+
+/// Sectors that were erased, and causes of resets.
+fn erased_and_reset(board: &mut Board) -> (Vec<u64>, Vec<String>) {
+    let (mut erased, mut resets) = (Vec::new(), Vec::new());
+    for event in board.events() {
+        match event.kind.as_str() {
+            "flash_erase" => erased.extend(event.numbers("sectors")),
+            "reset" => resets.push(event.text("cause").to_owned()),
+            "flash_error" | "flash_key" | "programmed_over" | "ignored_write" => panic!("{event:?}"),
+            _ => {}
+        }
+    }
+    (erased, resets)
+}
+
+#[test]
+fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
+    const TEST: &str = "configuration_survives_restarts_while_sectors_fill_and_are_used_again";
+    /// Stores between two restarts.
+    const STORES: usize = 40;
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let (mut erased, mut resets) = erased_and_reset(&mut board);
+    let mut stores = 0;
+    while erased.len() < 4 {
+        for _ in 0..STORES {
+            stores += 1;
+            let (reply, took) = timed(&mut board, |board| ask(board, &storing(latitude(stores))));
+            assert_eq!(reply, Ok(Reply::Done), "store {stores}");
+            let (sectors, causes) = erased_and_reset(&mut board);
+            let least = ERASE * sectors.len() as u32;
+            assert!(
+                (least..least + STORE_TIME).contains(&took),
+                "store {stores}: {took:?}, erased {sectors:?}"
+            );
+            erased.extend(sectors);
+            assert_eq!(causes, Vec::<String>::new(), "store {stores}");
+        }
+        restart(&mut board);
+        assert_eq!(service::configuration(&mut board), latitude(stores), "store {stores}");
+        let info = service::info(&mut board);
+        assert_eq!((info.configuration, info.flash), (Origin::Stored, FlashState::Ready));
+        resets.extend(erased_and_reset(&mut board).1);
+    }
+    println!("{TEST}: {stores} stores, sectors erased: {erased:?}");
+    assert_eq!(erased[..4], [1, 2, 1, 2]);
+    assert_eq!(resets[0], "por");
+    assert!(resets[1..].iter().all(|cause| cause == "software"), "{resets:?}");
+}
+
+#[test]
+fn invalid_configuration_is_refused_and_changes_nothing() {
+    let Some(mut board) = common::boot("invalid_configuration_is_refused_and_changes_nothing") else {
+        return;
+    };
+    board.run(START);
+    assert_eq!(ask(&mut board, &storing(latitude(7))), Ok(Reply::Done));
+    let records = |board: &mut Board| board.read(At::Address(FLASH_BASE + STORE.start), STORE.len());
+    let before = records(&mut board);
+    let wild = Configuration { latitude_deg: Some(91.0), ..latitude(8) };
+    let range = FieldError::Range { field: Field::LatitudeDeg, value: 91.0, low: -90.0, high: 90.0 };
+    let refusal = Refusal::Store(StoreError::Field(range));
+    assert_eq!(ask(&mut board, &storing(wild)), Err(refusal));
+    let other = Request::SetConfiguration { version: 1, configuration: latitude(8) };
+    assert!(matches!(ask(&mut board, &other), Err(Refusal::Version { found: 1, .. })));
+    assert!(records(&mut board) == before, "the flash is as it was");
+    restart(&mut board);
+    assert_eq!(service::configuration(&mut board), latitude(7));
+}
+
+#[test]
+fn board_time_goes_on_over_an_erase() {
+    const TEST: &str = "board_time_goes_on_over_an_erase";
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.configure("GPIOA.watch", vec![LED]);
+    board.run(START + 2 * BLINK);
+    // The first store erases a sector, whatever is in it.
+    let (reply, took) = timed(&mut board, |board| ask(board, &storing(latitude(1))));
+    assert_eq!(reply, Ok(Reply::Done));
+    assert!(took > ERASE);
+    board.run(3 * BLINK);
+    let events = board.events();
+    let erase = events.iter().find(|event| event.kind == "flash_erase").expect("an erase").time;
+    let edges: Vec<Duration> =
+        events.iter().filter(|event| event.kind == "pin").map(|event| event.time).collect();
+    let first = edges[0];
+    println!("{TEST}: edges {edges:?}, erase at {erase:?}");
+    let late = |time: Duration| (time - first).as_micros() % BLINK.as_micros();
+    let stalled = |time: &Duration| (erase..erase + ERASE + MS).contains(time);
+    for edge in edges.iter().filter(|time| !stalled(time)) {
+        let late = late(*edge + MS);
+        assert!(late <= 2 * MS.as_micros(), "edge at {edge:?}: {late} us");
+    }
+    assert!(edges.iter().filter(|time| **time > erase + ERASE + MS).count() >= 3);
+}
+
+#[test]
+fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
+    const TEST: &str = "longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns";
+    let Some(mut board) = common::unpowered(TEST) else { return };
+    // The slowest flash and the fastest watchdog (DS8626 tables 39 and 34).
+    board.configure("FLASH.time_factor", 2.0);
+    board.configure("RCC.lsi_hz", 47_000);
+    board.power_on();
+    board.run(START);
+    let (slot, took) = timed(&mut board, |board| service::begin_upload(board, 64));
+    println!("{TEST}: slot {slot} erased in {took:?}");
+    assert!(took >= Duration::from_secs(2));
+    board.run(Duration::from_millis(500));
+    assert_eq!(erased_and_reset(&mut board), (vec![10], vec!["por".to_owned()]));
+    // Idle hangs.
+    board.patch(At::Symbol("idle::Idle::turn"), &[0xFE, 0xE7]);
+    let hung = board.counts().time;
+    let reset =
+        board.run_until("iwdg_expired", Duration::from_secs(1)).expect("the watchdog resets the board");
+    assert!(reset - hung < 90 * MS, "{:?}", reset - hung);
+}
+
+#[test]
+fn uploaded_weights_run_from_their_slot() {
+    const TEST: &str = "uploaded_weights_run_from_their_slot";
+    /// Samples: static initialisation takes three seconds, the first windows follow.
+    const SAMPLES: usize = 400;
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let file = other_weights(1);
+    let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
+    let (done, took) = timed(&mut board, |board| {
+        upload(&mut Device::new(board.line(SERVICE), "the virtual board"), &file, |_| {})
+    });
+    assert_eq!(done.expect("it is taken"), Uploaded { slot: Slot::A, crc });
+    println!("{TEST}: {} bytes in {took:?}", file.len());
+    assert_eq!(service::info(&mut board).weights, WeightSource::BuiltIn);
+    restart(&mut board);
+    let info = service::info(&mut board);
+    assert_eq!(
+        (info.weights, info.weights_crc, info.flash),
+        (WeightSource::Slot(Slot::A), Some(crc), FlashState::Ready)
+    );
+    assert_eq!(erased_and_reset(&mut board), (vec![10, 1], vec!["por".to_owned(), "software".to_owned()]));
+    let samples = common::drive(SAMPLES);
+    let begin = board.counts().time;
+    let _ = board.can_frames();
+    for (k, sample) in samples.iter().enumerate() {
+        board.send_at(IMU, sample, begin + common::SAMPLE * k as u32);
+    }
+    board.run(common::SAMPLE * (SAMPLES as u32 + 1));
+    let sent = common::frames(&board.can_frames());
+    let host = |file: &[u8]| -> Vec<DataFrame> {
+        let file: &'static [u8] = file.to_vec().leak();
+        let blob = Blob::new_checked(file).expect("a weight file");
+        let mut host = replay::Board::configured(&Configuration::DEFAULT, blob);
+        host.push(&samples.concat());
+        host.lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect()
+    };
+    let (new, old) = (host(&file), host(&weights::DEFAULT.0));
+    assert!(sent.len() >= common::SET * (SAMPLES - 1), "{} frames", sent.len());
+    assert!(sent == new[..sent.len()], "the frames are those of the new weights");
+    assert!(sent != old[..sent.len()], "the old weights give others");
+}

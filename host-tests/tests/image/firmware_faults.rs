@@ -1,0 +1,181 @@
+//! Faults of the sensor, in the emulated image: what the bus is told, how soon, and that it ends.
+//! Every frame is held against the host's, byte for byte.
+
+use embedded_can::{Frame, Id};
+use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
+use gyronet::can::yaw::{RATE_NOT_AVAILABLE, RateMessage};
+use gyronet::can::{DataFrame, slcan};
+use gyronet::health::Quality;
+use gyronet::monitor::{HOLD, STUCK_AFTER};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::recordings::{self, Row, workspace};
+use gyronet_host_tests::{image, qemu, replay};
+use std::time::Duration;
+
+const LIMIT: Duration = Duration::from_secs(120);
+const IMU: usize = 1;
+const SLCAN: usize = 2;
+/// Frames of one sample.
+const SET: usize = 6;
+/// By then it is initialised and corrected by the network.
+const READY: usize = 340;
+/// MTData2 status: a gyro axis is clipped.
+const CLIPPED: u32 = 1 << 11;
+
+fn boot(test: &str) -> Option<qemu::Board> {
+    let elf = image::coprocessor(test, env!("CARGO_TARGET_TMPDIR"))?;
+    Some(qemu::Board::boot(&elf, SLCAN, &[]))
+}
+
+fn rows() -> Vec<Row> {
+    recordings::rows(&workspace().join("tools/data/simulated_drive.csv"))
+}
+
+/// Samples of the simulated drive as bytes.
+fn drive(samples: core::ops::Range<usize>) -> Vec<u8> {
+    let rows = rows();
+    samples.flat_map(|number| replay::message(number, &rows[number]).emit().to_vec()).collect()
+}
+
+/// Status of the rate in each TX1.
+fn statuses(lines: &[Vec<u8>]) -> Vec<SignalStatus> {
+    let frames = lines.iter().map(|line| slcan::parse::<DataFrame>(line).expect("a frame"));
+    let tx1 = frames.filter(|frame| frame.id() == Id::Standard(TX1_ID));
+    tx1.map(|frame| Tx1::parse(frame.data()).expect("a good checksum").yaw_rate_status).collect()
+}
+
+/// Sets that say that there is no rate.
+fn unusable(lines: &[Vec<u8>]) -> usize {
+    statuses(lines).iter().filter(|status| **status == SignalStatus::FAILURE).count()
+}
+
+fn same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
+    let text = |line: &Vec<u8>| line.escape_ascii().to_string();
+    for (number, (line, expected)) in lines.iter().zip(expected).enumerate() {
+        assert_eq!(text(line), text(expected), "line {number}");
+    }
+    assert!(lines.len() >= expected.len(), "{} lines, {} expected", lines.len(), expected.len());
+}
+
+/// The cable is cut after `READY` samples, `garbage` comes over it, and it is back 0.5 s later.
+fn cut(test: &str, garbage: &[u8]) {
+    let Some(mut board) = boot(test) else { return };
+    board.send(IMU, &drive(0..READY), LIMIT);
+    board.send(IMU, garbage, LIMIT);
+    let _ = board.lines_until(SLCAN, b'\r', LIMIT, |lines| unusable(lines) >= 20);
+    board.send(IMU, &drive(READY + 50..READY + 150), LIMIT);
+    let all = |lines: &[Vec<u8>]| {
+        let silent = unusable(lines);
+        lines.len() >= (READY + 100 + silent) * SET
+    };
+    let lines = board.lines_until(SLCAN, b'\r', LIMIT, all);
+    // As many sets without a rate as the board has sent until the cable was back.
+    let back = statuses(&lines).iter().rposition(|status| *status == SignalStatus::FAILURE);
+    let trailing = statuses(&lines).len() - 1 - back.expect("the sensor was silent");
+    let silent = unusable(&lines);
+    println!("{test}: {silent} sets without a rate, {trailing} after them");
+    let mut host = replay::Board::new();
+    host.push(&drive(0..READY));
+    host.silence(silent as u64);
+    host.push(&drive(READY + 50..READY + 150));
+    same(&lines, &host.lines);
+    // No number is marked good that is none.
+    let sets = &lines[READY * SET..(READY + silent) * SET];
+    for line in sets {
+        let frame: DataFrame = slcan::parse(line).expect("a frame");
+        if let Ok(rate) = RateMessage::parse(frame.data())
+            && frame.id() == rate_id()
+        {
+            assert_eq!((rate.quality, rate.rate), (Quality::Unusable, RATE_NOT_AVAILABLE));
+        }
+    }
+    // And it is good again with the first sample.
+    assert!(statuses(&lines)[READY + silent..].iter().all(|status| *status == SignalStatus::OK));
+}
+
+fn rate_id() -> Id {
+    let yaw = replay::CONFIG.settings().yaw.expect("own messages are configured");
+    Id::Standard(embedded_can::StandardId::new(yaw.ids[0]).expect("11 bits"))
+}
+
+#[test]
+fn cable_cut_and_back() {
+    cut("cable_cut_and_back", &[]);
+}
+
+#[test]
+fn nothing_but_garbage() {
+    let mut noise = Noise::new(31);
+    cut("nothing_but_garbage", &(0..2_000).map(|_| noise.byte()).collect::<Vec<u8>>());
+}
+
+#[test]
+fn silence_is_told_within_30_ms() {
+    const NAME: &str = "silence_is_told_within_30_ms";
+    let Some(mut board) = boot(NAME) else { return };
+    board.send(SLCAN, b"Z1\r", LIMIT);
+    let _ = board.lines(SLCAN, b'\r', 1, LIMIT);
+    board.send(IMU, &drive(0..READY), LIMIT);
+    let stamped = |lines: &[Vec<u8>]| -> Vec<(u16, SignalStatus)> {
+        let frames = lines.iter().filter_map(|line| slcan::parse_stamped::<DataFrame>(line).ok());
+        let tx1 = frames.filter(|(frame, _)| frame.id() == Id::Standard(TX1_ID));
+        tx1.map(|(frame, at)| (at, Tx1::parse(frame.data()).expect("a good checksum").yaw_rate_status))
+            .collect()
+    };
+    let failed = |sets: &[(u16, SignalStatus)]| -> Vec<u16> {
+        sets.iter().filter(|(_, status)| *status == SignalStatus::FAILURE).map(|(at, _)| *at).collect()
+    };
+    let lines = board.lines_until(SLCAN, b'\r', LIMIT, |lines| failed(&stamped(lines)).len() >= 10);
+    let sets = stamped(&lines);
+    let (last, _) = sets[READY - 1];
+    let silent = failed(&sets);
+    println!("{NAME}: the last sample at {last} ms, then sets without a rate at {silent:?}");
+    assert_eq!(last, (READY as u16 - 1) * 10);
+    assert!((25..=30).contains(&(silent[0] - last)), "{} ms", silent[0] - last);
+    // By the emulated clock, which runs on while the host is busy elsewhere.
+    assert!(silent.windows(2).all(|pair| (9..=12).contains(&(pair[1] - pair[0]))), "{silent:?}");
+}
+
+#[test]
+fn stuck_sensor() {
+    let Some(mut board) = boot("stuck_sensor") else { return };
+    const STUCK: usize = 40;
+    let rows = rows();
+    let stuck = (READY..READY + STUCK).flat_map(|number| {
+        replay::message(number, &Row { time: rows[number].time, ..rows[READY - 1] }).emit().to_vec()
+    });
+    let bytes: Vec<u8> = [drive(0..READY), stuck.collect(), drive(READY + STUCK..READY + 100)].concat();
+    let expected = replay::lines(&bytes);
+    board.send(IMU, &bytes, LIMIT);
+    let lines = board.lines(SLCAN, b'\r', expected.len(), LIMIT);
+    same(&lines, &expected);
+    let first = READY + STUCK_AFTER as usize - 1;
+    for (tick, status) in statuses(&expected).iter().enumerate().skip(310) {
+        let failed = (first..READY + STUCK).contains(&tick);
+        assert_eq!(*status == SignalStatus::FAILURE, failed, "sample {tick}");
+    }
+}
+
+#[test]
+fn saturated_sensor() {
+    let Some(mut board) = boot("saturated_sensor") else { return };
+    const SATURATED: usize = 3;
+    let rows = rows();
+    let bytes: Vec<u8> = (0..READY + 100)
+        .flat_map(|number| {
+            let mut message = replay::message(number, &rows[number]);
+            if (READY..READY + SATURATED).contains(&number) {
+                message.status = Some(CLIPPED);
+            }
+            message.emit().to_vec()
+        })
+        .collect();
+    let expected = replay::lines(&bytes);
+    board.send(IMU, &bytes, LIMIT);
+    let lines = board.lines(SLCAN, b'\r', expected.len(), LIMIT);
+    same(&lines, &expected);
+    for (tick, status) in statuses(&expected).iter().enumerate().skip(310) {
+        let failed = (READY..READY + SATURATED + HOLD as usize).contains(&tick);
+        assert_eq!(*status == SignalStatus::FAILURE, failed, "sample {tick}");
+    }
+}

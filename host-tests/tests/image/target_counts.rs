@@ -1,0 +1,176 @@
+//! What the kernels and the parsers cost on the target, counted in the emulator, against the bars that the
+//! project has set itself; and that they are right there. Instructions are exact where a C
+//! compiler is found (QEMU plugin), else good to six; modelled cycles need the compiler, and a
+//! test without one says that it left them out.
+
+use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
+use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
+use gyronet::units::Angle;
+use gyronet::window::{Features, WINDOW};
+use gyronet_host_tests::require::{Need, wants};
+use gyronet_host_tests::{image, qemu};
+use gyronet_tools::image_size::ImageSize;
+use gyronet_tools::parser_load::{FRAMES, ParserLoad};
+use gyronet_tools::target_bench::{self, Counts};
+
+/// Largest part of the processor's time that a part's frames may take, at 5 wait states.
+const SHARES: [(&str, f64); 3] = [
+    ("sensor/dsp1760_frame", 0.025),
+    ("sensor/dsp1760_timed_frame", 0.025),
+    ("sensor/mtdata2_frame", 0.0025),
+];
+
+/// The largest frame of each parser, and what it may hold beside it: clock, counters, settings.
+const PARSERS: [(&str, u64, u64); 6] = [
+    ("sensor/dsp1760_parser", 40, 100),
+    ("sensor/mtdata2_parser", 259, 61),
+    ("sensor/dsp3000_line_parser", 32, 16),
+    ("sensor/dsp3000_word_parser", 4, 16),
+    ("sensor/icm42688_packet_parser", 20, 40),
+    ("sensor/adis16465_burst_parser", 20, 0),
+];
+
+struct Bar {
+    name: &'static str,
+    instructions: u64,
+    cycles: u64,
+    cycles_5ws: u64,
+}
+
+/// CMSIS-NN s8 takes 3,484,464 instructions and 4,382,365 modelled cycles for a whole window.
+const BARS: [Bar; 4] = [
+    Bar { name: "gyronet/window", instructions: 1_350_000, cycles: 1_570_000, cycles_5ws: 1_620_000 },
+    Bar { name: "gyronet/newest", instructions: 950_000, cycles: 1_100_000, cycles_5ws: 1_150_000 },
+    Bar { name: "fognet/window", instructions: 23_800_000, cycles: 26_100_000, cycles_5ws: 32_000_000 },
+    // What keeps a task of the same priority waiting.
+    Bar { name: "fognet/piece", instructions: 210_000, cycles: 230_000, cycles_5ws: 280_000 },
+];
+
+const NO_PLUGIN: &str = "cycles cannot be counted: no C compiler, or an emulator without plugins";
+
+#[test]
+fn counts_and_sizes() {
+    let test = "counts_and_sizes";
+    let Some(()) = qemu::available(test) else { return };
+    let mut counts = Counts::default();
+    for name in target_bench::IMAGES {
+        let Some(bench) = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), name) else { return };
+        let counted = target_bench::measure(&target_bench::workspace(), &bench);
+        counts.extend(counted.unwrap_or_else(|error| panic!("{name}: {error}")));
+    }
+    let counted = if counts.exact() { Ok(()) } else { Err(NO_PLUGIN.to_owned()) };
+    let modelled = wants(test, Need::Qemu, counted).is_some();
+    for Bar { name, instructions, cycles, cycles_5ws } in BARS {
+        let count = counts.get(name).expect(name);
+        println!("{count:?}");
+        assert!(count.instructions <= instructions, "{count:?}");
+        let within = |counted: Option<u64>, bar: u64| counted.is_some_and(|counted| counted <= bar);
+        assert!(
+            !modelled || within(count.cycles, cycles) && within(count.cycles_5ws, cycles_5ws),
+            "{count:?}"
+        );
+    }
+    // Ten random windows, zeros, the ends of the range: the same work to the instruction.
+    assert_eq!(counts.starting_with("gyronet/window").count(), 12);
+    assert!(counts.constant(), "{counts:?}");
+
+    let size = |name: &str| counts.sizes.iter().find(|(n, _)| n == name).expect("the image prints it").1;
+    assert!(size("gyronet/weights") <= 126_000);
+    assert!(size("gyronet/state") <= 28_000);
+    assert!(size("fognet/state") <= 36_000);
+    let stack = counts.get("gyronet/window").expect("measured").stack;
+    assert!(stack <= 1_280, "{stack} bytes of stack for a window");
+    parsers(&counts);
+}
+
+fn parsers(counts: &Counts) {
+    let loads = ParserLoad::all(counts);
+    assert_eq!(loads.len(), FRAMES.len(), "{loads:?}");
+    for (name, limit) in SHARES {
+        let load = loads.iter().find(|load| load.name == name).expect(name);
+        println!("{load}");
+        assert!(load.share().is_none_or(|share| share <= limit), "{load}");
+    }
+    for (name, frame, beside) in PARSERS {
+        let (_, bytes) = counts.sizes.iter().find(|(n, _)| n == name).expect(name);
+        println!("{name}: {bytes} bytes");
+        assert!(*bytes <= frame + beside, "{name}: {bytes} bytes");
+    }
+}
+
+#[test]
+fn coprocessor_size() {
+    let Some(elf) = image::firmware("coprocessor_size", env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
+        return;
+    };
+    let size = ImageSize::read(&elf).expect("an ELF file");
+    println!("{size:?}");
+    assert!(size.kernels > 0 && size.kernels <= 8 * 1024, "{size:?}");
+}
+
+/// The kernels on the target equal their portable definition, and GyroNet's outputs there
+/// equal this host's.
+#[test]
+fn selftest() {
+    let Some(()) = qemu::available("selftest") else { return };
+    let Some(elf) = image::firmware("selftest", env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
+    let (printed, _) = target_bench::emulate(&elf, &[]).unwrap_or_else(|error| panic!("{error}"));
+    println!("{printed}");
+    assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
+    assert!(printed.contains(&format!("fognet hash={:08x}\n", fognet_hash())), "{printed}");
+}
+
+/// What the self-test computes: CRC-32 over the corrections and scales of sixteen random windows.
+fn hash() -> u32 {
+    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
+    let mut digest = gyronet::model::blob::CRC.digest();
+    let mut numbers = Xorshift(7);
+    for _ in 0..16 {
+        let window: [Features; WINDOW] = std::array::from_fn(|_| {
+            std::array::from_fn(|k| numbers.within(if k < 3 { 10 << 20 } else { 1 << 25 }))
+        });
+        let estimate = network.estimate(&window);
+        for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+            digest.update(&rate.0.to_le_bytes());
+        }
+    }
+    digest.finalize()
+}
+
+/// The same for FoGNet: CRC-32 over the estimates of three random windows.
+fn fognet_hash() -> u32 {
+    let mut state = FogNetState::ZERO;
+    let blob = FogBlob::new_checked(&weights::FOGNET.0).expect("the weights are good");
+    let mut network = FogNet::new(blob, &mut state);
+    let mut minute = Minute::EMPTY;
+    let mut digest = gyronet::model::blob::CRC.digest();
+    let mut numbers = Xorshift(8);
+    for _ in 0..3 {
+        for _ in 0..STEPS {
+            let features = std::array::from_fn(|k| {
+                numbers.within(if !(3..=5).contains(&k) { 10 << 20 } else { 1 << 25 })
+            });
+            let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
+            minute.push(Second { features, turn });
+        }
+        let window = minute.window(Padding::None).expect("it is full");
+        let estimate = network.estimate(&window);
+        for angle in [estimate.correction, estimate.linear] {
+            digest.update(&angle.0.to_le_bytes());
+        }
+    }
+    digest.finalize()
+}
+
+/// The images' random numbers (`src/bin/support`).
+struct Xorshift(u32);
+
+impl Xorshift {
+    fn within(&mut self, limit: i32) -> i32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        (self.0 >> 1) as i32 % (2 * limit + 1) - limit
+    }
+}

@@ -1,0 +1,170 @@
+//! The configuration of the vehicle bus: what is refused, what it costs, what goes out.
+
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, Vdc2Settings, YawSettings};
+use gyronet::can::e2e::{DataIdMode, P11Mode};
+use gyronet::can::encoder::CanEncoder;
+use gyronet::can::yaw::Quality;
+use gyronet::estimate::VehicleSample;
+use gyronet::units::{AngularRate, Yaw};
+use gyronet_host_tests::synthetic;
+
+const YAW: YawSettings = match Settings::DEFAULT.yaw {
+    Some(yaw) => yaw,
+    None => panic!("the default has our own messages"),
+};
+const ALL: Settings = Settings { vdc2: Some(Vdc2Settings { source: 0x80 }), ..Settings::DEFAULT };
+
+fn with_yaw(yaw: YawSettings) -> Settings {
+    Settings { yaw: Some(yaw), ..Settings::DEFAULT }
+}
+
+fn with_e2e(e2e: E2e) -> Settings {
+    with_yaw(YawSettings { e2e, ..YAW })
+}
+
+#[test]
+fn loads() {
+    let percent = |per_mille: u32| f64::from(per_mille) / 10.0;
+    for (name, settings) in [("default", Settings::DEFAULT), ("all encoder", ALL)] {
+        let load = Config::new(settings).expect("checked").bus_load_per_mille();
+        println!("{name}: bus load at 500 kbit/s, most stuff bits: {:.1} %", percent(load));
+        assert!(load < 200);
+    }
+    let settings = [("default", Settings::DEFAULT), ("all encoder", ALL), ("115200", Settings::SLCAN_115200)];
+    for (name, settings) in settings {
+        for baud in [115_200, 921_600] {
+            let [plain, stamped] = [false, true]
+                .map(|stamped| Config::new(settings).expect("checked").line_load_per_mille(baud, stamped));
+            println!(
+                "{name}: SLCAN at {baud}: {:.1} %, with time stamps {:.1} %",
+                percent(plain),
+                percent(stamped)
+            );
+            let fits = baud == 921_600 || name == "115200";
+            assert_eq!(stamped < 900, fits, "{name} at {baud}");
+        }
+    }
+}
+
+#[test]
+fn loads_by_hand() {
+    // Six frames of 135 bits a hundred times a second; 29-bit identifiers have 160.
+    let config = Config::new(Settings::DEFAULT).expect("checked");
+    assert_eq!(config.bus_load_per_mille(), 6 * 135 * 100 / 500);
+    assert_eq!(Config::new(ALL).expect("checked").bus_load_per_mille(), (6 * 135 + 160) * 100 / 500);
+    // 22 characters of ten bits.
+    assert_eq!(config.line_load_per_mille(1_320_000, false), 100);
+    assert_eq!(config.line_load_per_mille(1_560_000, true), 100);
+}
+
+#[test]
+fn settings_that_cannot_be() {
+    let refused = |settings| Config::new(settings).expect_err("refused");
+    let nothing = Settings { bosch: None, yaw: None, ..Settings::DEFAULT };
+    assert_eq!(refused(nothing), ConfigError::Empty);
+    assert_eq!(refused(Settings { bits_per_second: 0, ..ALL }), ConfigError::BitRate(0));
+    let ids = |ids| with_yaw(YawSettings { ids, ..YAW });
+    assert_eq!(refused(ids([0x1A0, 0x800, 0x1A2])), ConfigError::Identifier(0x800));
+    assert_eq!(refused(ids([0x7DF, 0x1A1, 0x1A2])), ConfigError::Identifier(0x7DF));
+    assert_eq!(refused(ids([0x1A0, 0x1A1, 0x1A0])), ConfigError::DuplicateIdentifier(0x1A0));
+    assert_eq!(refused(ids([0x1A0, 0x178, 0x1A2])), ConfigError::DuplicateIdentifier(0x178));
+    let tx1_only = Settings { bosch: Some(BoschSettings { tx1_only: true }), ..ids([0x1A0, 0x178, 0x1A2]) };
+    assert!(Config::new(tx1_only).is_ok(), "0x178 is free then");
+    for period_ms in [0, 5, 15, 1010] {
+        let settings = with_yaw(YawSettings { period_ms, ..YAW });
+        assert_eq!(refused(settings), ConfigError::Period(period_ms));
+    }
+    let vdc2 = |source| Settings { vdc2: Some(Vdc2Settings { source }), ..Settings::DEFAULT };
+    assert_eq!(refused(vdc2(254)), ConfigError::SourceAddress(254));
+    assert!(Config::new(vdc2(253)).is_ok());
+    let slow = refused(Settings { bits_per_second: 100_000, ..ALL });
+    assert_eq!(slow, ConfigError::Overload { per_mille: 970 });
+    assert_eq!(slow.to_string(), "the messages are 97.0 % of the bus");
+}
+
+#[test]
+fn e2e_identifiers_tell_the_messages_apart() {
+    let refused = |e2e| Config::new(with_e2e(e2e)).expect_err("refused");
+    let duplicate = ConfigError::DuplicateDataId;
+    use DataIdMode::{Alternating, Both, Low, Nibble};
+    assert_eq!(refused(E2e::P01 { mode: Both, data_ids: [1, 2, 1] }), duplicate);
+    assert_eq!(refused(E2e::P01 { mode: Low, data_ids: [0x101, 0x201, 2] }), duplicate);
+    assert_eq!(refused(E2e::P01 { mode: Alternating, data_ids: [0x101, 0x102, 0x203] }), duplicate);
+    assert_eq!(refused(E2e::P01 { mode: Alternating, data_ids: [0x101, 0x201, 0x302] }), duplicate);
+    assert_eq!(refused(E2e::P01 { mode: Nibble, data_ids: [1, 2, 0x1000] }), ConfigError::DataId(0x1000));
+    assert_eq!(refused(E2e::P11 { mode: P11Mode::Nibble, data_ids: [1, 2, 2] }), duplicate);
+    assert_eq!(refused(E2e::P05 { data_ids: [1, 1, 2] }), duplicate);
+    let list = |first: u8| core::array::from_fn(|k| first + k as u8);
+    let mut mixed = list(17);
+    mixed[3] = list(1)[3];
+    assert_eq!(refused(E2e::P02 { data_ids: [list(1), mixed, list(33)] }), duplicate);
+    for e2e in [
+        E2e::P01 { mode: Low, data_ids: [1, 2, 3] },
+        E2e::P01 { mode: Alternating, data_ids: [0x101, 0x202, 0x303] },
+        E2e::P01 { mode: Nibble, data_ids: [0x101, 0x102, 0x201] },
+        E2e::P02 { data_ids: [list(1), list(17), list(33)] },
+        E2e::P05 { data_ids: [1, 2, 3] },
+        E2e::P11 { mode: P11Mode::Both, data_ids: [1, 2, 3] },
+    ] {
+        assert!(Config::new(with_e2e(e2e)).is_ok(), "{e2e:?}");
+    }
+}
+
+#[test]
+fn the_drop_in_set_takes_57_percent_of_a_slow_line() {
+    let config = Config::new(Settings { yaw: None, ..Settings::DEFAULT }).expect("checked");
+    // 22 characters, three messages, 100 Hz: 66 kbit/s of 115.2.
+    assert_eq!(config.line_load_per_mille(115_200, false), 573);
+}
+
+#[test]
+fn what_comes_with_the_library_is_checked() {
+    assert_eq!(Config::new(Settings::DEFAULT), Ok(Config::DEFAULT));
+    assert_eq!(Config::new(Settings::SLCAN_115200), Ok(Config::SLCAN_115200));
+}
+
+fn sample(tick: u32) -> VehicleSample {
+    synthetic::vehicle(tick, AngularRate(1_000_000), Yaw::default())
+}
+
+#[test]
+fn frames_go_out_as_configured() {
+    for settings in [Settings::DEFAULT, ALL, Settings::SLCAN_115200] {
+        let config = Config::new(settings).expect("checked");
+        let mut encoder = CanEncoder::new(config);
+        let mut sent = Vec::new();
+        for tick in 0..100 {
+            sent.extend(encoder.encode(&sample(tick)));
+        }
+        for message in config.messages() {
+            let count = sent.iter().filter(|frame| frame.id() == message.id).count();
+            assert_eq!(count, 1000 / usize::from(message.period_ms), "{message:?}");
+            assert!(config.sends(message.id));
+        }
+        assert!(sent.iter().all(|frame| config.sends(frame.id()) && frame.dlc() == 8));
+    }
+    let vdc2 = ExtendedId::new(0x18F0_0980).expect("29 bits");
+    assert!(Config::new(ALL).expect("checked").sends(Id::Extended(vdc2)));
+    let other = StandardId::new(0x123).expect("11 bits");
+    assert!(!Config::new(ALL).expect("checked").sends(Id::Standard(other)));
+}
+
+#[test]
+fn every_feed_says_that_the_rate_is_not_to_be_used() {
+    let mut encoder = CanEncoder::new(Config::new(ALL).expect("checked"));
+    for (quality, nibble, rate, vdc2) in
+        [(Quality::Initialising, 4, 426_887, 0xFFFF), (Quality::Unusable, 2, i32::MIN, 0xFE00)]
+    {
+        let mut unusable = sample(0);
+        unusable.navigation.quality = quality;
+        unusable.prompt.quality = quality;
+        let frames = encoder.encode(&unusable);
+        assert_eq!(frames[0].data()[2] >> 4, nibble);
+        // What the part has not passed on is no acceleration either.
+        let force = if quality == Quality::Unusable { 2 } else { 0 };
+        assert_eq!(frames[0].data()[6] >> 4, force);
+        assert_eq!(frames[3].data()[3..7], i32::to_le_bytes(rate));
+        assert_eq!(frames[6].data()[3..5], u16::to_le_bytes(vdc2));
+    }
+}

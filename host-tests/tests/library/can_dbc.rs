@@ -1,0 +1,323 @@
+//! `tools/gyronet.dbc` says what the codecs do: parsed by another's parser, decoded bit by bit.
+
+use can_dbc::{AttributeValue, ByteOrder, Dbc, Message, MessageId, NumericValue, Signal, ValueType};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::bosch;
+use gyronet::can::config::{Config, Settings, Vdc2Settings};
+use gyronet::can::encoder::CanEncoder;
+use gyronet::can::j1939::Vdc2;
+use gyronet::can::load::Periodic;
+use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
+use gyronet::estimate::{VehicleSample, YawEstimate};
+use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+const DBC: &str = include_str!("../../../tools/gyronet.dbc");
+const ALL: Settings = Settings { vdc2: Some(Vdc2Settings { source: 0x80 }), ..Settings::DEFAULT };
+
+fn dbc() -> Dbc {
+    Dbc::try_from(DBC).expect("a DBC file")
+}
+
+fn message_id(id: Id) -> MessageId {
+    match id {
+        Id::Standard(id) => MessageId::Standard(id.as_raw()),
+        Id::Extended(id) => MessageId::Extended(id.as_raw()),
+    }
+}
+
+fn message(dbc: &Dbc, id: Id) -> &Message {
+    let id = message_id(id);
+    dbc.messages.iter().find(|message| message.id == id).expect("a message of the file")
+}
+
+fn number(value: NumericValue) -> f64 {
+    match value {
+        NumericValue::Uint(value) => value as f64,
+        NumericValue::Int(value) => value as f64,
+        NumericValue::Double(value) => value,
+    }
+}
+
+/// A signal's raw value, one bit after the other.
+fn raw(signal: &Signal, data: &[u8]) -> i64 {
+    assert_eq!(signal.byte_order, ByteOrder::LittleEndian, "{}", signal.name);
+    let bit = |k: u64| i64::from(data[(k / 8) as usize] >> (k % 8) & 1);
+    let value = (0..signal.size).map(|k| bit(signal.start_bit + k) << k).sum::<i64>();
+    let sign = 1 << (signal.size - 1);
+    if signal.value_type == ValueType::Signed && value & sign != 0 { value - 2 * sign } else { value }
+}
+
+/// Every signal of a frame by its name, raw and physical.
+fn decode(dbc: &Dbc, frame: &DataFrame) -> BTreeMap<String, (i64, f64)> {
+    let signals = &message(dbc, frame.id()).signals;
+    let decoded = signals.iter().map(|signal| {
+        let raw = raw(signal, frame.data());
+        (signal.name.clone(), (raw, raw as f64 * signal.factor + signal.offset))
+    });
+    decoded.collect()
+}
+
+fn encoder() -> CanEncoder {
+    CanEncoder::new(Config::new(ALL).expect("checked"))
+}
+
+#[test]
+fn the_file_has_every_message_with_its_cycle_time() {
+    let dbc = dbc();
+    let config = Config::new(ALL).expect("checked");
+    let fog =
+        FOG_IDS.map(|id| Periodic { id: Id::Standard(StandardId::new(id).expect("11 bits")), period_ms: 10 });
+    let sent: Vec<Periodic> = config.messages().iter().copied().chain(fog).collect();
+    assert_eq!(dbc.messages.len(), sent.len());
+    for sent in sent {
+        let message = message(&dbc, sent.id);
+        assert_eq!(message.size, 8);
+        let cycle = dbc.message_attribute(message.id, "GenMsgCycleTime");
+        assert_eq!(cycle, Some(&AttributeValue::Uint(sent.period_ms.into())), "{}", message.name);
+        assert!(dbc.message_comment(message.id).is_some(), "{}", message.name);
+    }
+}
+
+#[test]
+fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
+    for message in &dbc().messages {
+        let mut taken = 0u64;
+        for signal in &message.signals {
+            let bits = ((1u64 << signal.size) - 1) << signal.start_bit;
+            assert!(signal.start_bit + signal.size <= 64 && taken & bits == 0, "{}", signal.name);
+            taken |= bits;
+            let span = 1i64 << signal.size;
+            let (low, high) = match signal.value_type {
+                ValueType::Signed => (-span / 2, span / 2 - 1),
+                ValueType::Unsigned => (0, span - 1),
+            };
+            let physical = |raw: i64| raw as f64 * signal.factor + signal.offset;
+            let (min, max) = (number(signal.min), number(signal.max));
+            // J1939 and value tables keep some codes; a range never promises more than there is.
+            let slack = signal.factor * 1e-6;
+            assert!(min >= physical(low) - slack && max <= physical(high) + slack, "{}", signal.name);
+            assert!(min < max, "{}", signal.name);
+        }
+    }
+}
+
+#[test]
+fn value_tables_are_our_enumerations() {
+    let dbc = dbc();
+    let table = |id: u16, name: &str| -> Vec<(i64, String)> {
+        let table = dbc.value_descriptions_for_signal(MessageId::Standard(id), name).expect("a table");
+        table.iter().map(|value| (value.id, value.description.to_lowercase())).collect()
+    };
+    let named = |code: u8, name: &str| (i64::from(code), name.to_owned());
+    let sources = [Source::Raw, Source::Static, Source::GyroNet, Source::FogNet]
+        .map(|source| named(source as u8, &format!("{source:?}").to_lowercase()));
+    assert_eq!(table(0x1A0, "Source"), sources);
+    let qualities = [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable]
+        .map(|quality| named(quality as u8, &format!("{quality:?}").to_lowercase()));
+    assert_eq!(table(0x1A0, "Quality"), qualities);
+    use bosch::SignalStatus;
+    let statuses = [
+        named(SignalStatus::OK.0, "ok"),
+        named(SignalStatus::NOT_AVAILABLE.0, "not available"),
+        named(SignalStatus::FAILURE.0, "failure"),
+        named(SignalStatus::INITIALISING.0, "initialising"),
+    ];
+    for (id, names) in [
+        (0x174, ["YawRate_STAT", "AY_STAT"]),
+        (0x178, ["RollRate_STAT", "AX_STAT"]),
+        (0x17C, ["PitchRate_STAT", "AZ_STAT"]),
+    ] {
+        for name in names {
+            assert_eq!(table(id, name), statuses);
+        }
+    }
+    assert_eq!(table(0x174, "TEMP")[1].0, i64::from(bosch::encode_temperature(None)));
+}
+
+#[test]
+fn each_fault_has_its_bit() {
+    let dbc = dbc();
+    for (name, fault) in [
+        ("Fault_Gap", Faults::GAP),
+        ("Fault_Clipped", Faults::CLIPPED),
+        ("Fault_Stuck", Faults::STUCK),
+        ("Fault_Implausible", Faults::IMPLAUSIBLE),
+        ("Fault_Late", Faults::LATE),
+        ("Fault_Stored", Faults::STORED),
+        ("Fault_Wheels", Faults::WHEELS),
+        ("Fault_Bus", Faults::BUS),
+    ] {
+        let data = AngleMessage { yaw: 0, faults: fault }.emit();
+        let id = embedded_can::StandardId::new(0x1A1).expect("11 bits");
+        let decoded = decode(&dbc, &DataFrame::new(id, &data).expect("eight bytes"));
+        let set: Vec<_> =
+            decoded.iter().filter(|(name, (raw, _))| name.starts_with("Fault_") && *raw == 1).collect();
+        assert_eq!(set.len(), 1);
+        assert_eq!(set[0].0, name);
+    }
+}
+
+fn any_sample() -> impl Strategy<Value = VehicleSample> {
+    let source =
+        prop_oneof![Just(Source::Raw), Just(Source::Static), Just(Source::GyroNet), Just(Source::FogNet)];
+    let quality = prop_oneof![
+        Just(Quality::Good),
+        Just(Quality::Degraded),
+        Just(Quality::Initialising),
+        Just(Quality::Unusable)
+    ];
+    // A little beyond what the coarse signals hold.
+    let rate = || (-500_000_000..500_000_000).prop_map(AngularRate);
+    let force = || (-50_000_000..50_000_000).prop_map(SpecificForce);
+    let prompt = (rate(), quality.clone()).prop_map(|(rate, quality)| YawEstimate {
+        rate,
+        quality,
+        ..YawEstimate::default()
+    });
+    let yaw = (
+        (rate(), rate(), any::<i64>(), proptest::option::of(rate())),
+        (source, quality, any::<u8>(), proptest::option::of(0..300_000_u32)),
+    )
+        .prop_map(|((rate, correction, yaw, sigma), (source, quality, faults, latency_us))| {
+            YawEstimate {
+                rate,
+                correction,
+                yaw: Yaw(yaw),
+                sigma,
+                source,
+                quality,
+                faults: Faults(faults),
+                latency_us,
+                ..YawEstimate::default()
+            }
+        });
+    let force = [force(), force(), force()];
+    let temperature = proptest::option::of(-6000..16_000_i16);
+    (prompt, yaw, [rate(), rate()], force, temperature, any::<u32>()).prop_map(
+        |(prompt, navigation, [roll_rate, pitch_rate], specific_force, temperature, tick)| VehicleSample {
+            prompt,
+            navigation,
+            roll_rate,
+            pitch_rate,
+            specific_force,
+            temperature: temperature.map(CentiCelsius),
+            tick,
+        },
+    )
+}
+
+fn close(a: f64, b: f64, tolerance: f64) {
+    assert!((a - b).abs() <= tolerance, "{a} is not {b}");
+}
+
+/// One message of the Bosch set against the file and against the sample it was made from.
+fn compare_bosch(
+    dbc: &Dbc,
+    frame: &DataFrame,
+    names: [&str; 6],
+    due: (AngularRate, SpecificForce),
+    tick: u32,
+) {
+    let decoded = decode(dbc, frame);
+    let message = bosch::Message::parse(frame.data()).expect("checksum");
+    let [rate, rate_status, force, force_status, counter, crc] = names.map(|name| decoded[name]);
+    assert_eq!(rate.0, i64::from(message.rate));
+    assert_eq!(rate_status.0, i64::from(message.rate_status.0));
+    assert_eq!(force.0, i64::from(message.acceleration));
+    assert_eq!(force_status.0, i64::from(message.acceleration_status.0));
+    assert_eq!(counter.0, i64::from(tick & 0xF));
+    assert_eq!(crc.0, i64::from(frame.data()[7]));
+    // The nearest code, one LSB more for the residual of the rate.
+    if message.rate_status.0 & bosch::SignalStatus::FAILURE.0 == 0 {
+        close(rate.1, due.0.rad_per_sec().to_degrees(), 0.0051);
+    }
+    if message.acceleration_status.0 == 0 {
+        close(force.1, due.1.metre_per_sec2() / 9.806_65, 0.000_127_465 * 0.51);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// What the file makes of every frame is what the codecs make of it, and what was put in.
+    #[test]
+    fn frames_mean_what_the_file_says(samples in proptest::collection::vec(any_sample(), 1..4)) {
+        let dbc = dbc();
+        let mut encoder = encoder();
+        for sample in &samples {
+            let frames = encoder.encode(sample);
+            let [tx1, tx2, tx3, rate, angle, detail, vdc2] = frames.as_slice() else {
+                return Err(TestCaseError::fail("seven frames"));
+            };
+            let [forward, left, up] = sample.specific_force;
+            let negated = AngularRate(-sample.roll_rate.0);
+            let names = ["YawRate", "YawRate_STAT", "AY", "AY_STAT", "MSG_CNT_TX1", "CRC_TX1"];
+            compare_bosch(&dbc, tx1, names, (sample.prompt.rate, left), sample.tick);
+            let names = ["RollRate", "RollRate_STAT", "AX", "AX_STAT", "MSG_CNT_TX2", "CRC_TX2"];
+            compare_bosch(&dbc, tx2, names, (negated, forward), sample.tick);
+            let names = ["PitchRate", "PitchRate_STAT", "AZ", "AZ_STAT", "MSG_CNT_TX3", "CRC_TX3"];
+            compare_bosch(&dbc, tx3, names, (sample.pitch_rate, up), sample.tick);
+            if let Some(CentiCelsius(centi)) = sample.temperature && (-5000..=15_000).contains(&centi) {
+                close(decode(&dbc, tx1)["TEMP"].1, f64::from(centi) / 100.0, 0.51);
+            }
+
+            for (frame, name) in [(rate, "Rate"), (angle, "Angle"), (detail, "Detail")] {
+                let decoded = decode(&dbc, frame);
+                let [crc, counter, samples, ..] = frame.data() else { continue };
+                prop_assert_eq!(decoded[&format!("{name}_CRC")].0, i64::from(*crc));
+                prop_assert_eq!(decoded[&format!("{name}_Counter")].0, i64::from(*counter));
+                prop_assert_eq!(decoded[&format!("{name}_SampleCounter")].0, i64::from(*samples));
+            }
+
+            let decoded = decode(&dbc, rate);
+            let message = RateMessage::parse(rate.data()).expect("a rate message");
+            prop_assert_eq!(decoded["Rate"].0, i64::from(message.rate));
+            prop_assert_eq!(decoded["Source"].0, sample.navigation.source as i64);
+            prop_assert_eq!(decoded["Quality"].0, sample.navigation.quality as i64);
+            if let Some(sent) = message.deg_per_sec() {
+                close(decoded["Rate"].1, sent, 1e-9);
+                close(sent, sample.navigation.rate.rad_per_sec().to_degrees(), 1.1e-6);
+            }
+
+            let decoded = decode(&dbc, angle);
+            let message = AngleMessage::parse(angle.data()).expect("an angle message");
+            prop_assert_eq!(decoded["Yaw"].0, i64::from(message.yaw));
+            close(decoded["Yaw"].1, message.deg(), 1e-12);
+
+            let decoded = decode(&dbc, detail);
+            let message = DetailMessage::parse(detail.data()).expect("a detail message");
+            prop_assert_eq!(decoded["Correction"].0, i64::from(message.correction));
+            prop_assert_eq!(decoded["ExpectedError"].0, i64::from(message.sigma));
+            prop_assert_eq!(decoded["Latency"].0, i64::from(message.latency));
+            if let Some(sigma) = sample.navigation.sigma && message.sigma < u16::MAX - 1 {
+                // Rounded up to the next step of 1e-5 deg/s.
+                let beyond = decoded["ExpectedError"].1 - sigma.rad_per_sec().abs().to_degrees();
+                prop_assert!((-1e-9..1.001e-5).contains(&beyond), "{beyond}");
+            }
+            if message.correction.abs() < i16::MAX {
+                close(decoded["Correction"].1, sample.navigation.correction.rad_per_sec().to_degrees(), 2.1e-4);
+            }
+            if let Some(us) = sample.navigation.latency_us && us <= 127_000 {
+                close(decoded["Latency"].1, f64::from(us) / 1000.0, 0.5);
+            }
+
+            let decoded = decode(&dbc, vdc2);
+            let message = Vdc2::parse(vdc2.data()).expect("eight bytes");
+            prop_assert_eq!(decoded["YawRate_VDC2"].0, i64::from(message.yaw_rate));
+            prop_assert_eq!(decoded["SteerWhlAngle"].0, 0xFFFF);
+            if let Some(sent) = message.yaw_rate_rad_per_sec() {
+                close(decoded["YawRate_VDC2"].1, sent, 1e-12);
+                close(sent, sample.prompt.rate.rad_per_sec(), 1.1 / 8192.0);
+            }
+            if message.lateral <= 0xFAFF {
+                close(decoded["LateralAccel"].1, left.metre_per_sec2(), 0.51 / 2048.0);
+            }
+            if message.longitudinal <= 250 {
+                close(decoded["LongitudinalAccel"].1, forward.metre_per_sec2(), 0.051);
+            }
+        }
+    }
+}

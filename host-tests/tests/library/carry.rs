@@ -1,0 +1,183 @@
+//! No angle is lost between the network's revised estimates and the rates on the bus: a ledger
+//! beside the pipeline, exact to the last code.
+
+use gyronet::compensate::{CompensateConfig, Hop, Lag, Mode};
+use gyronet::health::Status;
+use gyronet::model::{Estimate, SCALE_MIN};
+use gyronet::pipeline::{Owed, Pipeline, PipelineConfig};
+use gyronet::sample::{ImuSample, Validity};
+use gyronet::units::{AngularRate, Yaw};
+use gyronet::window::WINDOW;
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::{idling, rate};
+use std::collections::BTreeMap;
+
+/// What the sum of the emitted rates must be, from the estimates alone.
+#[derive(Default)]
+struct Ledger {
+    samples: BTreeMap<u32, Sample>,
+    /// Mean of the last believed window.
+    prior: i64,
+    out: Option<(u32, [i64; WINDOW])>,
+    /// Sums of the rates that went out.
+    prompt: i64,
+    navigation: i64,
+}
+
+/// One sample.
+struct Sample {
+    /// Gyro less bias.
+    gyro: i64,
+    /// The value before a window has covered it.
+    prior: i64,
+    estimates: Vec<i64>,
+}
+
+impl Sample {
+    /// Its best estimate as known now.
+    fn estimate(&self) -> i64 {
+        match self.estimates.len() as i64 {
+            0 => self.prior,
+            n => self.estimates.iter().sum::<i64>() / n,
+        }
+    }
+}
+
+impl Ledger {
+    /// The best rates of all samples as known now, summed.
+    fn best(&self) -> i64 {
+        self.samples.values().map(|sample| sample.gyro - sample.estimate()).sum()
+    }
+
+    fn break_window(&mut self) {
+        self.out = None;
+        self.prior = 0;
+    }
+
+    fn take_estimate(&mut self, tick: u32, mode: Mode, max_mean: i64) {
+        let Some((end, estimate)) = self.out.take_if(|(end, _)| tick >= *end + mode.delay()) else { return };
+        let mean = |values: &[i64]| values.iter().sum::<i64>() / values.len() as i64;
+        if mean(&estimate).abs() > max_mean {
+            self.prior = 0;
+            return;
+        }
+        for (place, tick) in (end + 1 - WINDOW as u32..=end).enumerate() {
+            if mode.used().contains(&place) {
+                let sample = self.samples.get_mut(&tick).expect("windows cover samples that went out");
+                sample.estimates.push(estimate[place]);
+            }
+        }
+        self.prior = mean(&estimate[mode.used()]);
+    }
+}
+
+/// How a stream goes wrong.
+#[derive(Clone, Copy)]
+struct Faults {
+    gaps: bool,
+    clipping: bool,
+    /// Spread of a window's estimates, and of their mean, rad/s.
+    spread: f64,
+}
+
+/// 30 s with the ledger checked about five times a second; returns how often the carry was bounded
+/// and how many samples were settled.
+fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) {
+    let CompensateConfig { mode, lag, max_mean, max_carry, .. } = compensate;
+    let mut noise = Noise::new(seed);
+    let config = PipelineConfig { compensate, zero_rate: None, ..PipelineConfig::DEFAULT };
+    let mut pipeline = Pipeline::new(config);
+    let mut ledger = Ledger::default();
+    let (mut tick, mut bounded, mut ready, mut settled) = (0u64, 0, 0, 0);
+    let bound = i64::from(max_carry.0);
+    while tick < 3_000 {
+        let moving = tick > 400;
+        tick += if moving && faults.gaps && noise.int(0, 99) == 0 { noise.int(2, 9) as u64 } else { 1 };
+        let clipped = moving && faults.clipping && noise.int(0, 99) == 0;
+        let mut sample =
+            ImuSample { validity: Validity::reported(clipped), ..idling(tick, 0.003, &mut noise) };
+        sample.angular_rate[2].0 += if moving { rate(0.4).0 } else { 0 };
+        let broken = ledger.samples.last_key_value().map(|(last, _)| *last);
+        let output = pipeline.process(sample).expect("a place on the grid");
+        let (prompt, navigation) = (output.vehicle.prompt, output.vehicle.navigation);
+        let Some([.., bias]) = pipeline.gyro_bias().filter(|_| prompt.status != Status::Init) else {
+            continue;
+        };
+        if clipped || broken.is_some_and(|last| prompt.tick != last + 1) {
+            ledger.break_window();
+        }
+        ledger.take_estimate(prompt.tick, mode, max_mean.0.into());
+        let gyro = i64::from(sample.angular_rate[2].0 - bias.0);
+        ledger.samples.insert(prompt.tick, Sample { gyro, prior: ledger.prior, estimates: Vec::new() });
+        ledger.prompt += i64::from(prompt.rate.0);
+        if navigation.status != Status::Init {
+            ledger.navigation += i64::from(navigation.rate.0);
+        }
+        if noise.int(0, 19) == 0 {
+            let Owed { prompt: Yaw(prompt_owed), navigation: Yaw(navigation_owed) } = pipeline.owed();
+            assert_eq!(ledger.prompt + prompt_owed, ledger.best(), "at tick {}", prompt.tick);
+            assert_eq!(ledger.navigation + navigation_owed, ledger.best(), "at tick {}", prompt.tick);
+        }
+        assert_eq!((prompt.yaw.0, navigation.yaw.0), (ledger.prompt, ledger.navigation));
+        if let Some(settled_now) = output.settled {
+            let sample = &ledger.samples[&settled_now.tick];
+            assert_eq!(i64::from(settled_now.correction.0), sample.estimate());
+            settled += u32::from(settled_now.good);
+        }
+        for rate in [prompt, navigation].iter().filter(|rate| rate.status != Status::Init) {
+            let sample = &ledger.samples[&rate.tick];
+            let carried = sample.gyro - sample.estimate() - i64::from(rate.rate.0);
+            assert!(carried.abs() <= bound, "one rate carries {carried}");
+            bounded += u32::from(carried.abs() == bound);
+        }
+        let late = ledger.samples.range(navigation.tick..).count() - 1;
+        assert_eq!(late, if navigation.status == Status::Init { 0 } else { lag.samples() });
+        ready += u32::from(navigation.status == Status::Ready);
+        if let Some(due) = output.window {
+            let mean = faults.spread * noise.normal();
+            let corrections = [(); WINDOW].map(|()| rate(mean + faults.spread * noise.normal()));
+            ledger.out = Some((due.end, corrections.map(|c| c.0.into())));
+            pipeline.deliver(due.end, Estimate { corrections, scale: SCALE_MIN, clamped_inputs: 0 });
+        }
+    }
+    assert!(ready > 1_000, "only {ready} samples were corrected");
+    (bounded, settled)
+}
+
+/// Every mode, with every kind of lag.
+fn configs() -> impl Iterator<Item = CompensateConfig> {
+    let overlap = [1, 3, 5, 10].into_iter().filter_map(Hop::new).map(|hop| Mode::Overlap { hop });
+    let modes = overlap.chain([Mode::Middle, Mode::Newest]);
+    let lags = [0, 2, 7, 11].into_iter().filter_map(Lag::new);
+    let with = |mode, lag| CompensateConfig { mode, lag, ..CompensateConfig::DEFAULT };
+    modes.flat_map(move |mode| lags.clone().map(move |lag| with(mode, lag)))
+}
+
+const CALM: Faults = Faults { gaps: false, clipping: false, spread: 0.0002 };
+
+#[test]
+fn clean_stream() {
+    for config in configs() {
+        let (bounded, settled) = check(config, CALM, 1);
+        assert_eq!(bounded, 0, "nothing here needs the bound");
+        // What comes before the first used output has no estimate, and the last are under way.
+        let without = config.mode.used().start + config.mode.settled_after();
+        assert_eq!(settled as usize, 3_000 - 300 - without, "{config:?}");
+    }
+}
+
+#[test]
+fn gaps_clipping_and_implausible_windows() {
+    for (seed, config) in (2..).zip(configs()) {
+        check(config, Faults { gaps: true, clipping: true, spread: 0.03 }, seed);
+    }
+}
+
+#[test]
+fn with_the_bound_active() {
+    for config in configs() {
+        let tight = CompensateConfig { max_carry: AngularRate(20_000), ..config };
+        assert!(check(tight, CALM, 7).0 > 1_000);
+        assert!(check(tight, Faults { gaps: true, clipping: true, spread: 0.02 }, 8).0 > 1_000);
+    }
+}

@@ -1,0 +1,311 @@
+//! A sensor's clock is held against the board's: an oscillator that is off turns by the right angle,
+//! through jitter, stalls, jumps, restarts and silence.
+
+use gyronet::align::clock_ratio::{ClockRatio, ClockRatioConfig, JITTER_US, RatioEstimator};
+use gyronet::coprocessor::{Config, Coprocessor};
+use gyronet::health::{Faults, Status};
+use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::units::{AngularRate, Micros, Yaw};
+use gyronet_host_tests::noise::{Noise, cases};
+use gyronet_host_tests::synthetic::{idling, rate};
+use proptest::prelude::*;
+
+/// The bar: 0.02 % of the angle, 0.018 deg in a quarter of a turn.
+const BAR: f64 = 2e-4;
+/// The points of a slope are all there.
+const SETTLED_S: f64 = 40.0;
+/// A sample takes at least so long to arrive.
+const LINE_US: f64 = 1_700.0;
+
+/// A sensor whose periods of 10 ms last longer by `off`, and a line that is late by up to `jitter_us`.
+struct Sensor {
+    off: f64,
+    jitter_us: f64,
+    noise: Noise,
+    /// True time, s; the sensor's, us.
+    now: f64,
+    stamp: u64,
+    /// A sample arrives when the one before has.
+    arrival: f64,
+}
+
+impl Sensor {
+    fn new(off: f64, jitter_us: f64, seed: u64) -> Self {
+        Self { off, jitter_us, noise: Noise::new(seed), now: 3.0, stamp: 77_000_000, arrival: 0.0 }
+    }
+
+    /// The next sample: its stamp and its arrival.
+    fn sample(&mut self) -> (Micros, Micros) {
+        self.now += (1.0 + self.off) * PERIOD_US as f64 * 1e-6;
+        self.stamp += PERIOD_US;
+        let arrival = self.now * 1e6 + LINE_US + self.noise.int(0, self.jitter_us as i64) as f64;
+        self.arrival = self.arrival.max(arrival);
+        (Micros(self.stamp), Micros(self.arrival as u64))
+    }
+
+    /// Samples of so many seconds of true time.
+    fn run(&mut self, seconds: f64, estimator: &mut RatioEstimator) {
+        let end = self.now + seconds;
+        while self.now < end {
+            let (stamp, arrival) = self.sample();
+            estimator.observe(stamp, arrival);
+        }
+    }
+}
+
+fn estimator() -> RatioEstimator {
+    RatioEstimator::new(ClockRatioConfig::DEFAULT)
+}
+
+/// The ratio as a number.
+fn number(ratio: ClockRatio) -> f64 {
+    f64::from(ratio.0) / f64::from(ClockRatio::ONE.0)
+}
+
+/// Returns the distance of the ratio from the true one.
+fn error(estimator: &RatioEstimator, off: f64) -> f64 {
+    (number(estimator.ratio()) / (1.0 + off) - 1.0).abs()
+}
+
+#[test]
+fn an_oscillator_that_is_off_turns_by_the_right_angle() {
+    println!("off, ppm; jitter, ms; error of the angle of five minutes, ppm; largest of a ratio, ppm");
+    for off in [-0.035, -0.01, 0.001, 0.01, 0.02, 0.035] {
+        for jitter_us in [0.0, 1_000.0, 5_000.0] {
+            for seed in 1..=20 {
+                let (mut sensor, mut estimator) = (Sensor::new(off, jitter_us, seed), estimator());
+                sensor.run(SETTLED_S, &mut estimator);
+                let (begin, turning) = (sensor.now, rate(0.5));
+                let (mut yaw, mut worst) = (Yaw::default(), 0.0f64);
+                while sensor.now < begin + 300.0 {
+                    yaw.0 += estimator.ratio().turned(turning);
+                    worst = worst.max(error(&estimator, off));
+                    let (stamp, arrival) = sensor.sample();
+                    estimator.observe(stamp, arrival);
+                }
+                let wrong = (yaw.rad() / ((sensor.now - begin) * turning.rad_per_sec()) - 1.0).abs();
+                if seed == 1 {
+                    let [off, wrong, worst] = [off, wrong, worst].map(|share| share * 1e6);
+                    println!("{off:.0} {:.0} {wrong:.1} {worst:.1}", jitter_us / 1e3);
+                }
+                assert!(wrong <= BAR && worst <= BAR, "{off} {jitter_us} {seed}: {wrong} {worst}");
+                assert!(!estimator.fault());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_ratio_is_one_for_ten_seconds_and_nearly_right_from_then_on() {
+    for seed in 1..=20 {
+        let (mut sensor, mut estimator) = (Sensor::new(0.01, 5_000.0, seed), estimator());
+        sensor.run(9.5, &mut estimator);
+        assert_eq!(estimator.ratio(), ClockRatio::ONE);
+        sensor.run(10.0, &mut estimator);
+        // 3 ms of 8 s.
+        assert!(error(&estimator, 0.01) < 4e-4, "{seed}: {}", error(&estimator, 0.01));
+    }
+}
+
+#[test]
+fn two_crystals_change_no_bit() {
+    for off in [-60e-6, 0.0, 60e-6] {
+        for jitter_us in [0.0, 1_000.0] {
+            let (mut sensor, mut estimator) = (Sensor::new(off, jitter_us, 5), estimator());
+            for _ in 0..600 {
+                sensor.run(1.0, &mut estimator);
+                assert_eq!(estimator.ratio(), ClockRatio::ONE, "{off} {jitter_us}");
+            }
+        }
+    }
+    for code in [i32::MIN, -1, 0, 1, 12_345, i32::MAX] {
+        assert_eq!(ClockRatio::ONE.turned(AngularRate(code)), i64::from(code));
+    }
+}
+
+#[test]
+fn a_ratio_multiplies_to_the_nearest_code() {
+    let one_percent = ClockRatio((1.01 * f64::from(ClockRatio::ONE.0)) as u32);
+    for (code, turned) in [(100, 101), (-100, -101), (60, 61), (40, 40), (1_000_000, 1_010_000)] {
+        assert_eq!(one_percent.turned(AngularRate(code)), turned, "{code}");
+    }
+    assert_eq!(ClockRatio(u32::MAX).turned(AngularRate(i32::MIN)), -8_589_934_590);
+}
+
+/// 6.67 %: time stamps that were taken for microseconds and are none.
+#[test]
+fn a_clock_beyond_the_limit_is_a_fault_and_changes_nothing() {
+    for off in [-0.0625, -0.041, 0.041, 1.0 / 15.0] {
+        let (mut sensor, mut estimator) = (Sensor::new(off, 1_000.0, 2), estimator());
+        sensor.run(SETTLED_S, &mut estimator);
+        assert!(estimator.fault(), "{off}");
+        assert_eq!(estimator.ratio(), ClockRatio::ONE);
+        // It is over with its cause.
+        sensor.off = 0.01;
+        sensor.run(2.0 * SETTLED_S, &mut estimator);
+        assert!(!estimator.fault(), "{off}");
+        assert!(error(&estimator, 0.01) < BAR, "{off}");
+    }
+}
+
+/// The board is busy for 1.5 s; the samples have waited in the part, or in the line, and come at once.
+#[test]
+fn a_stall_is_no_drift() {
+    let (mut sensor, mut estimator) = (Sensor::new(0.01, 1_000.0, 3), estimator());
+    sensor.run(SETTLED_S, &mut estimator);
+    for _ in 0..20 {
+        sensor.arrival = (sensor.now + 1.5) * 1e6;
+        for _ in 0..10 {
+            sensor.run(1.0, &mut estimator);
+            assert!(error(&estimator, 0.01) < BAR, "{}", error(&estimator, 0.01));
+        }
+    }
+    assert!(!estimator.fault());
+}
+
+/// A counter of 16 bits that has turned once more than was seen; an offset that is new after a stall of
+/// the line.
+#[test]
+fn a_step_of_either_clock_is_no_drift() {
+    for step in [7_000, 20_000, 69_905, 900_000_u64] {
+        for seed in 1..=10 {
+            let (mut sensor, mut estimator) = (Sensor::new(-0.01, 1_000.0, seed), estimator());
+            sensor.run(SETTLED_S + seed as f64, &mut estimator);
+            sensor.stamp += step;
+            for _ in 0..100 {
+                sensor.run(1.0, &mut estimator);
+                assert!(error(&estimator, -0.01) < 2.5e-4, "{step}: {}", error(&estimator, -0.01));
+            }
+            sensor.now += step as f64 * 1e-6;
+            for _ in 0..100 {
+                sensor.run(1.0, &mut estimator);
+                assert!(error(&estimator, -0.01) < 2.5e-4, "{step}: {}", error(&estimator, -0.01));
+            }
+            assert!(!estimator.fault());
+        }
+    }
+}
+
+#[test]
+fn a_restart_and_a_silence_keep_the_ratio() {
+    let (mut sensor, mut estimator) = (Sensor::new(0.012, 1_000.0, 4), estimator());
+    sensor.run(SETTLED_S, &mut estimator);
+    for stamp in [0, 500_000_000] {
+        sensor.stamp = stamp;
+        sensor.now += 3.0;
+        for _ in 0..60 {
+            sensor.run(1.0, &mut estimator);
+            assert!(error(&estimator, 0.012) < BAR);
+        }
+        // The sensor's clock goes on in the silence.
+        sensor.now += 10.0 * 1.012;
+        sensor.stamp += 10_000_000;
+        for _ in 0..60 {
+            sensor.run(1.0, &mut estimator);
+            assert!(error(&estimator, 0.012) < BAR);
+        }
+    }
+}
+
+#[test]
+fn an_oscillator_that_warms_up_is_followed() {
+    let (mut sensor, mut estimator) = (Sensor::new(0.01, 1_000.0, 6), estimator());
+    sensor.run(SETTLED_S, &mut estimator);
+    for second in 0..600 {
+        // 0.2 % in ten minutes.
+        sensor.off = 0.01 + 0.002 * f64::from(second) / 600.0;
+        sensor.run(1.0, &mut estimator);
+        assert!(error(&estimator, sensor.off) < BAR, "{second}");
+    }
+}
+
+/// A car that stands for five seconds and then turns at 0.3 rad/s, by a sensor that is off by a share,
+/// through a coprocessor with and without another clock. The yaw from 60 s to 160 s over that of the same rates
+/// in true time, less one; all rates, and the coprocessor.
+fn turned(off: f64, config: Config) -> (f64, Vec<AngularRate>, Coprocessor) {
+    let (mut coprocessor, mut sensor) = (Coprocessor::new(config), Sensor::new(off, 5_000.0, 8));
+    let (mut noise, mut rates, mut marks) = (Noise::new(9), Vec::new(), Vec::new());
+    for tick in 0..16_001 {
+        let (time, arrival) = sensor.sample();
+        let mut sample = idling(tick, 0.001, &mut noise);
+        if sensor.now > 8.0 {
+            sample.angular_rate[2].0 += rate(0.3).0;
+        }
+        let output = coprocessor.imu(ImuSample { time, ..sample }, arrival).expect("in time");
+        assert!(tick < 400 || output.vehicle.prompt.status == Status::Degraded, "{tick}");
+        rates.push(output.vehicle.navigation.rate);
+        if [6_000, 16_000].contains(&tick) {
+            marks.push(output.vehicle.navigation.yaw.rad());
+        }
+    }
+    let period = (1.0 + off) * PERIOD_US as f64 * 1e-6;
+    let truth: f64 = rates[6_001..].iter().map(|rate| rate.rad_per_sec() * period).sum();
+    ((marks[1] - marks[0]) / truth - 1.0, rates, coprocessor)
+}
+
+#[test]
+fn the_guard_sums_true_periods_where_there_is_another_clock() {
+    let with = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
+    for off in [-0.01, 0.01] {
+        let (by_its_own, own_rates, _) = turned(off, Config::DEFAULT);
+        let (by_the_board, rates, coprocessor) = turned(off, with);
+        println!("{off}: {by_its_own:.2e} by the sensor's clock, {by_the_board:.2e} by the board's");
+        assert!((by_its_own + off / (1.0 + off)).abs() < 1e-9, "{by_its_own}");
+        assert!(by_the_board.abs() < BAR, "{by_the_board}");
+        assert_eq!(rates, own_rates, "a rate is right whatever the clock");
+        assert_eq!((coprocessor.monitor_counters().wrong, coprocessor.monitor_counters().clock_off), (0, 0));
+    }
+}
+
+#[test]
+fn a_clock_at_fault_is_on_the_bus() {
+    let config = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
+    let (mut coprocessor, mut sensor, mut noise) =
+        (Coprocessor::new(config), Sensor::new(1.0 / 15.0, 1_000.0, 1), Noise::new(2));
+    let mut first = None;
+    for tick in 0..6_000 {
+        let (time, arrival) = sensor.sample();
+        let sample = ImuSample { time, ..idling(tick, 0.001, &mut noise) };
+        let faults = coprocessor.imu(sample, arrival).expect("in time").vehicle.navigation.faults;
+        let told = faults == faults.with(Faults::IMPLAUSIBLE);
+        first = first.or(told.then_some(tick));
+        assert!(first.is_none() || told, "for as long as it lasts");
+    }
+    assert!((900..1_100).contains(&first.expect("told")), "after ten seconds: {first:?}");
+    assert_eq!(coprocessor.monitor_counters().clock_off, 1);
+}
+
+proptest! {
+    #![proptest_config(cases(256))]
+
+    /// Any times at all: no panic, and no ratio beyond the limit.
+    #[test]
+    fn any_times_are_survived(
+        steps in prop::collection::vec((0..3_000_000u64, 0..3_000_000u64, any::<u8>()), 1..300),
+        begin in (any::<u64>(), any::<u64>()),
+    ) {
+        let mut estimator = estimator();
+        let (mut sensor, mut board) = begin;
+        for (stamp, arrival, kind) in steps {
+            (sensor, board) = match kind {
+                0 => (stamp, board.wrapping_add(arrival)),
+                1 => (sensor.wrapping_sub(stamp), board.wrapping_sub(arrival)),
+                2..100 => (sensor.wrapping_add(10_000), board.wrapping_add(arrival / 300)),
+                _ => (sensor.wrapping_add(stamp), board.wrapping_add(arrival)),
+            };
+            estimator.observe(Micros(sensor), Micros(board));
+            prop_assert!(estimator.ratio().departure_ppm() <= ClockRatioConfig::DEFAULT.limit_ppm);
+        }
+    }
+}
+
+/// The slope of two crystals is told from one only by what jitter cannot do.
+#[test]
+fn a_difference_counts_from_three_milliseconds_on() {
+    for (off_us, counts) in [(JITTER_US - 200, false), (JITTER_US + 200, true)] {
+        let off = off_us as f64 / 32e6;
+        let (mut sensor, mut estimator) = (Sensor::new(off, 0.0, 1), estimator());
+        sensor.run(SETTLED_S, &mut estimator);
+        assert_eq!(estimator.ratio() != ClockRatio::ONE, counts, "{off_us} us in 32 s");
+    }
+}

@@ -1,0 +1,317 @@
+//! The coprocessor as a caller sees it: frames, windows, lateness, and every way to use it wrongly.
+
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::align::AlignError;
+use gyronet::align::clock::ClockError;
+use gyronet::can::DataFrame;
+use gyronet::can::wheel::{WheelError, WheelReceiver, WheelSettings};
+use gyronet::can::yaw::FOG_IDS;
+use gyronet::compensate::DELAY;
+use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
+use gyronet::fog::seconds::STEPS;
+use gyronet::health::{Faults, InputCounters, Quality, Status};
+use gyronet::model::fognet::FogEstimate;
+use gyronet::model::{Estimate, SCALE_MIN};
+use gyronet::pipeline::DueWindow;
+use gyronet::sample::{FogSample, PERIOD_US, Standstill};
+use gyronet::units::{Angle, AngularRate, Micros};
+use gyronet::window::WINDOW;
+use gyronet::{Config, Coprocessor};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::idling;
+
+const NOTHING: Estimate =
+    Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 };
+/// All four wheels at 0 km/h.
+const STANDS: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
+/// Frames of a sample.
+const SET: usize = 6;
+
+fn at(tick: u64) -> Micros {
+    Micros(tick * PERIOD_US)
+}
+
+fn wheels() -> Option<WheelReceiver> {
+    Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"))
+}
+
+fn wheel_frame(data: &[u8]) -> DataFrame {
+    DataFrame::new(StandardId::new(0xAA).expect("11 bits"), data).expect("at most eight bytes")
+}
+
+fn fog(millisecond: u64) -> FogSample {
+    let increment = [None, None, Some(Angle(1_000_000 + (millisecond * 7_919 % 1_000) as i64))];
+    FogSample { time: Micros(millisecond * 1_000), span: 1_000, lost: 0, increment, temperature: None }
+}
+
+fn frames(coprocessor: &mut Coprocessor) -> Vec<DataFrame> {
+    std::iter::from_fn(|| coprocessor.next_frame()).map(|sent| sent.frame).collect()
+}
+
+/// A parked car; whoever runs the network is up to the test.
+struct Car {
+    coprocessor: Coprocessor,
+    noise: Noise,
+    tick: u64,
+}
+
+impl Car {
+    fn new(config: Config) -> Self {
+        Self { coprocessor: Coprocessor::new(config), noise: Noise::new(5), tick: 0 }
+    }
+
+    fn sample(&mut self) -> Observation {
+        let sample = idling(self.tick, 0.001, &mut self.noise);
+        self.tick += 1;
+        self.coprocessor.imu(sample, at(self.tick)).expect("in time")
+    }
+
+    /// Samples until the next window is due.
+    fn until_window(&mut self) -> DueWindow {
+        loop {
+            self.sample();
+            frames(&mut self.coprocessor);
+            if let Some(window) = self.coprocessor.window() {
+                return window;
+            }
+        }
+    }
+
+    fn counted(&self) -> InputCounters {
+        *self.coprocessor.input_counters()
+    }
+}
+
+#[test]
+fn a_sample_gives_its_frames_once_and_an_observation() {
+    let mut car = Car::new(Config::DEFAULT);
+    let observation = car.sample();
+    assert_eq!(observation.sample.map(|sample| sample.time), Some(Micros(0)));
+    assert_eq!((observation.vehicle.prompt.status, observation.wheels), (Status::Init, Standstill::Unknown));
+    let sent: Vec<_> = std::iter::from_fn(|| car.coprocessor.next_frame()).collect();
+    assert_eq!(sent.len(), SET);
+    assert!(sent.iter().all(|frame| frame.time == Micros(0)), "stamped with the sample's time");
+    assert_eq!(car.coprocessor.next_frame(), None);
+    assert_eq!(car.counted(), InputCounters::default());
+}
+
+#[test]
+fn a_window_is_handed_out_once_and_its_estimate_is_used_two_samples_later() {
+    let mut car = Car::new(Config::DEFAULT);
+    let window = car.until_window();
+    assert_eq!(car.coprocessor.window(), None);
+    car.coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
+    for sample in 1..=DELAY {
+        let status = car.sample().vehicle.prompt.status;
+        assert_eq!(status == Status::Ready, sample == DELAY, "{sample}");
+    }
+}
+
+#[test]
+fn an_estimate_for_no_window_is_an_error_and_counted() {
+    let mut car = Car::new(Config::DEFAULT);
+    let missing = |end| Err(InputError::NoWindow { end });
+    assert_eq!(car.coprocessor.deliver(3, NOTHING), missing(3), "before the first window");
+    let window = car.until_window();
+    assert_eq!(car.coprocessor.deliver(window.end + 1, NOTHING), missing(window.end + 1));
+    assert_eq!(car.coprocessor.deliver(window.end, NOTHING), Ok(()));
+    assert_eq!(car.coprocessor.deliver(window.end, NOTHING), missing(window.end), "twice");
+    let late = car.until_window();
+    for _ in 0..DELAY {
+        let _ = car.sample();
+    }
+    assert_eq!(car.coprocessor.deliver(late.end, NOTHING), missing(late.end), "its turn has passed");
+    let fog = FogEstimate { correction: Angle::ZERO, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
+    assert_eq!(car.coprocessor.deliver_fog(0, fog), missing(0));
+    assert_eq!(car.counted().unclaimed_estimates, 5);
+    assert_eq!(car.coprocessor.pipeline().counters().late, 1);
+    assert!(missing(3).is_err_and(|error: InputError| error.to_string() == "no window waits for estimate 3"));
+}
+
+#[test]
+fn a_sample_out_of_order_is_an_error_and_the_next_ones_report_a_gap() {
+    let mut car = Car::new(Config::DEFAULT);
+    for _ in 0..400 {
+        let _ = car.sample();
+    }
+    frames(&mut car.coprocessor);
+    let old = idling(300, 0.001, &mut car.noise);
+    let error = car.coprocessor.imu(old, at(car.tick)).expect_err("an old one");
+    let backwards = AlignError::Backwards { last: at(399), at: at(300) };
+    assert_eq!(error, InputError::Imu(backwards));
+    assert_eq!(frames(&mut car.coprocessor), [], "no frame is sent for it");
+    assert_eq!(car.coprocessor.pipeline().counters().misplaced, 1);
+    assert!(car.sample().vehicle.navigation.faults.contains(Faults::GAP));
+    car.coprocessor.fog(fog(10), at(car.tick)).expect("the first one");
+    let again = car.coprocessor.fog(fog(10), at(car.tick));
+    assert_eq!(again, Err(InputError::Fog(ClockError::Duplicate { at: Micros(10_000) })));
+    assert_eq!(car.coprocessor.fog_counters().misplaced, 1);
+}
+
+#[test]
+fn a_clock_that_goes_back_is_an_error_and_followed_from_there() {
+    let mut car = Car::new(Config::DEFAULT);
+    for _ in 0..400 {
+        let _ = car.sample();
+    }
+    let back = Err(InputError::ClockWentBack { by_us: 1_000_000 });
+    assert_eq!(car.coprocessor.poll(Micros(at(car.tick).0 - 1_000_000)), back);
+    assert_eq!(car.counted().clock_back, 1);
+    // 20 ms later by the clock that was set back nothing is missing yet; 30 ms later the sensor is silent.
+    let set_back = |ms: u64| Micros(at(400).0 - 1_000_000 + ms * 1_000);
+    assert_eq!(car.coprocessor.poll(set_back(20)), Ok(None));
+    assert!(matches!(car.coprocessor.poll(set_back(30)), Ok(Some(_))));
+    for time in [0, u64::MAX, 0, u64::MAX, 7] {
+        let _ = car.coprocessor.poll(Micros(time));
+        let _ = car.coprocessor.imu(idling(400, 0.001, &mut car.noise), Micros(time));
+        let _ = car.coprocessor.fog(fog(time % 1_000), Micros(time));
+        let _ = car.coprocessor.can(&wheel_frame(&STANDS), Micros(time));
+        frames(&mut car.coprocessor);
+    }
+}
+
+#[test]
+fn what_nobody_takes_is_replaced_and_counted() {
+    let mut car = Car::new(Config::DEFAULT);
+    for _ in 0..3 {
+        let _ = car.sample();
+    }
+    // Places for the frames of a sample and of a step of the fibre-optic gyro.
+    let kept = frames(&mut car.coprocessor).len();
+    assert_eq!((kept, car.counted().replaced_frames as usize), (10, 3 * SET - 10));
+    while car.counted().replaced_windows == 0 {
+        car.sample();
+    }
+    let window = car.coprocessor.window().expect("the newest one");
+    assert_eq!(u64::from(window.end), car.tick - 1, "the newest one");
+    assert_eq!(car.coprocessor.pipeline().counters().late, 1);
+}
+
+/// Samples that come faster than 100 times a second wait for the estimate that they want, until it is late.
+#[test]
+fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
+    let mut car = Car::new(Config::DEFAULT);
+    let window = car.until_window();
+    let now = at(car.tick);
+    assert!(car.coprocessor.is_ready(now), "the next sample does not want it yet");
+    let early = idling(car.tick, 0.001, &mut car.noise);
+    car.coprocessor.imu(early, now).expect("in time");
+    assert!(!car.coprocessor.is_ready(now));
+    assert!(!car.coprocessor.is_ready(Micros(now.0 + u64::from(DELAY) * PERIOD_US - 1)));
+    let mut waited = car.coprocessor.clone();
+    waited.deliver(window.end, NOTHING).expect("the window that is due");
+    assert!(waited.is_ready(now));
+    let late = Micros(now.0 + u64::from(DELAY) * PERIOD_US);
+    assert!(car.coprocessor.is_ready(late));
+    // A sensor whose samples wait is not silent.
+    assert_eq!(waited.poll(Micros(now.0 + 10)), Ok(None));
+}
+
+#[test]
+fn wheel_frames_that_are_damaged_are_errors_and_others_are_passed_over() {
+    let mut coprocessor = Coprocessor::new(Config { wheels: wheels(), ..Config::DEFAULT });
+    assert_eq!(coprocessor.can(&wheel_frame(&STANDS), at(1)), Ok(()));
+    assert_eq!(
+        coprocessor.can(&wheel_frame(&STANDS[..3]), at(1)),
+        Err(InputError::Wheels(WheelError::Short(3)))
+    );
+    let other = DataFrame::new(StandardId::new(0x123).expect("11 bits"), &[0; 8]).expect("eight bytes");
+    assert_eq!(coprocessor.can(&other, at(1)), Ok(()));
+    assert_eq!(coprocessor.input_counters().wheel_errors, 1);
+}
+
+/// With a clock of its own standstill takes half a second of that clock, with the sensor's of the samples.
+#[test]
+fn wheels_are_judged_by_the_clock_that_is_configured() {
+    for (clock, pace) in [(Clock::Outside, 1), (Clock::Outside, 10), (Clock::Sensor, 1), (Clock::Sensor, 10)]
+    {
+        let mut coprocessor = Coprocessor::new(Config { wheels: wheels(), clock, ..Config::DEFAULT });
+        let mut noise = Noise::new(5);
+        let still = (0..200).find(|tick| {
+            // Samples that come at ten times their pace.
+            let now = Micros(at(*tick).0 / pace);
+            coprocessor.can(&wheel_frame(&STANDS), now).expect("a wheel frame");
+            let observation = coprocessor.imu(idling(*tick, 0.001, &mut noise), now).expect("in time");
+            observation.wheels == Standstill::Still
+        });
+        let expected = if clock == Clock::Outside && pace == 10 { None } else { Some(50) };
+        assert_eq!(still, expected, "{clock:?} at {pace} times the pace");
+    }
+}
+
+#[test]
+fn damage_and_losses_are_reported_with_every_set() {
+    let storage = StorageFaults { damaged: true, configuration_lost: true };
+    let mut lost = Car::new(Config { storage, ..Config::DEFAULT });
+    loop {
+        let window = lost.until_window();
+        lost.coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
+        let sent = lost.sample().vehicle;
+        if sent.prompt.status == Status::Ready {
+            // No rate is better than degraded with another vehicle's configuration.
+            assert_eq!((sent.prompt.quality, sent.prompt.faults), (Quality::Degraded, Faults::STORED));
+            break;
+        }
+    }
+    let mut car = Car::new(Config::DEFAULT);
+    assert_eq!(car.sample().vehicle.navigation.faults, Faults::NONE);
+    car.coprocessor.bus(3, false);
+    assert_eq!(car.sample().vehicle.navigation.faults, Faults::BUS, "lost frames are reported once");
+    assert_eq!(car.sample().vehicle.navigation.faults, Faults::NONE);
+    car.coprocessor.bus(3, true);
+    assert_eq!(car.sample().vehicle.navigation.faults, Faults::BUS, "the controller is off the bus");
+    car.coprocessor.bus(3, false);
+    car.coprocessor.weights_damaged();
+    for _ in 0..400 {
+        assert!(car.sample().vehicle.navigation.faults.contains(Faults::STORED));
+        assert_eq!(car.coprocessor.window(), None);
+    }
+}
+
+#[test]
+fn a_fibre_optic_gyro_sends_its_own_messages_and_hands_out_its_own_windows() {
+    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
+    let (mut sent, mut windows) = (0, 0);
+    for millisecond in 1..6_000_u64 {
+        let now = Micros(millisecond * 1_000);
+        if millisecond.is_multiple_of(10) {
+            car.coprocessor.can(&wheel_frame(&STANDS), now).expect("a wheel frame");
+            car.tick = millisecond / 10 - 1;
+            car.sample();
+        }
+        car.coprocessor.fog(fog(millisecond), now).expect("in order");
+        let own = |frame: &DataFrame| {
+            FOG_IDS.iter().any(|id| frame.id() == Id::Standard(StandardId::new(*id).expect("11 bits")))
+        };
+        sent += frames(&mut car.coprocessor).iter().filter(|frame| own(frame)).count();
+        if let Some((number, window)) = car.coprocessor.fog_window() {
+            assert_eq!(window.iter().count(), STEPS);
+            windows += 1;
+            let correction = Angle(600_000_000);
+            let estimate = FogEstimate { correction, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
+            car.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
+        }
+    }
+    assert_eq!(sent, 3 * 599, "a set of three messages every 10 ms");
+    // The inertial sensor is known after three seconds, then there is a window every second.
+    assert!((1..=2).contains(&windows), "{windows}");
+    let estimate = *car.coprocessor.fog_estimate().expect("it was heard");
+    assert_eq!(estimate.faults, Faults::NONE);
+}
+
+/// An inertial sensor, or wheels, that have fallen silent are not taken for those of the gyro's step.
+#[test]
+fn a_fibre_optic_gyro_does_not_use_old_wheels() {
+    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
+    car.coprocessor.can(&wheel_frame(&STANDS), at(1)).expect("a wheel frame");
+    car.sample();
+    let mut silent = None;
+    for millisecond in 11..400_u64 {
+        car.coprocessor.fog(fog(millisecond), Micros(millisecond * 1_000)).expect("in order");
+        frames(&mut car.coprocessor);
+        let faults = car.coprocessor.fog_estimate().map_or(Faults::NONE, |estimate| estimate.faults);
+        silent = silent.or(faults.contains(Faults::WHEELS).then_some(millisecond));
+    }
+    // The last frame came at 10 ms and is good for 100 ms, though no sample of the other sensor has come since.
+    assert!(silent.is_some_and(|at| (110..=135).contains(&at)), "{silent:?}");
+}

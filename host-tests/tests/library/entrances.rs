@@ -1,0 +1,104 @@
+//! Every entrance of bytes over its corpus, and over damaged copies of it: what the fuzz targets
+//! do under coverage, for a moment and on any machine.
+
+use gyronet_host_tests::entrance::{ALL, Entrance};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::recordings::workspace;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn corpus(entrance: &Entrance) -> PathBuf {
+    workspace().join("host-tests/fuzz/corpus").join(entrance.name)
+}
+
+/// The files of a folder, by name.
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let mut files: Vec<_> = entries
+        .map(|entry| {
+            let entry = entry.expect("a file");
+            (entry.file_name().to_string_lossy().into_owned(), fs::read(entry.path()).expect("a file"))
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+/// `cargo test -p gyronet-host-tests --test library entrances -- --ignored` writes the corpus.
+#[test]
+#[ignore = "writes into the repository"]
+fn write_corpus() {
+    for entrance in &ALL {
+        let folder = corpus(entrance);
+        fs::create_dir_all(&folder).expect("a folder of the repository");
+        for (name, seed) in (entrance.seeds)() {
+            fs::write(folder.join(name), seed).expect("a file of the repository");
+        }
+    }
+}
+
+/// Beside the seeds there are only inputs that once broke something, named `found_*`.
+#[test]
+fn corpus_is_what_the_seeds_make() {
+    for entrance in &ALL {
+        let (found, kept): (Vec<_>, Vec<_>) =
+            files(&corpus(entrance)).into_iter().partition(|(name, _)| name.starts_with("found_"));
+        let mut seeds: Vec<_> =
+            (entrance.seeds)().into_iter().map(|(name, seed)| (name.to_owned(), seed)).collect();
+        seeds.sort();
+        assert!(kept == seeds, "{}: the corpus is not what write_corpus makes", entrance.name);
+        println!("{}: {} seeds, {} found", entrance.name, kept.len(), found.len());
+    }
+}
+
+#[test]
+fn each_entrance_has_a_fuzz_target() {
+    let targets: BTreeSet<String> = files(&workspace().join("host-tests/fuzz/fuzz_targets"))
+        .into_iter()
+        .map(|(name, text)| {
+            let name = name.trim_end_matches(".rs").to_owned();
+            let call = format!("run({name:?}, data)");
+            assert!(String::from_utf8_lossy(&text).contains(&call), "{name} does not {call}");
+            name
+        })
+        .collect();
+    assert_eq!(targets, ALL.iter().map(|entrance| entrance.name.to_owned()).collect());
+}
+
+#[test]
+fn damaged_copies_keep_every_promise() {
+    for entrance in &ALL {
+        let corpus = files(&corpus(entrance));
+        corpus.iter().for_each(|(_, input)| (entrance.run)(input));
+        let mut noise = Noise::new(26);
+        for _ in 0..entrance.mutations {
+            let pick = |noise: &mut Noise| &corpus[noise.int(0, corpus.len() as i64 - 1) as usize].1;
+            let mut input = pick(&mut noise).clone();
+            for _ in 0..noise.int(1, 4) {
+                let other = pick(&mut noise);
+                damage(&mut input, other, &mut noise);
+            }
+            (entrance.run)(&input);
+        }
+    }
+}
+
+/// One change, of the kinds that a line, a disk or a stranger makes.
+fn damage(input: &mut Vec<u8>, other: &[u8], noise: &mut Noise) {
+    let at = noise.int(0, input.len() as i64) as usize;
+    match noise.int(0, 6) {
+        0 => input.truncate(at),
+        1 => input.insert(at, noise.byte()),
+        2 => drop(input.splice(at.., other[at.min(other.len())..].iter().copied())),
+        3 => input.extend_from_within(at..),
+        kind => {
+            let Some(byte) = input.get_mut(at) else { return };
+            *byte = match kind {
+                4 => *byte ^ 1 << noise.int(0, 7),
+                5 => [0, 0xFF, 0x7F, 0x80, b'9', b'-', b'\n'][noise.int(0, 6) as usize],
+                _ => noise.byte(),
+            };
+        }
+    }
+}

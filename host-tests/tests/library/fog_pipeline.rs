@@ -1,0 +1,171 @@
+//! A fibre-optic gyro's messages: what they say of its correction, of gaps, and of what is missing.
+
+use gyronet::estimate::YawEstimate;
+use gyronet::fog::FogConfig;
+use gyronet::fog::FogPipeline;
+use gyronet::health::{Faults, Quality, Source};
+use gyronet::model::fognet::FogEstimate;
+use gyronet::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
+use gyronet::units::{Angle, Micros, WheelSpeed, Yaw};
+
+/// Codes that the gyro turns in 10 ms.
+const TURN: i64 = 1 << 40;
+const NOTHING: FogEstimate =
+    FogEstimate { correction: Angle(600_000_000), linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
+
+fn sample(step: u64) -> FogSample {
+    FogSample {
+        time: Micros(step * PERIOD_US),
+        span: PERIOD_US as u32,
+        lost: 0,
+        // It has noise.
+        increment: [None, None, Some(Angle(TURN + (step % 2) as i64))],
+        temperature: None,
+    }
+}
+
+fn wheels() -> WheelSample {
+    WheelSample { time: Micros(0), speeds: [Some(WheelSpeed(1_000)); 4], standstill: Standstill::Moving }
+}
+
+/// Steps of 10 ms; `with` says whether the gyro sends in one. What is due is answered at once.
+fn run(fog: &mut FogPipeline, steps: core::ops::Range<u64>, with: impl Fn(u64) -> bool) -> Vec<YawEstimate> {
+    let mut sent = Vec::new();
+    for step in steps {
+        let now = Micros(step * PERIOD_US);
+        if with(step) {
+            fog.push(now, sample(step)).expect("in order");
+        }
+        while let Some(yaw) = fog.next_step(now, Some([0; 6]), Some(&wheels())) {
+            sent.push(yaw);
+        }
+        if let Some((number, _)) = fog.window() {
+            fog.deliver(number, NOTHING);
+        }
+    }
+    sent
+}
+
+#[test]
+fn corrected_when_an_estimate_is_in_use() {
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    let sent = run(&mut fog, 1..401, |_| true);
+    assert_eq!(sent.len(), 400);
+    // A window after the first second, its estimate after the second one.
+    let first = sent.iter().position(|yaw| yaw.source == Source::FogNet);
+    assert_eq!(first, Some(200));
+    assert!(sent[..200].iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Raw, Quality::Degraded)));
+    assert!(sent[200..].iter().all(|yaw| yaw.quality == Quality::Good && yaw.faults == Faults::NONE));
+    // The yaw is the sum of the rates.
+    let sum = sent.iter().map(|yaw| i64::from(yaw.rate.0)).sum::<i64>();
+    assert_eq!(sent[399].yaw, Yaw(sum));
+    assert_eq!((fog.counters().windows, fog.counters().late, fog.counters().gaps), (3, 0, 0));
+}
+
+#[test]
+fn a_gap_is_no_rate_and_ends_the_window() {
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    let sent = run(&mut fog, 1..501, |step| !(301..306).contains(&step));
+    let gap: Vec<_> = sent.iter().filter(|yaw| yaw.quality == Quality::Unusable).collect();
+    assert!((5..=6).contains(&gap.len()), "{}", gap.len());
+    assert!(gap.iter().all(|yaw| yaw.faults.0 & Faults::GAP.0 != 0 && yaw.rate.0 == 0));
+    // Not by the estimate from before it.
+    let behind = sent.iter().rposition(|yaw| yaw.quality == Quality::Unusable).expect("a gap") + 1;
+    assert_eq!(sent[behind].source, Source::Raw);
+    assert!(fog.counters().broken > 0);
+}
+
+#[test]
+fn a_gyro_that_says_the_same_is_stuck() {
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    let mut sent = run(&mut fog, 1..301, |_| true);
+    // From step 301 on it repeats what it said in step 300.
+    for step in 301..351 {
+        let repeated = FogSample { time: Micros(step * PERIOD_US), ..sample(300) };
+        fog.push(Micros(step * PERIOD_US), repeated).expect("in order");
+        let yaw = fog.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
+        sent.push(yaw);
+    }
+    sent.extend(run(&mut fog, 351..700, |_| true));
+    let stuck = |yaw: &YawEstimate| yaw.faults.0 & Faults::STUCK.0 != 0;
+    // The fifth equal turn is that of step 304; step 351 differs.
+    assert_eq!(sent.iter().position(stuck), Some(303));
+    assert_eq!(sent.iter().rposition(stuck), Some(349));
+    let during = &sent[303..350];
+    assert!(during.iter().all(|yaw| stuck(yaw) && yaw.quality == Quality::Unusable && yaw.rate.0 == 0));
+    // The window has to begin anew.
+    assert_eq!((sent[350].source, sent[350].quality), (Source::Raw, Quality::Degraded));
+    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
+    assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
+}
+
+/// On the grid equal increments have unequal sums, because one that straddles two steps is split and rounded: a clock
+/// that is off must not hide that they are equal.
+#[test]
+fn a_stuck_gyro_is_found_while_its_clock_drifts() {
+    for ppm in [-20_000_i64, -137, 0, 137, 20_000] {
+        let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+        let (mut first, mut sent) = (None, 0);
+        for millisecond in 1..=1_000_u64 {
+            let now = Micros(millisecond * 1_000);
+            let stamp = (now.0 as i64 + now.0 as i64 * ppm / 1_000_000) as u64;
+            let noise = if millisecond < 500 { millisecond as i64 * 7_919 % 1_000 } else { 0 };
+            let increment = [None, None, Some(Angle(TURN / 10 + noise))];
+            let reading = FogSample { time: Micros(stamp), span: 1_000, increment, ..sample(0) };
+            fog.push(now, reading).expect("in order");
+            while let Some(yaw) = fog.next_step(now, Some([0; 6]), Some(&wheels())) {
+                sent += 1;
+                let stuck = yaw.faults.contains(Faults::STUCK);
+                assert!(first.is_none() || stuck, "{ppm} ppm: for as long as it lasts");
+                first = first.or(stuck.then_some(millisecond));
+            }
+        }
+        assert!(sent > 95, "{ppm} ppm: {sent} steps");
+        // The tenth repetition is that of 510 ms; the step that holds it is sent within 20 ms.
+        assert!(first.is_some_and(|first| (510..=530).contains(&first)), "{ppm} ppm: {first:?}");
+    }
+}
+
+#[test]
+fn a_gyro_that_is_expected_is_missed_from_the_start() {
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    assert_eq!(run(&mut fog, 0..101, |_| false), []);
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    fog.expect(Micros(0));
+    let sent = run(&mut fog, 0..501, |step| step > 100);
+    // Step 0 is due 10 ms on; each of silence is no rate.
+    assert_eq!(sent.len(), 501);
+    let silent = sent.iter().take_while(|yaw| yaw.quality == Quality::Unusable).count();
+    assert!((100..=102).contains(&silent), "{silent}");
+    assert!(sent[..silent].iter().all(|yaw| yaw.faults.0 & Faults::GAP.0 != 0 && yaw.rate.0 == 0));
+    // Then all is as if it had been heard from the start.
+    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
+    assert_eq!(fog.counters().gaps as usize, silent);
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, false);
+    let sent = run(&mut fog, 1..301, |_| true);
+    assert!(sent.iter().all(|yaw| yaw.source == Source::Raw && yaw.faults == Faults::STORED));
+    assert!(fog.window().is_none());
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    fog.push(Micros(PERIOD_US), sample(1)).expect("the first one");
+    let yaw = fog.next_step(Micros(PERIOD_US), Some([0; 6]), None).expect("a step");
+    assert_eq!(yaw.faults, Faults::WHEELS);
+    // Nobody runs the window in time.
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    let mut late = 0;
+    for step in 1..251 {
+        fog.push(Micros(step * PERIOD_US), sample(step)).expect("in order");
+        let yaw = fog.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
+        late += u32::from(yaw.faults == Faults::LATE && yaw.source == Source::Raw);
+    }
+    assert_eq!((late, fog.counters().late), (51, 1));
+}
+
+#[test]
+fn nothing_is_sent_of_a_gyro_that_was_never_heard() {
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    assert!(run(&mut fog, 1..101, |_| false).is_empty());
+}

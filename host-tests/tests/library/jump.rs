@@ -1,0 +1,161 @@
+//! Readings that no vehicle can have: limits to the code, how long a reading is refused, and what goes
+//! out meanwhile.
+
+use gyronet::coprocessor::{Config, Coprocessor, Observation};
+use gyronet::health::{Faults, Quality, Status};
+use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::units::{AngularRate, Micros, SpecificForce};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::idling;
+
+/// 1 rad/s in codes of 2^-27 rad/s.
+const RATE_LIMIT: i32 = 134_217_728;
+/// 30 m/s^2 in codes of 2^-20 m/s^2.
+const FORCE_LIMIT: i32 = 31_457_280;
+
+/// A vehicle that stands with its engine running, past static initialisation.
+struct Drive {
+    coprocessor: Coprocessor,
+    noise: Noise,
+    tick: u64,
+    last: ImuSample,
+}
+
+impl Drive {
+    fn new() -> Self {
+        let (mut coprocessor, mut noise) = (Coprocessor::new(Config::DEFAULT), Noise::new(7));
+        let mut last = idling(0, 0.001, &mut noise);
+        for tick in 0..400 {
+            last = idling(tick, 0.001, &mut noise);
+            coprocessor.imu(last, Micros(last.time.0)).expect("in time");
+        }
+        assert_eq!(coprocessor.monitor_counters().wrong, 0, "no reading of an idling engine is doubted");
+        Self { coprocessor, noise, tick: 399, last }
+    }
+
+    /// The next sample: the last one that was believed, with one axis off by some codes.
+    fn off_by(&mut self, axis: usize, codes: i32) -> Observation {
+        let mut sample = self.last;
+        match axis {
+            0..3 => sample.angular_rate[axis].0 += codes,
+            _ => sample.specific_force[axis - 3].0 += codes,
+        }
+        self.send(sample)
+    }
+
+    /// A sample of the idling engine.
+    fn idle(&mut self) -> Observation {
+        let sample = idling(self.tick + 1, 0.001, &mut self.noise);
+        self.last = sample;
+        self.send(sample)
+    }
+
+    fn send(&mut self, sample: ImuSample) -> Observation {
+        self.tick += 1;
+        let time = Micros(self.tick * PERIOD_US);
+        self.coprocessor.imu(ImuSample { time, ..sample }, time).expect("in time")
+    }
+}
+
+/// Nobody runs the network here, so every window is late.
+fn without_late(faults: Faults) -> Faults {
+    Faults(faults.0 & !Faults::LATE.0)
+}
+
+/// The sample has no rate, and says why.
+fn assert_refused(output: &Observation, why: &str) {
+    assert_eq!(output.vehicle.prompt.status, Status::Clipped, "{why}");
+    assert_eq!(output.vehicle.prompt.quality, Quality::Unusable, "{why}");
+    let faults = output.vehicle.navigation.faults;
+    assert_eq!(without_late(faults), Faults::IMPLAUSIBLE, "{why}");
+}
+
+fn assert_believed(output: &Observation, why: &str) {
+    assert_eq!(output.vehicle.prompt.status, Status::Degraded, "{why}");
+    assert_eq!(output.vehicle.prompt.quality, Quality::Degraded, "{why}");
+    assert_eq!(without_late(output.vehicle.navigation.faults), Faults::NONE, "{why}");
+}
+
+#[test]
+fn a_step_of_the_limit_is_believed_and_one_code_more_is_not() {
+    for axis in 0..6 {
+        let limit = if axis < 3 { RATE_LIMIT } else { FORCE_LIMIT };
+        for sign in [1, -1] {
+            let why = format!("axis {axis}, sign {sign}");
+            let mut drive = Drive::new();
+            assert_believed(&drive.off_by(axis, sign * limit), &why);
+            assert_eq!(drive.coprocessor.monitor_counters().wrong, 0, "{why}");
+            let mut drive = Drive::new();
+            assert_refused(&drive.off_by(axis, sign * (limit + 1)), &why);
+            assert_eq!(drive.coprocessor.monitor_counters().wrong, 1, "{why}");
+        }
+    }
+}
+
+#[test]
+fn the_fourth_reading_in_a_row_is_believed_wherever_it_is() {
+    for axis in [2, 5] {
+        let limit = if axis < 3 { RATE_LIMIT } else { FORCE_LIMIT };
+        let mut drive = Drive::new();
+        for number in 1..=3 {
+            assert_refused(&drive.off_by(axis, limit + 100 * number), &format!("reading {number}"));
+        }
+        assert_believed(&drive.off_by(axis, limit + 400), "reading 4");
+        assert_eq!(drive.coprocessor.monitor_counters().wrong, 3);
+        // Others are held against this one from there on.
+        assert_refused(&drive.off_by(axis, 399), "a limit and a code away");
+        assert_believed(&drive.off_by(axis, 400), "a limit away");
+        assert_eq!(drive.coprocessor.monitor_counters().wrong, 4);
+    }
+}
+
+#[test]
+fn a_reading_near_the_last_good_one_ends_it() {
+    let mut drive = Drive::new();
+    for _ in 0..2 {
+        assert_refused(&drive.off_by(2, 4 * RATE_LIMIT), "off");
+        assert_refused(&drive.off_by(2, -4 * RATE_LIMIT), "off, the other way");
+        assert_believed(&drive.off_by(2, 1_000), "near the one before");
+    }
+    assert_eq!(drive.coprocessor.monitor_counters().wrong, 4);
+}
+
+#[test]
+fn a_refused_reading_is_not_what_the_next_one_is_held_against() {
+    let mut drive = Drive::new();
+    assert_refused(&drive.off_by(2, 2 * RATE_LIMIT), "two limits off");
+    // One limit from the refused one, two from the last that was believed.
+    assert_refused(&drive.off_by(2, 2 * RATE_LIMIT + 1), "two limits and a code off");
+    assert_believed(&drive.off_by(2, RATE_LIMIT), "one limit off");
+}
+
+/// After 50 ms without a sample the last reading says nothing of the next.
+#[test]
+fn across_a_gap_any_reading_is_believed() {
+    for (missing, refused) in [(4, true), (5, false)] {
+        let mut drive = Drive::new();
+        drive.tick += missing;
+        let output = drive.off_by(2, 2 * RATE_LIMIT);
+        assert_eq!(output.vehicle.prompt.status == Status::Clipped, refused, "{missing} samples missing");
+        assert_eq!(drive.coprocessor.monitor_counters().wrong, u32::from(refused));
+        assert_eq!(output.vehicle.navigation.faults.with(Faults::GAP), output.vehicle.navigation.faults);
+    }
+}
+
+/// A rate that is not believed is not integrated as a rate that looks right: the navigation rate of that
+/// very sample, which goes out seven samples later, has no quality either.
+#[test]
+fn the_navigation_rate_of_a_refused_reading_is_unusable() {
+    let mut drive = Drive::new();
+    let jump = drive.off_by(2, 2 * RATE_LIMIT).vehicle.prompt.tick;
+    let unusable =
+        (0..12).map(|_| drive.idle()).filter(|out| out.vehicle.navigation.quality == Quality::Unusable);
+    assert_eq!(unusable.map(|output| output.vehicle.navigation.tick).collect::<Vec<_>>(), [jump]);
+}
+
+/// The limits in physical units, by the types' own conversion.
+#[test]
+fn limits_in_physical_units() {
+    assert_eq!(AngularRate::from_rad_per_sec(1.0), Ok(AngularRate(RATE_LIMIT)));
+    assert_eq!(SpecificForce::from_metre_per_sec2(30.0), Ok(SpecificForce(FORCE_LIMIT)));
+}

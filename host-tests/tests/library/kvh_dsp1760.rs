@@ -1,0 +1,306 @@
+//! KVH DSP-1760: recorded and constructed frames, damage, lost messages, commands.
+
+use gyronet::sample::FogSample;
+use gyronet::sensor::ByteSource;
+use gyronet::sensor::crc::CRC_32_MPEG_2;
+use gyronet::sensor::dsp1760::command::{Command, Reply, setup};
+use gyronet::sensor::dsp1760::message::{Extra, Format, Message, MessageError, Validity};
+use gyronet::sensor::dsp1760::{
+    AngleUnit, Dsp1760, Dsp1760Config, Dsp1760Error, OutputRate, Rotation, TemperatureUnit,
+};
+use gyronet::units::{Angle, CentiCelsius, Micros};
+use proptest::prelude::*;
+
+/// Of a real part.
+const RECORDED: &str = "FE81FF55 BC646C1E 3C3FF981 3B3C1E78 BC065FB7 BB2FBD79 3F7E9800 77470014 168D8B1D";
+const PLUS_10_DPS: &str = "fe81ff55 0000000000000000 393702d3 000000000000000000000000 07000019 ce6fb608";
+const MINUS_10_DPS: &str = "fe81ff55 0000000000000000 b93702d3 000000000000000000000000 037ffffb 09a87f88";
+const HUNDREDTHS: &str = "fe81ff55 0000000000000000 3727c5ac 000000000000000000000000 070509e6 e161f0f6";
+const HUNDREDTHS_Z_BAD: &str =
+    "fe81ff55 0000000000000000 3727c5ac 000000000000000000000000 030509e6 9d94bcf3";
+const TIMED: &str = "fe81ff56 0000000000000000 379268A8 0000000000000000 3f800000 075bcd15 77010019 5d9c71b2";
+
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits: Vec<u8> = hex.bytes().filter(u8::is_ascii_hexdigit).collect();
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).expect("ascii"), 16).expect("hex");
+    digits.chunks(2).map(byte).collect()
+}
+
+fn feed(part: &mut Dsp1760, bytes: &[u8]) -> Vec<Result<FogSample, Dsp1760Error>> {
+    let mut samples = Vec::new();
+    for byte in bytes {
+        part.push(*byte);
+        samples.extend(std::iter::from_fn(|| part.next_sample()));
+    }
+    samples
+}
+
+fn feed_new(bytes: &[u8]) -> Vec<Result<FogSample, Dsp1760Error>> {
+    feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), bytes)
+}
+
+fn message(sequence: u8, z: f32) -> Message {
+    Message {
+        rotation: [0.0, 0.0, z],
+        acceleration: [0.0; 3],
+        extra: Extra::Temperature(25),
+        validity: Validity::GYRO,
+        sequence,
+    }
+}
+
+#[test]
+fn recorded_frame() {
+    let raw = bytes(RECORDED);
+    let message = Message::parse(&raw).expect("it is intact");
+    assert_eq!(message.rotation, [-0.013_941_793, 0.011_717_201, 0.002_870_468_4]);
+    assert_eq!(message.acceleration, [-0.008_201_531, -0.002_681_581_5, 0.994_506_84]);
+    assert_eq!(message.validity, Validity::ALL);
+    assert_eq!((message.sequence, message.extra), (71, Extra::Temperature(20)));
+    assert_eq!(message.emit()[..], raw[..]);
+}
+
+#[test]
+fn constructed_frames() {
+    let ten = f32::from_bits(0x3937_02d3);
+    let slow = Message { extra: Extra::Temperature(2534), ..message(5, f32::from_bits(0x3727_c5ac)) };
+    let cold = Message { extra: Extra::Temperature(-5), validity: Validity(3), ..message(127, -ten) };
+    let timed = Message {
+        acceleration: [0.0, 0.0, 1.0],
+        extra: Extra::Timed { time: 123_456_789, temperature: 25 },
+        validity: Validity::ALL,
+        ..message(1, f32::from_bits(0x3792_68A8))
+    };
+    let made = [
+        (PLUS_10_DPS, message(0, ten)),
+        (MINUS_10_DPS, cold),
+        (HUNDREDTHS, slow),
+        (HUNDREDTHS_Z_BAD, Message { validity: Validity(3), ..slow }),
+        (TIMED, timed),
+    ];
+    for (hex, message) in made {
+        assert_eq!(Message::parse(&bytes(hex)), Ok(message), "{hex}");
+        assert_eq!(message.emit()[..], bytes(hex), "{hex}");
+    }
+}
+
+#[test]
+fn samples_carry_angle_time_and_temperature() {
+    let z = Angle::from_rad(f32::from_bits(0x3937_02d3)).expect("finite");
+    // 10 deg/s for a millisecond, to a part in 2^24.
+    assert!((z.rad() - 0.01f64.to_radians()).abs() < 1e-11);
+    let first = FogSample {
+        time: Micros(1_000),
+        span: 1_000,
+        lost: 0,
+        increment: [Some(Angle(0)), Some(Angle(0)), Some(z)],
+        temperature: Some(CentiCelsius(2_500)),
+    };
+    assert_eq!(feed_new(&bytes(PLUS_10_DPS)), [Ok(first)]);
+    // The number before 0 is 127: two frames in that order are one step apart.
+    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let samples = feed(part, &[bytes(MINUS_10_DPS), bytes(PLUS_10_DPS)].concat());
+    let invalid = samples[0].expect("a sample");
+    assert_eq!((invalid.increment[2], invalid.temperature), (None, Some(CentiCelsius(-500))));
+    assert_eq!(samples[1..], [Ok(FogSample { time: Micros(2_000), ..first })]);
+    assert_eq!((part.counters().gaps, part.counters().lost, part.bad_checksums()), (0, 0, 0));
+    assert_eq!(feed_new(&bytes(TIMED))[0].map(|sample| sample.time), Ok(Micros(123_456_789)));
+}
+
+#[test]
+fn there_are_three_axes() {
+    let good = |axis| (Validity(0xFF).gyro(axis), Validity(0xFF).accelerometer(axis));
+    assert_eq!([0, 1, 2, 3].map(good), [(true, true), (true, true), (true, true), (false, false)]);
+    let bad = |axis| (Validity(0).gyro(axis), Validity(0).accelerometer(axis));
+    assert_eq!([0, 1, 2].map(bad), [(false, false); 3]);
+}
+
+#[test]
+fn resynchronises() {
+    let (recorded, other) = (bytes(RECORDED), bytes(PLUS_10_DPS));
+    let false_start = [0xFE, 0x81, 0xFE, 0x81, 0xFF];
+    for before in [&false_start[..], &other[16..], &[&false_start, &other[16..]].concat()] {
+        assert_eq!(feed_new(&[before, &recorded].concat()), feed_new(&recorded), "after {before:02x?}");
+    }
+    // A damaged frame is a candidate whose checksum does not fit.
+    let mut damaged = other.clone();
+    damaged[20] ^= 1;
+    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    assert_eq!(feed(part, &[&damaged[..], &damaged, &recorded].concat()).len(), 1);
+    assert_eq!((part.bad_checksums(), ByteSource::bad_checksums(part)), (2, 2));
+    // A header inside the payload: an acceleration whose bits are FE 81 FF 55.
+    let hidden = Message { acceleration: [f32::from_bits(0xFE81_FF55), 0.0, 0.0], ..message(3, 1e-5) }.emit();
+    assert_eq!(feed_new(&[&hidden[10..], &hidden[..], &recorded[..]].concat()).len(), 2);
+}
+
+#[test]
+fn self_tests_are_passed_over() {
+    let short = bytes("FE8100AA 7F7F7F7F7F7F 55");
+    let long = bytes("FE8100AB 7F7F7F7F7F7F7F7F 55");
+    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let stream = [&short[..], &bytes(RECORDED), &long, &bytes(PLUS_10_DPS), &short].concat();
+    assert_eq!(feed(part, &stream).len(), 2);
+    assert_eq!(part.counters().self_tests, 3);
+    // One that is cut off must not take the frame behind it along.
+    for cut in 1..short.len() {
+        let stream = [&short[..cut], &bytes(RECORDED)].concat();
+        assert_eq!(feed_new(&stream).len(), 1, "cut after {cut} bytes");
+    }
+}
+
+#[test]
+fn lost_and_repeated_messages() {
+    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let mut take = |sequence| feed(part, &message(sequence, 1e-6).emit())[0].map(|s| (s.time.0, s.lost));
+    assert_eq!(take(126), Ok((1_000, 0)));
+    assert_eq!(take(127), Ok((2_000, 0)));
+    assert_eq!(take(2), Ok((5_000, 2)));
+    assert_eq!(take(2), Err(Dsp1760Error::Repeated { sequence: 2 }));
+    assert_eq!(take(3), Ok((6_000, 0)));
+    let counters = part.counters();
+    assert_eq!((counters.gaps, counters.lost, counters.repeated), (1, 2, 1));
+}
+
+#[test]
+fn a_number_that_is_none_is_not_valid() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let made = Message { rotation: [1e-6, bad, 1e-6], validity: Validity::ALL, ..message(0, 0.0) };
+        assert_eq!(Message::parse(&made.emit()).expect("intact").validity, Validity(0x75));
+        assert_eq!(feed_new(&made.emit())[0].expect("a sample").increment[1], None);
+        let made = Message { acceleration: [0.0, 0.0, bad], validity: Validity::ALL, ..message(0, 0.0) };
+        assert_eq!(Message::parse(&made.emit()).expect("intact").validity, Validity(0x37));
+    }
+    // Faster than anything turns: 1 rad in a millisecond.
+    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    assert_eq!(feed(part, &message(0, 1.0).emit())[0].expect("a sample").increment[2], None);
+    assert_eq!(part.counters().implausible, 1);
+}
+
+#[test]
+fn units() {
+    let expected = 10f64.to_radians() * 1e-3;
+    for (rotation, angle, value) in [
+        (Rotation::Delta, AngleUnit::Radians, expected),
+        (Rotation::Delta, AngleUnit::Degrees, 0.01),
+        (Rotation::Rate, AngleUnit::Radians, 10f64.to_radians()),
+        (Rotation::Rate, AngleUnit::Degrees, 10.0),
+    ] {
+        let temperature = TemperatureUnit::Hundredths;
+        let config = Dsp1760Config { rotation, angle, temperature, ..Dsp1760Config::DEFAULT };
+        let made = Message { extra: Extra::Temperature(2534), ..message(0, value as f32) };
+        let sample = feed(&mut Dsp1760::new(config), &made.emit())[0].expect("a sample");
+        assert_eq!(sample.temperature, Some(CentiCelsius(2534)));
+        let got = sample.increment[2].expect("valid").rad();
+        // A few roundings of f32.
+        assert!((got / expected - 1.0).abs() < 3.0 * f64::from(f32::EPSILON), "{rotation:?} {angle:?} {got}");
+    }
+}
+
+#[test]
+fn time_stamps_wrap_and_750_messages_fill_a_second() {
+    let timed = |sequence, time| {
+        Message { extra: Extra::Timed { time, temperature: 0 }, ..message(sequence, 0.0) }.emit()
+    };
+    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    feed(part, &timed(0, u32::MAX - 499));
+    let after = feed(part, &timed(1, 500))[0].expect("a sample");
+    assert_eq!(after.time, Micros(u64::from(u32::MAX) + 501));
+    let rate = OutputRate::new(750).expect("offered");
+    let part = &mut Dsp1760::new(Dsp1760Config { rate, ..Dsp1760Config::DEFAULT });
+    let stream: Vec<u8> = (0..750u16).flat_map(|n| message((n % 128) as u8, 0.0).emit()).collect();
+    let samples = feed(part, &stream);
+    assert_eq!(samples.last().expect("750 samples").expect("a sample").time, Micros(1_000_000));
+    assert_eq!(samples.iter().map(|s| s.expect("a sample").span).sum::<u32>(), 1_000_000);
+}
+
+#[test]
+fn errors_say_where() {
+    let mut frame = bytes(RECORDED);
+    assert_eq!(Message::parse(&frame[1..]), Err(MessageError::Header));
+    assert_eq!(Message::parse(&frame[..35]), Err(MessageError::Length { got: 35, expected: 36 }));
+    frame[35] ^= 1;
+    let error = Message::parse(&frame).expect_err("damaged");
+    assert_eq!(error, MessageError::Crc { computed: 0x168D_8B1D, stored: 0x168D_8B1C });
+    assert_eq!(error.to_string(), "DSP-1760: CRC 168d8b1d, but the message carries 168d8b1c");
+    let mut frame = bytes(RECORDED);
+    frame[29] = 128;
+    let crc = CRC_32_MPEG_2.checksum(&frame[..32]);
+    frame[32..].copy_from_slice(&crc.to_be_bytes());
+    assert_eq!(Message::parse(&frame), Err(MessageError::Sequence { got: 128 }));
+}
+
+#[test]
+fn crc_has_its_check_value() {
+    assert_eq!(CRC_32_MPEG_2.checksum(b"123456789"), 0x0376_E6E7);
+    assert_eq!(CRC_32_MPEG_2.checksum(&bytes(RECORDED)), 0);
+}
+
+#[test]
+fn commands() {
+    let config = Dsp1760Config { temperature: TemperatureUnit::Hundredths, ..Dsp1760Config::DEFAULT };
+    let lines: Vec<_> = setup(&config).iter().map(|command| command.emit().to_string()).collect();
+    assert_eq!(lines, ["=config,1\n", "=dr,1000\n", "=rotfmt,delta\n", "=tempunits,C_100\n", "=config,0\n"]);
+    let every = [
+        Command::Configure(true),
+        Command::Configure(false),
+        Command::Rotation(Rotation::Delta),
+        Command::Rotation(Rotation::Rate),
+        Command::ResetRotation,
+        Command::Temperature(TemperatureUnit::Whole),
+        Command::Temperature(TemperatureUnit::Hundredths),
+        Command::QueryRate,
+    ];
+    let rates = OutputRate::OFFERED.map(|hertz| Command::Rate(OutputRate::new(hertz).expect("offered")));
+    for command in every.into_iter().chain(rates) {
+        assert_eq!(Command::parse(command.emit().as_bytes()), Some(command));
+    }
+    assert_eq!(Command::parse(b"=dr,999\n"), None);
+    assert_eq!(Reply::parse(b"DR,1000\r\n"), Some(Reply::Rate(OutputRate::HZ_1000)));
+    assert_eq!(Reply::Rate(OutputRate::HZ_1000).emit(), "DR,1000\r\n");
+    assert_eq!(Reply::parse(b"DR,1001"), None);
+}
+
+/// A message with any readings, finite ones so that it compares.
+fn any_message() -> impl Strategy<Value = Message> {
+    let reading = || prop::num::f32::NORMAL | prop::num::f32::ZERO;
+    let extra = prop_oneof![
+        any::<i16>().prop_map(Extra::Temperature),
+        (any::<u32>(), any::<i16>()).prop_map(|(time, temperature)| Extra::Timed { time, temperature }),
+        reading().prop_map(Extra::Slow),
+    ];
+    (prop::array::uniform3(reading()), prop::array::uniform3(reading()), extra, any::<u8>(), 0..128u8)
+        .prop_map(|(rotation, acceleration, extra, validity, sequence)| Message {
+            rotation,
+            acceleration,
+            extra,
+            validity: Validity(validity),
+            sequence,
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn round_trip(message in any_message()) {
+        let frame = message.emit();
+        prop_assert_eq!(Format::of(frame[..4].try_into().unwrap()), Some(message.format()));
+        prop_assert_eq!(Message::parse(&frame), Ok(message));
+    }
+
+    /// A CRC of 32 bits finds every single flipped bit.
+    #[test]
+    fn damage_is_refused(message in any_message()) {
+        let frame = message.emit();
+        for length in 0..frame.len() {
+            prop_assert!(Message::parse(&frame[..length]).is_err());
+            prop_assert!(feed_new(&frame[..length]).is_empty());
+        }
+        for bit in 0..frame.len() * 8 {
+            let mut damaged = frame.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            prop_assert!(Message::parse(&damaged).is_err(), "bit {}", bit);
+            prop_assert!(feed_new(&damaged).is_empty(), "bit {}", bit);
+        }
+    }
+}

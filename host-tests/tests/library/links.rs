@@ -1,0 +1,65 @@
+//! Every link inside the repository's pages leads to a file and, where it names one, to a heading.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const PAGES: [&str; 10] = [
+    "README.md",
+    "CHANGELOG.md",
+    "host-tests/README.md",
+    "host-tests/board/README.md",
+    "host-tests/board/PERIPHERALS.md",
+    "src/bin/README.md",
+    "src/bin/PORTING.md",
+    "tools/README.md",
+    "tools/MEASUREMENTS.md",
+    "tools/train/README.md",
+];
+
+#[test]
+fn no_link_is_dead() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut seen = 0;
+    for page in PAGES {
+        let path = root.join(page);
+        for link in links(&fs::read_to_string(&path).unwrap()) {
+            if link.starts_with("http") {
+                continue;
+            }
+            let (file, heading) = link.split_once('#').unwrap_or((&link, ""));
+            let target = if file.is_empty() { path.clone() } else { path.with_file_name("").join(file) };
+            assert!(target.exists(), "{page}: {link} leads nowhere");
+            assert!(
+                heading.is_empty() || headings(&target).iter().any(|h| h == heading),
+                "{page}: no {link}"
+            );
+            seen += 1;
+        }
+    }
+    assert!(seen > 10, "{seen} links found in all pages: are they read at all?");
+}
+
+/// What stands in the round brackets of `[text](link)`.
+fn links(text: &str) -> Vec<String> {
+    text.split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split_once(')'))
+        .map(|(link, _)| link.to_owned())
+        .collect()
+}
+
+/// The headings of a page, as a browser of repositories makes anchors of them.
+fn headings(page: &PathBuf) -> Vec<String> {
+    let text = fs::read_to_string(page).unwrap();
+    text.lines()
+        .filter(|line| line.starts_with('#'))
+        .map(|line| {
+            let title = line.trim_start_matches('#').trim().to_lowercase();
+            title
+                .chars()
+                .filter(|c| c.is_alphanumeric() || " -_".contains(*c))
+                .collect::<String>()
+                .replace(' ', "-")
+        })
+        .collect()
+}

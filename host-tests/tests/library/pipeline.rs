@@ -1,0 +1,238 @@
+//! The pipeline on made-up streams: status from initialisation to a corrected rate, and what a
+//! gap, clipping, motion or a jumping clock does to it.
+
+use gyronet::compensate::{CompensateConfig, DELAY};
+use gyronet::estimate::VehicleSample;
+use gyronet::health::Status::{Clipped, Degraded, Init, Ready};
+use gyronet::health::{Faults, Quality, judge};
+use gyronet::pipeline::Output;
+use gyronet::sample::{ImuSample, Validity};
+use gyronet::units::AngularRate;
+use gyronet::window::WINDOW;
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::stream::{KNOWN, constant, drive, faults, new, run, statuses};
+use gyronet_host_tests::synthetic::{rate, turning};
+
+/// First tick that a window covers: ten samples, then the delay.
+const COVERED: u64 = KNOWN + WINDOW as u64 - 1 + DELAY as u64;
+
+#[test]
+fn init_then_degraded_then_ready() {
+    let mut pipeline = new();
+    let outputs = run(&mut pipeline, drive(0..400), constant(0.002));
+    assert_eq!(
+        statuses(&outputs),
+        [(Init, 300), (Degraded, (COVERED - KNOWN) as usize), (Ready, 400 - COVERED as usize)]
+    );
+    assert_eq!(pipeline.gyro_bias(), Some([AngularRate(0), AngularRate(0), rate(0.001)]));
+    let at = |tick: u64| outputs[tick as usize].vehicle.prompt;
+    assert_eq!((at(0).rate, at(299).yaw.0), (rate(0.001), 0), "raw, and nothing summed yet");
+    let less_bias = AngularRate(rate(0.25).0 - rate(0.001).0);
+    assert_eq!(at(COVERED - 1).rate, less_bias);
+    assert_eq!(at(399).rate, AngularRate(less_bias.0 - rate(0.002).0));
+    for output in &outputs {
+        let VehicleSample { prompt, navigation, tick, .. } = output.vehicle;
+        assert_eq!((prompt.source, prompt.quality), judge(prompt.status));
+        assert_eq!((navigation.source, navigation.quality), judge(navigation.status));
+        assert_eq!((prompt.faults, navigation.faults, tick), (Faults::NONE, Faults::NONE, prompt.tick));
+    }
+    // The first window ends with the tenth sample, the others follow every fifth.
+    let ends: Vec<u32> = outputs.iter().filter_map(|output| Some(output.window?.end)).collect();
+    assert_eq!(ends, (309..400).step_by(CompensateConfig::DEFAULT.mode.hop() as usize).collect::<Vec<u32>>());
+    assert_eq!(pipeline.counters().windows, 18, "the one that ended at 399 is still out");
+}
+
+#[test]
+fn windows_hold_the_features_oldest_first() {
+    let samples =
+        (0..KNOWN + 40).map(|tick| turning(tick, AngularRate(if tick < KNOWN { 5 } else { tick as i32 })));
+    for due in run(&mut new(), samples, constant(0.0)).iter().filter_map(|output| output.window) {
+        for (features, tick) in due.features.iter().zip(due.end + 1 - WINDOW as u32..) {
+            assert_eq!(
+                features,
+                &[0, 0, turning(0, AngularRate(0)).specific_force[2].0, 0, 0, tick as i32 - 5]
+            );
+        }
+    }
+}
+
+#[test]
+fn a_gap_degrades_and_heals() {
+    let mut pipeline = new();
+    let ticks = (0..400).chain(403..500);
+    let outputs = run(&mut pipeline, drive(ticks), constant(0.0));
+    let broken = WINDOW - 1 + DELAY as usize;
+    assert_eq!(
+        statuses(&outputs),
+        [(Init, 300), (Degraded, 11), (Ready, 89), (Degraded, broken), (Ready, 97 - broken)]
+    );
+    let ticks = [&outputs[399], &outputs[400]].map(|output| output.vehicle.tick);
+    assert_eq!(ticks, [399, 403], "a receiver sees what is missing");
+    assert_eq!(faults(&outputs), [(Faults::NONE, 400), (Faults::GAP, WINDOW), (Faults::NONE, 97 - WINDOW)]);
+    assert_eq!((pipeline.counters().missing, pipeline.counters().samples), (3, 497));
+}
+
+#[test]
+fn a_gap_restarts_static_initialisation() {
+    let outputs = run(
+        &mut new(),
+        drive((0..200).chain(210..290)).chain((290..700).map(|t| turning(t, rate(0.001)))),
+        constant(0.0),
+    );
+    assert_eq!(statuses(&outputs)[0], (Init, 500));
+}
+
+#[test]
+fn clipping_is_a_failure_until_it_is_over() {
+    let mut pipeline = new();
+    let samples = drive(0..500).map(|sample| ImuSample {
+        validity: Validity::reported((4_000_000..4_030_000).contains(&sample.time.0)),
+        ..sample
+    });
+    let outputs = run(&mut pipeline, samples, constant(0.001));
+    assert_eq!(
+        statuses(&outputs),
+        [(Init, 300), (Degraded, 11), (Ready, 89), (Clipped, 3), (Degraded, 11), (Ready, 86)]
+    );
+    for output in &outputs[400..403] {
+        assert_eq!(output.vehicle.prompt.quality, Quality::Unusable);
+    }
+    assert_eq!(faults(&outputs), [(Faults::NONE, 400), (Faults::CLIPPED, 3), (Faults::NONE, 97)]);
+    assert_eq!(pipeline.counters().invalid, 3);
+}
+
+#[test]
+fn a_clipped_sample_is_no_part_of_the_bias() {
+    let samples = (0..400).map(|tick| ImuSample {
+        validity: Validity::reported(tick == 0),
+        ..turning(tick, rate(if tick == 0 { 0.06 } else { 0.001 }))
+    });
+    let mut pipeline = new();
+    let outputs = run(&mut pipeline, samples, constant(0.0));
+    assert_eq!(statuses(&outputs)[..2], [(Clipped, 1), (Init, 300)]);
+    assert_eq!(pipeline.gyro_bias(), Some([AngularRate(0), AngularRate(0), rate(0.001)]));
+}
+
+#[test]
+fn a_vehicle_that_moves_is_refused_and_tried_again() {
+    let mut pipeline = new();
+    let samples = (0..700).map(|tick| turning(tick, rate(if tick < 150 { 0.3 } else { 0.001 })));
+    let outputs = run(&mut pipeline, samples, constant(0.0));
+    assert!(outputs[299].refused.is_some());
+    assert_eq!(outputs.iter().filter(|output| output.refused.is_some()).count(), 1);
+    assert_eq!((statuses(&outputs)[0], pipeline.counters().moving), ((Init, 600), 1));
+}
+
+#[test]
+fn misplaced_samples_are_a_gap_and_change_no_rate() {
+    let clean = run(&mut new(), drive(0..600), constant(0.0));
+    let (mut pipeline, mut noise) = (new(), Noise::new(6));
+    for (sample, clean) in drive(0..600).zip(&clean) {
+        let outputs = run(&mut pipeline, [sample], constant(0.0));
+        let told = outputs[0].vehicle.navigation.faults == Faults::GAP;
+        assert_eq!(told, clean.vehicle.prompt.tick > KNOWN as u32);
+        let prompt = |output: &Output| {
+            (output.vehicle.prompt.tick, output.vehicle.prompt.rate, output.vehicle.prompt.yaw)
+        };
+        assert_eq!(prompt(&outputs[0]), prompt(clean));
+        for _ in 0..if u64::from(clean.vehicle.prompt.tick) < KNOWN { 0 } else { noise.int(1, 2) } {
+            let mut misplaced = turning(0, rate(3.0));
+            misplaced.time.0 =
+                sample.time.0.saturating_sub(noise.int(0, 900_000) as u64) + noise.int(0, 1) as u64 * 5_000;
+            misplaced.time.0 = misplaced.time.0.min(sample.time.0 + 5_000);
+            assert!(pipeline.process(misplaced).is_err());
+        }
+    }
+    assert!(pipeline.counters().misplaced > 400);
+}
+
+#[test]
+fn the_same_sample_once_more_changes_nothing() {
+    let clean = run(&mut new(), drive(0..600), constant(0.004));
+    let mut pipeline = new();
+    let mut twice = |sample| {
+        let outputs = run(&mut pipeline, [sample], constant(0.004));
+        assert!(pipeline.process(sample).is_err());
+        outputs
+    };
+    let outputs: Vec<Output> = drive(0..600).flat_map(&mut twice).collect();
+    assert_eq!(outputs, clean);
+    assert_eq!(pipeline.counters().misplaced, 600);
+}
+
+#[test]
+fn a_misplaced_sample_starts_static_initialisation_anew() {
+    let standing = |ticks: core::ops::Range<u64>| ticks.map(|tick| turning(tick, rate(0.001)));
+    let mut pipeline = new();
+    run(&mut pipeline, standing(0..200), constant(0.0));
+    assert!(pipeline.process(turning(198, rate(3.0))).is_err());
+    let outputs = run(&mut pipeline, standing(200..600), constant(0.0));
+    assert_eq!(statuses(&outputs)[0], (Init, KNOWN as usize));
+}
+
+/// Time that no sample stands for is told, wherever between two grid steps the clock lands. What is
+/// within the jitter of a stamp is not time that is missing.
+#[test]
+fn a_clock_that_jumps_by_a_few_milliseconds_is_a_gap() {
+    for jump_us in (-45_000_i64..=45_000).step_by(100) {
+        let mut pipeline = new();
+        run(&mut pipeline, drive(0..400), constant(0.0));
+        let stamped = drive(400..700).enumerate().map(|(k, mut sample)| {
+            // No two readings of a part are the same.
+            sample.specific_force[0].0 += 1 + k as i32;
+            sample.time.0 = sample.time.0.strict_add_signed(jump_us);
+            sample
+        });
+        let told: Vec<Output> = stamped.filter_map(|sample| pipeline.process(sample).ok()).collect();
+        let counters = pipeline.counters();
+        let counted = counters.missing + counters.misplaced + counters.clock_jumps;
+        let within = jump_us.abs() <= 2_000;
+        assert_eq!(counted > 0, !within, "{jump_us} us");
+        assert_eq!(told[0].vehicle.navigation.faults == Faults::GAP, !within, "{jump_us} us");
+    }
+}
+
+#[test]
+fn a_clock_jump_is_counted_and_survived() {
+    let mut pipeline = new();
+    run(&mut pipeline, drive(0..400), constant(0.0));
+    let later = |tick: u64| tick + 1_000_000;
+    assert!(pipeline.process(drive([later(0)]).next().unwrap()).is_err());
+    let outputs = run(&mut pipeline, drive((1..100).map(later)), constant(0.0));
+    assert_eq!(statuses(&outputs), [(Degraded, 11), (Ready, 88)]);
+    assert_eq!((pipeline.counters().clock_jumps, pipeline.counters().missing), (1, 0));
+    assert_eq!(faults(&outputs), [(Faults::GAP, WINDOW), (Faults::NONE, 99 - WINDOW)]);
+    assert_eq!(outputs[0].vehicle.prompt.tick, 400);
+}
+
+#[test]
+fn the_navigation_rate_is_late_and_leaves_none_out() {
+    let lag = CompensateConfig::DEFAULT.lag.samples();
+    let mut pipeline = new();
+    let outputs = run(&mut pipeline, drive((0..400).chain(403..500)), constant(0.002));
+    let (init, sent) = outputs.split_at(KNOWN as usize + lag);
+    assert!(
+        init.iter()
+            .all(|output| output.vehicle.navigation.status == Init && output.vehicle.navigation.yaw.0 == 0)
+    );
+    // A gap delays what came before it, it swallows none.
+    let expected: Vec<u32> = (KNOWN as u32..400).chain(403..500 - lag as u32).collect();
+    assert_eq!(sent.iter().map(|output| output.vehicle.navigation.tick).collect::<Vec<_>>(), expected);
+    let late = |output: &Output| output.vehicle.navigation.latency_us;
+    let across_the_gap = sent.iter().filter(|output| late(output) != Some(10_000 * lag as u32));
+    assert_eq!(across_the_gap.map(late).collect::<Vec<_>>(), vec![Some(10_000 * (lag as u32 + 3)); lag]);
+    // The first four after start and gap go out before a window has covered them, and the gap
+    // takes the last five before it their window.
+    let degraded = sent
+        .iter()
+        .filter(|output| output.vehicle.navigation.status == Degraded)
+        .map(|o| o.vehicle.navigation.tick);
+    assert_eq!(
+        degraded.collect::<Vec<_>>(),
+        [300, 301, 302, 303, 395, 396, 397, 398, 399, 403, 404, 405, 406]
+    );
+    // They are made up for all the same.
+    let less = i64::from(rate(0.25).0 - rate(0.001).0 - rate(0.002).0);
+    let sum: i64 = sent.iter().map(|output| i64::from(output.vehicle.navigation.rate.0)).sum();
+    assert_eq!(sum + pipeline.owed().navigation.0, less * 197);
+}

@@ -1,0 +1,125 @@
+//! Estimates that come late, not at all or wrong, and rates that do not fit: the pipeline falls
+//! back to the gyro less its bias, or says that there is no good rate.
+
+use embedded_can::Frame;
+use gyronet::can::bosch::{SignalStatus, Tx1};
+use gyronet::can::config::Config;
+use gyronet::can::encoder::CanEncoder;
+use gyronet::compensate::{CompensateConfig, DELAY};
+use gyronet::estimate::YawEstimate;
+use gyronet::health::Faults;
+use gyronet::health::Status::{Degraded, Init, Ready};
+use gyronet::model::{Estimate, SCALE_MIN};
+use gyronet::pipeline::{DueWindow, Output};
+use gyronet::units::{AngularRate, Yaw};
+use gyronet::window::WINDOW;
+use gyronet_host_tests::stream::{constant, drive, faults, new, run, statuses};
+use gyronet_host_tests::synthetic::{rate, turning};
+
+/// What the navigation rate owes where all samples that wait for it are alike, and no revision.
+fn waiting(last: &YawEstimate) -> Yaw {
+    Yaw(CompensateConfig::DEFAULT.lag.samples() as i64 * i64::from(last.rate.0))
+}
+
+#[test]
+fn an_estimate_that_is_late_or_missing_is_counted() {
+    for lateness in [DELAY as usize, CompensateConfig::DEFAULT.mode.hop() as usize, 20, usize::MAX] {
+        let mut pipeline = new();
+        let mut waiting: Vec<(usize, DueWindow)> = Vec::new();
+        for (now, sample) in drive(0..400).enumerate() {
+            let output = pipeline.process(sample).expect("a place on the grid");
+            waiting.retain(|(since, due)| {
+                let deliver = now - since >= lateness;
+                if deliver {
+                    pipeline.deliver(due.end, constant(0.01)(due).expect("an estimate"));
+                }
+                !deliver
+            });
+            waiting.extend(output.window.map(|due| (now, due)));
+            assert!(
+                matches!(output.vehicle.prompt.status, Init | Degraded),
+                "{lateness} samples late at {now}"
+            );
+            assert_eq!(output.vehicle.prompt.correction, AngularRate(0));
+        }
+        let counters = pipeline.counters();
+        assert_eq!((counters.windows, counters.late), (0, 18), "{lateness} samples late");
+    }
+    // In time is up to the sample before its turn.
+    let mut pipeline = new();
+    let mut waiting: Option<DueWindow> = None;
+    for sample in drive(0..400) {
+        let output = pipeline.process(sample).expect("a place on the grid");
+        if let Some(due) = waiting.take() {
+            pipeline.deliver(due.end, constant(0.01)(&due).expect("an estimate"));
+        }
+        waiting = output.window;
+    }
+    assert_eq!((pipeline.counters().windows, pipeline.counters().late), (18, 0));
+}
+
+#[test]
+fn a_network_that_dies_leaves_the_gyro_less_its_bias() {
+    let mut pipeline = new();
+    let mut alive = constant(0.01);
+    let outputs = run(&mut pipeline, drive(0..600), |due| if due.end < 450 { alive(due) } else { None });
+    assert_eq!(statuses(&outputs)[2].0, Ready);
+    let last = outputs[599].vehicle.prompt;
+    assert_eq!((last.status, pipeline.owed().navigation), (Degraded, waiting(&last)));
+    assert_eq!(faults(&outputs), [(Faults::NONE, 456), (Faults::LATE, 144)]);
+    assert_eq!(last.correction, AngularRate(0), "an old estimate must not be applied for ever");
+}
+
+#[test]
+fn an_estimate_for_another_window_is_not_used() {
+    let mut pipeline = new();
+    for sample in drive(0..400) {
+        let output = pipeline.process(sample).expect("a place on the grid");
+        if let Some(due) = output.window {
+            pipeline.deliver(due.end.wrapping_sub(5), constant(0.01)(&due).expect("an estimate"));
+            pipeline.deliver(due.end + 1, constant(0.01)(&due).expect("an estimate"));
+        }
+    }
+    assert_eq!((pipeline.counters().windows, pipeline.counters().late), (0, 18));
+}
+
+#[test]
+fn an_implausible_estimate_is_not_believed() {
+    let mut pipeline = new();
+    let limit = CompensateConfig::DEFAULT.max_mean;
+    let corrections = |due: &DueWindow| if due.end < 350 { limit } else { AngularRate(limit.0 + 1) };
+    let outputs = run(&mut pipeline, drive(0..400), |due| {
+        Some(Estimate { corrections: [corrections(due); WINDOW], scale: SCALE_MIN, clamped_inputs: 1 })
+    });
+    assert_eq!(statuses(&outputs), [(Init, 300), (Degraded, 11), (Ready, 45), (Degraded, 44)]);
+    assert_eq!((pipeline.counters().implausible, pipeline.counters().clamped_inputs), (9, 18));
+    assert_eq!(outputs.iter().filter(|output| output.implausible.is_some()).count(), 9);
+    assert_eq!(faults(&outputs), [(Faults::NONE, 356), (Faults::IMPLAUSIBLE, 44)]);
+    let last = outputs[399].vehicle.prompt;
+    assert_eq!((last.correction, pipeline.owed().navigation), (AngularRate(0), waiting(&last)));
+}
+
+#[test]
+fn a_rate_beyond_the_signal_is_marked() {
+    let mut pipeline = new();
+    let samples = (0..320).map(|tick| turning(tick, rate(if tick < 310 { 0.0 } else { 3.0 })));
+    let outputs = run(&mut pipeline, samples, constant(0.0));
+    let mut encoder = CanEncoder::new(Config::DEFAULT);
+    for (number, tx1) in tx1(&mut encoder, &outputs).iter().enumerate() {
+        let failed = (tx1.yaw_rate, tx1.yaw_rate_status) == (0xFFFF, SignalStatus::FAILURE);
+        assert_eq!(failed, number >= 310, "{number}");
+    }
+    assert_eq!(encoder.out_of_range(), 10);
+    // Neither do the largest codes wrap.
+    let samples = (0..400).map(|tick| turning(tick, AngularRate(if tick < 300 { 1_000 } else { i32::MIN })));
+    let outputs = run(&mut new(), samples, constant(0.01));
+    assert_eq!(outputs[399].vehicle.prompt.rate, AngularRate(i32::MIN));
+    let last = *tx1(&mut CanEncoder::new(Config::DEFAULT), &outputs).last().expect("samples");
+    assert_eq!((last.yaw_rate, last.yaw_rate_status), (0, SignalStatus::FAILURE));
+}
+
+/// TX1 of each sample.
+fn tx1(encoder: &mut CanEncoder, outputs: &[Output]) -> Vec<Tx1> {
+    let mut first = |output: &Output| encoder.encode(&output.vehicle)[0];
+    outputs.iter().map(|output| Tx1::parse(first(output).data()).expect("a good checksum")).collect()
+}

@@ -1,0 +1,179 @@
+//! The sensor monitor in the coprocessor: silence by the outside clock, readings that repeat themselves,
+//! saturation, implausible readings; and the weights' checksum in the background.
+
+use embedded_can::{Frame, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::coprocessor::{Config, Coprocessor, Observation};
+use gyronet::health::{Faults, Quality, Source, Status};
+use gyronet::model::background::BackgroundCheck;
+use gyronet::model::{Blob, BlobError, weights};
+use gyronet::monitor::{AXIS_STUCK_AFTER, HOLD, JUMP_PATIENCE, START_US, STUCK_AFTER, TIMEOUT_US};
+use gyronet::sample::{ImuSample, PERIOD_US, Validity};
+use gyronet::units::Micros;
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::{idling, rate};
+
+/// Both clocks agree, but for an offset.
+const OFFSET_US: u64 = 7_000_003;
+
+fn coprocessor() -> Coprocessor {
+    let wheels = Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"));
+    Coprocessor::new(Config { wheels, ..Config::DEFAULT })
+}
+
+fn fed(samples: u64) -> (Coprocessor, Noise) {
+    let (mut coprocessor, mut noise) = (coprocessor(), Noise::new(3));
+    for tick in 0..samples {
+        let observation = sample(&mut coprocessor, idling(tick, 0.001, &mut noise), tick);
+        assert_eq!(coprocessor.poll(at(tick)), Ok(None));
+        assert!(matches!(observation.vehicle.prompt.status, Status::Init | Status::Degraded));
+    }
+    (coprocessor, noise)
+}
+
+fn at(tick: u64) -> Micros {
+    Micros(OFFSET_US + tick * PERIOD_US)
+}
+
+fn sample(coprocessor: &mut Coprocessor, sample: ImuSample, tick: u64) -> Observation {
+    let sample = ImuSample { time: Micros(tick * PERIOD_US), ..sample };
+    coprocessor.imu(sample, at(tick)).expect("in time")
+}
+
+#[test]
+fn silence_has_no_rate_and_ends_with_a_sample() {
+    let (mut coprocessor, mut noise) = fed(400);
+    let quiet = at(399).0;
+    assert_eq!(coprocessor.poll(Micros(quiet + TIMEOUT_US - 1)), Ok(None));
+    let mut sets = Vec::new();
+    for millisecond in TIMEOUT_US / 1_000..TIMEOUT_US / 1_000 + 100 {
+        sets.extend(coprocessor.poll(Micros(quiet + millisecond * 1_000)).expect("time goes on"));
+    }
+    assert_eq!(sets.len(), 10, "one every 10 ms");
+    for (set, tick) in sets.iter().map(|set| set.vehicle).zip(402..) {
+        let rate = set.navigation;
+        assert_eq!((set.tick, rate.quality, rate.rate.0), (tick, Quality::Unusable, 0));
+        assert_eq!((rate.faults, rate.status, set.temperature), (Faults::GAP, Status::Silent, None));
+    }
+    assert_eq!(coprocessor.monitor_counters().silences, 1);
+    let set = sample(&mut coprocessor, idling(412, 0.001, &mut noise), 412).vehicle;
+    assert_eq!((set.prompt.tick, set.prompt.status), (412, Status::Degraded), "the bias is kept");
+    assert_eq!(coprocessor.poll(at(413)), Ok(None));
+}
+
+#[test]
+fn silence_keeps_the_yaw() {
+    let (mut coprocessor, mut noise) = fed(400);
+    let last = sample(&mut coprocessor, idling(400, 0.001, &mut noise), 400).vehicle.navigation;
+    let set = coprocessor.poll(Micros(at(400).0 + TIMEOUT_US)).expect("time goes on").expect("a set");
+    let silent = set.vehicle.navigation;
+    assert_ne!(silent.yaw.0, 0);
+    assert_eq!((silent.yaw, silent.source, set.sample), (last.yaw, Source::Raw, None));
+}
+
+#[test]
+fn a_part_has_time_to_start() {
+    let mut coprocessor = coprocessor();
+    assert_eq!(coprocessor.poll(Micros(START_US - 1)), Ok(None));
+    let set = coprocessor.poll(Micros(START_US)).expect("time goes on").expect("a set");
+    assert_eq!(set.vehicle.navigation.quality, Quality::Unusable);
+}
+
+#[test]
+fn wheels_that_fall_silent_are_a_fault() {
+    let (mut coprocessor, mut noise) = fed(400);
+    let id = StandardId::new(0xAA).expect("11 bits");
+    let stands = DataFrame::new(id, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]).expect("eight bytes");
+    coprocessor.can(&stands, at(400)).expect("a wheel frame");
+    for tick in 400..430 {
+        let set = sample(&mut coprocessor, idling(tick, 0.001, &mut noise), tick).vehicle;
+        assert_eq!(set.navigation.faults.contains(Faults::WHEELS), tick > 410, "sample {tick}");
+    }
+}
+
+#[test]
+fn readings_that_no_vehicle_can_have_are_dropped_until_they_persist() {
+    let (mut coprocessor, mut noise) = fed(400);
+    for tick in 400..420 {
+        let mut far = idling(tick, 0.001, &mut noise);
+        far.angular_rate[2].0 += if tick == 400 || tick >= 410 { rate(1.5).0 } else { 0 };
+        let set = sample(&mut coprocessor, far, tick).vehicle;
+        let implausible = tick == 400 || (410..410 + u64::from(JUMP_PATIENCE)).contains(&tick);
+        assert_eq!(set.prompt.quality == Quality::Unusable, implausible, "sample {tick}");
+        assert_eq!(set.prompt.faults.contains(Faults::IMPLAUSIBLE), implausible, "sample {tick}");
+    }
+    assert_eq!(coprocessor.monitor_counters().wrong, 1 + u32::from(JUMP_PATIENCE));
+}
+
+#[test]
+fn stuck_from_the_seventh_equal_sample_to_the_first_that_differs() {
+    let (mut coprocessor, mut noise) = fed(400);
+    let still = idling(399, 0.001, &mut noise);
+    for tick in 400..440 {
+        let set = sample(&mut coprocessor, still, tick).vehicle;
+        let stuck = tick >= 400 + u64::from(STUCK_AFTER);
+        assert_eq!(set.prompt.status == Status::Stuck, stuck, "sample {tick}");
+        assert_eq!(set.prompt.quality == Quality::Unusable, stuck);
+        // Nobody runs the network here.
+        let late = set.navigation.faults.contains(Faults::LATE);
+        let stuck = if stuck { Faults::STUCK } else { Faults::NONE };
+        assert_eq!(set.navigation.faults, stuck.with(if late { Faults::LATE } else { Faults::NONE }));
+    }
+    let moved = idling(440, 0.001, &mut noise);
+    assert_eq!(sample(&mut coprocessor, moved, 440).vehicle.prompt.status, Status::Degraded);
+    assert_eq!(coprocessor.monitor_counters().stuck, 1);
+}
+
+#[test]
+fn a_gyro_or_one_axis_may_be_stuck_beside_axes_that_move() {
+    for (axes, after) in [(&[0, 1, 2][..], STUCK_AFTER), (&[2], AXIS_STUCK_AFTER), (&[1], AXIS_STUCK_AFTER)] {
+        let (mut coprocessor, mut noise) = fed(400);
+        let still = idling(399, 0.001, &mut noise);
+        for tick in 400..500 {
+            let mut moving = idling(tick, 0.001, &mut noise);
+            for axis in axes {
+                moving.angular_rate[*axis] = still.angular_rate[*axis];
+            }
+            let set = sample(&mut coprocessor, moving, tick).vehicle;
+            let stuck = tick >= 400 + u64::from(after);
+            assert_eq!(set.prompt.status == Status::Stuck, stuck, "axes {axes:?}, sample {tick}");
+        }
+        assert_eq!(coprocessor.monitor_counters().stuck, 1);
+    }
+}
+
+#[test]
+fn saturation_is_held_for_50_ms() {
+    let (mut coprocessor, mut noise) = fed(400);
+    for tick in 400..420 {
+        let reading =
+            ImuSample { validity: Validity::reported(tick < 402), ..idling(tick, 0.001, &mut noise) };
+        let observation = sample(&mut coprocessor, reading, tick);
+        let (validity, status) = match tick {
+            ..402 => (Validity::Saturated, Status::Clipped),
+            402..407 => (Validity::Recovering, Status::Clipped),
+            _ => (Validity::Good, Status::Degraded),
+        };
+        let judged = observation.sample.expect("a sample").validity;
+        assert_eq!((judged, observation.vehicle.prompt.status), (validity, status), "sample {tick}");
+    }
+    assert_eq!(coprocessor.monitor_counters().held, u32::from(HOLD));
+}
+
+#[test]
+fn every_round_of_the_background_check_sees_a_flipped_bit() {
+    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+    let mut check = BackgroundCheck::new(&blob);
+    let round = |check: &mut BackgroundCheck| loop {
+        if let Some(result) = check.advance(13) {
+            return result;
+        }
+    };
+    assert_eq!((round(&mut check), round(&mut check)), (Ok(()), Ok(())));
+    let mut damaged = blob.content.to_vec();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    let mut check = BackgroundCheck::new(&Blob { content: &damaged, ..blob });
+    assert!(matches!(round(&mut check), Err(BlobError::Crc { stored, .. }) if stored == blob.crc));
+}

@@ -1,0 +1,242 @@
+//! The board's end of an SLCAN line, over a line that takes what it likes.
+
+use embedded_can::{Frame, StandardId};
+use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
+use gyronet::can::config::Config;
+use gyronet::can::encoder::CanEncoder;
+use gyronet::can::slcan::host::StatusFlags;
+use gyronet::can::slcan::port::Port;
+use gyronet::can::{DataFrame, slcan};
+use gyronet::sample::PERIOD_US;
+use gyronet::units::Micros;
+use gyronet_host_tests::stream::{constant, drive, new, run};
+use gyronet_host_tests::synthetic;
+use proptest::prelude::*;
+use std::collections::VecDeque;
+
+/// As many as the image has.
+const QUEUE: usize = 32;
+/// Bits for a byte: start, eight, stop.
+const BITS: u32 = 10;
+
+/// A serial line.
+#[derive(Debug, Default)]
+struct Line {
+    received: VecDeque<u8>,
+    /// Bytes that it still takes.
+    room: usize,
+    broken: bool,
+    sent: Vec<u8>,
+}
+
+impl ErrorType for Line {
+    type Error = ErrorKind;
+}
+
+impl ReadReady for Line {
+    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
+        Ok(!self.received.is_empty())
+    }
+}
+
+impl Read for Line {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
+        let byte = self.received.pop_front();
+        byte.into_iter().zip(bytes).for_each(|(byte, slot)| *slot = byte);
+        Ok(usize::from(byte.is_some()))
+    }
+}
+
+impl WriteReady for Line {
+    fn write_ready(&mut self) -> Result<bool, ErrorKind> {
+        if self.broken { Err(ErrorKind::BrokenPipe) } else { Ok(self.room > 0) }
+    }
+}
+
+impl Write for Line {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        let taken = bytes.len().min(self.room).min(7);
+        self.room -= taken;
+        self.sent.extend(&bytes[..taken]);
+        Ok(taken)
+    }
+
+    fn flush(&mut self) -> Result<(), ErrorKind> {
+        Ok(())
+    }
+}
+
+fn frame(number: u64) -> DataFrame {
+    DataFrame::new(StandardId::new(0x174).expect("11 bits"), &number.to_le_bytes()).expect("eight bytes")
+}
+
+/// What a host takes apart: CR ends a line, BEL is an answer of its own.
+fn texts(sent: &[u8]) -> impl Iterator<Item = &[u8]> {
+    sent.split(|byte| [b'\r', 7].contains(byte))
+}
+
+/// Frames on a line, without answers and what is not complete.
+fn frames(sent: &[u8]) -> Vec<DataFrame> {
+    texts(sent).filter_map(|line| slcan::parse(line).ok()).collect()
+}
+
+/// A minute of messages over a line of so many bit/s; how many were dropped.
+fn minute(config: Config, baud: u32, hello: &[u8]) -> u32 {
+    let (mut port, mut encoder) = (Port::<QUEUE>::new(500_000), CanEncoder::new(config));
+    let mut line = Line { received: hello.iter().copied().collect(), ..Line::default() };
+    for tick in 0..6_000 {
+        let sample = synthetic::vehicle(tick, synthetic::rate(0.1), gyronet::units::Yaw(0));
+        for frame in encoder.encode(&sample) {
+            port.push(frame, Micros(u64::from(tick) * PERIOD_US));
+        }
+        // A UART holds nothing over for later.
+        line.room = (baud / BITS / 100) as usize;
+        port.service(&mut line, |_| ()).expect("the line holds");
+    }
+    port.dropped()
+}
+
+#[test]
+fn each_configuration_fits_its_line() {
+    for (name, config, baud, fits) in [
+        ("default", Config::DEFAULT, 921_600, true),
+        ("default", Config::DEFAULT, 115_200, false),
+        ("115200", Config::SLCAN_115200, 115_200, true),
+    ] {
+        for hello in [&b"C\rS6\rO\r"[..], b"Z1\r"] {
+            let dropped = minute(config, baud, hello);
+            println!("{name} at {baud}, {}: {dropped} frames dropped in a minute", hello.escape_ascii());
+            assert_eq!(dropped == 0, fits);
+        }
+    }
+}
+
+#[test]
+fn a_line_that_stalls_breaks_or_goes_holds_up_nothing() {
+    let clean = run(&mut new(), drive(0..1_000), constant(0.002));
+    for broken in [false, true] {
+        let (mut pipeline, mut encoder) = (new(), CanEncoder::new(Config::DEFAULT));
+        let mut port = Port::<QUEUE>::new(500_000);
+        let (mut line, mut all) = (Line::default(), Vec::new());
+        let mut outputs = Vec::new();
+        for (tick, sample) in drive(0..1_000).enumerate() {
+            outputs.extend(run(&mut pipeline, [sample], constant(0.002)));
+            for frame in encoder.encode(&outputs[tick].vehicle) {
+                all.push(frame);
+                port.push(frame, sample.time);
+            }
+            // In the middle of a line, which must be whole nevertheless.
+            let gone = (400..800).contains(&tick);
+            line.room = if gone { 0 } else { 6 * 22 + usize::from(tick < 400) };
+            line.broken = broken && gone;
+            assert_eq!(port.service(&mut line, |_| ()).is_err(), line.broken);
+        }
+        assert_eq!(outputs, clean, "the pipeline does not know of it");
+        let sent = frames(&line.sent);
+        // The newest come first when the line is back; what was begun is finished.
+        let resumed = 6 * 801 - QUEUE;
+        let due: Vec<DataFrame> = all[..6 * 400].iter().chain(&all[resumed..]).copied().collect();
+        let waiting = due.len() - sent.len();
+        assert_eq!(sent, due[..sent.len()]);
+        assert_eq!(port.dropped() as usize, resumed - 6 * 400);
+        println!("broken {broken}: {} sent, {} dropped, {waiting} wait", sent.len(), port.dropped());
+        assert!(waiting < QUEUE, "a line with no more room than it needs keeps its backlog, no more");
+    }
+}
+
+#[test]
+fn commands_are_answered_between_frames() {
+    let mut port = Port::<QUEUE>::new(500_000);
+    let mut line = Line { room: 10, ..Line::default() };
+    port.push(frame(1), Micros(0));
+    port.push(frame(2), Micros(1_234_000));
+    port.service(&mut line, |_| ()).expect("the line holds");
+    line.received.extend(b"V\rZ1\rt0AA21A6F\r");
+    line.room = 1_000;
+    let mut taken = Vec::new();
+    port.service(&mut line, |frame| taken.push(frame)).expect("the line holds");
+    assert_eq!(
+        line.sent.escape_ascii().to_string(),
+        "t17480100000000000000\\rV0101\\r\\r\\rt1748020000000000000004D2\\r"
+    );
+    assert_eq!(taken.len(), 1);
+    assert_eq!(taken[0].data(), [0x1A, 0x6F]);
+}
+
+#[test]
+fn the_bus_state_is_told_beside_drops() {
+    let mut port = Port::<1>::new(500_000);
+    let mut line = Line { room: 1_000, ..Line::default() };
+    port.set_bus(StatusFlags::BUS_ERROR);
+    (0..2).for_each(|number| port.push(frame(number), Micros(0)));
+    line.received.extend(b"F\rF\r");
+    port.service(&mut line, |_| ()).expect("the line holds");
+    // The drop once, the bus as long as it is off.
+    assert!(line.sent.starts_with(b"F82\rF80\r"), "{}", line.sent.escape_ascii());
+    port.set_bus(StatusFlags::default());
+    line.sent.clear();
+    line.received.extend(b"F\r");
+    port.service(&mut line, |_| ()).expect("the line holds");
+    assert_eq!(line.sent, b"F00\r");
+}
+
+#[test]
+fn drops_are_told_once() {
+    let mut port = Port::<2>::new(500_000);
+    let mut line = Line::default();
+    for number in 0..5 {
+        port.push(frame(number), Micros(0));
+    }
+    line.received.extend(b"F\rF\r");
+    line.room = 1_000;
+    port.service(&mut line, |_| ()).expect("the line holds");
+    assert!(line.sent.starts_with(b"F02\rF00\r"), "{}", line.sent.escape_ascii());
+    assert_eq!(frames(&line.sent), [frame(3), frame(4)]);
+    // A host that asks and never reads: no torn answer, no growth, and it is counted.
+    line.room = 0;
+    line.received.extend(b"V\r".repeat(1_000));
+    while !line.received.is_empty() {
+        port.service(&mut line, |_| ()).expect("the line holds");
+    }
+    line.room = usize::MAX;
+    line.sent.clear();
+    port.service(&mut line, |_| ()).expect("the line holds");
+    let answers = line.sent.len() / 6;
+    assert_eq!(line.sent, b"V0101\r".repeat(answers));
+    assert_eq!(port.refused() as usize, 1_000 - answers);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever the line does: lines are whole and in order, and every frame is accounted for.
+    #[test]
+    fn nothing_is_torn_and_nothing_lost_unseen(
+        turns in proptest::collection::vec((0..4_u64, 0..60_usize, any::<bool>(), "[VNFO\r]{0,6}"), 0..80),
+    ) {
+        let mut port = Port::<4>::new(500_000);
+        let (mut line, mut number) = (Line::default(), 0);
+        for (pushes, room, broken, said) in turns {
+            for _ in 0..pushes {
+                port.push(frame(number), Micros(0));
+                number += 1;
+            }
+            line.received.extend(said.bytes());
+            (line.room, line.broken) = (room, broken);
+            let before = line.sent.len();
+            let _ = port.service(&mut line, |_| ());
+            prop_assert!(line.sent.len() - before <= room);
+        }
+        (line.room, line.broken) = (usize::MAX, false);
+        port.service(&mut line, |_| ()).expect("the line holds");
+        let sent = frames(&line.sent);
+        let number_of = |frame: &DataFrame| u64::from_le_bytes(frame.data().try_into().expect("eight bytes"));
+        prop_assert_eq!(sent.len() as u64 + u64::from(port.dropped()), number);
+        prop_assert!(sent.is_sorted_by(|a, b| number_of(a) < number_of(b)));
+        let answers = [&b""[..], b"V0101", b"NGYRO", b"F00", b"F02"];
+        for text in texts(&line.sent) {
+            let known = answers.contains(&text) || slcan::parse::<DataFrame>(text).is_ok();
+            prop_assert!(known, "{}", text.escape_ascii());
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! Records: ranges, versions, damage, and where they lie.
+
+use embedded_storage::nor_flash::NorFlash;
+use gyronet::can::config::{ConfigError, YawSettings};
+use gyronet::model::blob::CRC;
+use gyronet::sample::RATE_HZ;
+use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
+use gyronet::store::slots::{SlotError, file, select};
+use gyronet::store::{
+    Accepted, Calibration, Configuration, Field, FieldError, Level, Mounting, Record, Slot, Store, StoreError,
+};
+use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet_host_tests::flash::{F405, Region};
+use gyronet_host_tests::noise::{Noise, cases};
+use gyronet_host_tests::recordings::workspace;
+use proptest::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+type Flash = Rc<RefCell<F405>>;
+
+fn region(flash: &Flash) -> Region<RECORD_SECTOR> {
+    Region::new(flash, layout::STORE)
+}
+
+fn open(flash: &Flash) -> Store<Region<RECORD_SECTOR>> {
+    Store::open(region(flash), 0, false).expect("the flash answers")
+}
+
+#[test]
+fn layout_is_the_linker_s() {
+    let text = std::fs::read_to_string(workspace().join("src/bin/stm32f405/regions.x"))
+        .expect("it is in the repository");
+    assert!(text.contains(&format!("FLASH : ORIGIN = {:#010x}, LENGTH = 1024K", layout::FLASH_BASE)));
+    assert!(text.contains(&format!("_stext = ORIGIN(FLASH) + {:#06X};", layout::CODE).replace("0X", "0x")));
+    let limit = std::fs::read_to_string(workspace().join("src/bin/stm32f405/slots.x")).expect("it is too");
+    assert!(limit.contains(&format!("ORIGIN(FLASH) + {}K,", layout::CODE_END >> 10)));
+    assert_eq!(SECTORS.iter().sum::<u32>(), 1 << 20);
+    assert_eq!((layout::STORE.end, layout::SLOTS.start), (layout::CODE, layout::CODE_END));
+    let sizes = |range: std::ops::Range<u32>, size: usize| {
+        let starts: Vec<u32> = range.step_by(size).collect();
+        starts
+            .iter()
+            .map(|start| SECTORS[usize::from(sector_at(*start).expect("a sector"))])
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(sizes(layout::STORE, RECORD_SECTOR), [16 << 10; 2]);
+    assert_eq!(sizes(layout::SLOTS, SLOT_SIZE), [128 << 10; 2]);
+    assert_eq!((sector_at(0x4000), sector_at(0x4004), sector_at(0x8_0000)), (Some(1), None, Some(8)));
+}
+
+#[test]
+fn records_come_back() {
+    let flash = Flash::default();
+    let mut store = open(&flash);
+    assert_eq!(store.get::<Configuration>(), Ok(None));
+    let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    let mut calibration =
+        Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Default::default() };
+    calibration.add_bias([AngularRate(5), AngularRate(-5), AngularRate(7)], Some(CentiCelsius(2_500)));
+    store.set(&configuration).expect("it is stored");
+    store.set(&calibration).expect("it is stored");
+    for mut store in [store, open(&flash)] {
+        assert_eq!(store.get::<Configuration>(), Ok(Some(configuration)));
+        assert_eq!(store.get::<Calibration>(), Ok(Some(calibration.clone())));
+        assert_eq!(store.get::<Accepted>(), Ok(None));
+        assert!(!store.damaged());
+    }
+}
+
+#[test]
+fn each_value_has_a_range() {
+    let default = Configuration::DEFAULT;
+    let tilted = |roll_deg, pitch_deg, yaw_deg| Configuration {
+        mounting: Mounting { roll_deg, pitch_deg, yaw_deg },
+        ..default
+    };
+    let mut noisy = default;
+    noisy.static_init.gyro_std = 0.0;
+    let mut believing = default;
+    believing.compensate.max_mean = AngularRate(1 << 27);
+    let cases = [
+        (Configuration { latitude_deg: Some(90.5), ..default }, Field::LatitudeDeg),
+        (Configuration { latitude_deg: Some(f32::NAN), ..default }, Field::LatitudeDeg),
+        (tilted(180.1, 0.0, 0.0), Field::MountingRollDeg),
+        (tilted(0.0, f32::NEG_INFINITY, 0.0), Field::MountingPitchDeg),
+        (tilted(0.0, 0.0, -181.0), Field::MountingYawDeg),
+        (noisy, Field::StaticGyroStd),
+        (believing, Field::CompensateMaxMean),
+    ];
+    let flash = Flash::default();
+    let mut store = open(&flash);
+    for (configuration, named) in cases {
+        match store.set(&configuration) {
+            Err(StoreError::Field(error @ FieldError::Range { field, .. })) => {
+                assert_eq!(field, named);
+                assert!(error.to_string().starts_with(named.name()), "{error}");
+            }
+            other => panic!("{named:?}: {other:?}"),
+        }
+    }
+    let mut can = default.can;
+    can.yaw = can.yaw.map(|yaw| YawSettings { period_ms: 15, ..yaw });
+    let refused = store.set(&Configuration { can, ..default });
+    assert_eq!(refused, Err(StoreError::Field(FieldError::Can(ConfigError::Period(15)))));
+    let wild = Calibration { gyro_bias: Some([AngularRate(i32::MAX); 3]), ..Default::default() };
+    assert!(matches!(
+        store.set(&wild),
+        Err(StoreError::Field(FieldError::Range { field: Field::CalibrationGyroBias, .. }))
+    ));
+    assert_eq!(flash.borrow().operations(), 0, "nothing was written");
+}
+
+/// A later layout of the configuration.
+#[derive(Debug, Serialize, Deserialize)]
+struct Later {
+    value: u32,
+}
+
+impl Record for Later {
+    const KEY: u8 = Configuration::KEY;
+    const VERSION: u8 = Configuration::VERSION + 1;
+
+    fn check(&self) -> Result<(), FieldError> {
+        Ok(())
+    }
+}
+
+/// The same version with other content: a bug, or a record of someone else's.
+#[derive(Debug, Serialize, Deserialize)]
+struct Alien {
+    value: [u8; 3],
+}
+
+impl Record for Alien {
+    const KEY: u8 = Configuration::KEY;
+    const VERSION: u8 = Configuration::VERSION;
+
+    fn check(&self) -> Result<(), FieldError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn another_layout_is_named() {
+    let flash = Flash::default();
+    let mut store = open(&flash);
+    store.set(&Later { value: 7 }).expect("it is stored");
+    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 3, expected: 2 }));
+    store.set(&Alien { value: [200; 3] }).expect("it is stored");
+    assert_eq!(store.get::<Configuration>(), Err(StoreError::Encoding));
+}
+
+/// The default of layout 1 but for its latitude, 48.1: it had no `fog_ids`.
+const LAYOUT_1: &[u8] = &[
+    0, 0, 160, 194, 30, 1, 0, 1, 160, 3, 161, 3, 162, 3, 10, 0, 0, 160, 3, 161, 3, 162, 3, 0, 1, 102, 102,
+    64, 66, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 205, 204, 76, 61, 0, 0, 192, 63, 111, 18, 131, 59, 143, 194,
+    245, 61, 88, 202, 178, 61, 2, 5, 7, 208, 238, 217, 6, 160, 210, 130, 67, 154, 250, 157, 2,
+];
+
+/// What is stored stays stored when the firmware is replaced.
+#[test]
+fn an_older_layout_is_read() {
+    let flash = Flash::default();
+    let word = |words: &mut Vec<u8>| {
+        words.resize(words.len().next_multiple_of(4), 0xFF);
+        words.extend(CRC.checksum(words).to_le_bytes());
+    };
+    let mut record = vec![Configuration::KEY, 1, LAYOUT_1.len() as u8, 0];
+    record.extend(LAYOUT_1);
+    word(&mut record);
+    let header = CRC.checksum(&(1 ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
+    let sector = [&1_u32.to_le_bytes()[..], &header.to_le_bytes(), &record].concat();
+    region(&flash).write(0, &sector).expect("it is blank");
+    let mut store = open(&flash);
+    let mut wanted = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    assert_eq!(store.get(), Ok(Some(wanted)));
+    wanted.fog_ids = [0x2A4, 0x2A5, 0x2A6];
+    store.set(&wanted).expect("it is stored");
+    assert_eq!(open(&flash).get(), Ok(Some(wanted)));
+}
+
+#[test]
+fn no_flipped_bit_is_believed() {
+    let flash = Flash::default();
+    let (old, new) = (
+        Configuration { latitude_deg: Some(1.0), ..Configuration::DEFAULT },
+        Configuration { latitude_deg: Some(2.0), ..Configuration::DEFAULT },
+    );
+    let mut store = open(&flash);
+    store.set(&old).expect("it is stored");
+    let from = layout::STORE.start as usize;
+    store.set(&new).expect("it is stored");
+    let end = flash.borrow().bytes()[..layout::STORE.end as usize].iter().rposition(|byte| *byte != 0xFF);
+    let mut flips = 0;
+    for offset in from..=end.expect("something is stored") {
+        for bit in 0..8 {
+            let damaged = Rc::new(RefCell::new(flash.borrow().clone()));
+            damaged.borrow_mut().damage(offset, 1 << bit);
+            let mut store = open(&damaged);
+            let found = store.get::<Configuration>();
+            assert!(store.damaged(), "byte {offset} bit {bit} is noticed");
+            assert!(
+                [Ok(Some(old)), Ok(Some(new)), Ok(None)].contains(&found),
+                "byte {offset} bit {bit}: {found:?}"
+            );
+            flips += 1;
+        }
+    }
+    println!("{flips} flipped bits, none believed");
+}
+
+proptest! {
+    #![proptest_config(cases(200))]
+
+    /// Sectors full of anything: nothing is read, nothing panics, and a record can be stored.
+    #[test]
+    fn sectors_full_of_anything(seed in any::<u64>(), sparse in any::<bool>()) {
+        let flash = Flash::default();
+        let mut noise = Noise::new(seed);
+        let content: Vec<u8> = (0..2 * RECORD_SECTOR)
+            .map(|_| if sparse && noise.byte() > 3 { 0xFF } else { noise.byte() })
+            .collect();
+        region(&flash).write(0, &content).expect("it is blank");
+        let mut store = open(&flash);
+        prop_assert_eq!(store.get::<Configuration>(), Ok(None));
+        prop_assert_eq!(store.set(&Configuration::DEFAULT), Ok(()));
+        prop_assert_eq!(open(&flash).get::<Configuration>(), Ok(Some(Configuration::DEFAULT)));
+    }
+}
+
+#[test]
+fn slots_are_checked() {
+    let mut flash = F405::default();
+    let start = layout::SLOTS.start as usize;
+    let built_in = &gyronet::model::weights::DEFAULT.0;
+    let slots = |flash: &F405| -> [Vec<u8>; 2] {
+        [0, SLOT_SIZE].map(|offset| flash.bytes()[start + offset..][..SLOT_SIZE].to_vec())
+    };
+    let [a, _] = slots(&flash);
+    assert_eq!(file(&a).err(), Some(SlotError::Empty));
+    flash.damage(start + 3, 0xFF);
+    let [a, _] = slots(&flash);
+    assert_eq!(file(&a).err(), Some(SlotError::Length(u32::MAX)));
+    // A file that nobody accepted is not used, however good it is.
+    let shared = Rc::new(RefCell::new(F405::default()));
+    Region::<SLOT_SIZE>::new(&shared, layout::SLOTS).write(0, built_in).expect("it is blank");
+    let held = shared.borrow();
+    let bytes = &held.bytes()[start..];
+    let slots = [&bytes[..SLOT_SIZE], &bytes[SLOT_SIZE..]];
+    let crc = file(slots[0]).expect("a whole file").crc;
+    let selection = select(&Accepted::NONE, slots, built_in);
+    assert_eq!(selection.source, gyronet::store::slots::WeightSource::BuiltIn);
+    let selection = select(&Accepted::NONE.with(Slot::A, crc ^ 1), slots, built_in);
+    assert_eq!(selection.source, gyronet::store::slots::WeightSource::BuiltIn);
+    assert_eq!(selection.refused, [Some(SlotError::NotAccepted(crc)), None]);
+}
+
+#[test]
+fn bias_by_temperature() {
+    let mut calibration = Calibration::default();
+    let bias = |z| [AngularRate(0), AngularRate(0), AngularRate(z)];
+    assert_eq!(calibration.bias_at(Some(CentiCelsius(0))), None);
+    for (celsius, z) in [(40, 400), (0, 0), (20, 100), (22, 120)] {
+        calibration.add_bias(bias(z), Some(CentiCelsius(celsius * 100)));
+    }
+    assert_eq!(calibration.temperature_table.len(), 3, "22 deg C has replaced 20");
+    let at = |celsius: i16| calibration.bias_at(Some(CentiCelsius(celsius * 100))).map(|[.., z]| z.0);
+    assert_eq!(
+        [-10, 0, 11, 22, 31, 40, 90].map(at),
+        [Some(0), Some(0), Some(60), Some(120), Some(260), Some(400), Some(400)]
+    );
+    assert_eq!(calibration.bias_at(None), Some(bias(120)));
+    for k in 0..2 * RATE_HZ as i16 {
+        calibration.add_bias(bias(1), Some(CentiCelsius(k * 77 - 4000)));
+        calibration.check().expect("it stays sorted and bounded");
+    }
+}
+
+#[test]
+fn sectors_of_zeros_are_damaged_but_in_the_emulator() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    for offset in layout::STORE {
+        flash.borrow_mut().damage(offset as usize, 0xFF);
+    }
+    assert!(open(&flash).damaged(), "a raw image of the flash has overwritten the records");
+    let emulated = Store::open(region(&flash), 0, true).expect("the flash answers");
+    assert!(!emulated.damaged());
+}

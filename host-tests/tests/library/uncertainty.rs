@@ -1,0 +1,117 @@
+//! The expected error of a rate: vectors worked out by hand, and how often recorded errors lie inside
+//! it.
+
+use gyronet::bias::STATIC_SAMPLES;
+use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::pipeline::{Pipeline, PipelineConfig};
+use gyronet::uncertainty::{Uncertainty, UncertaintyConfig};
+use gyronet::units::AngularRate;
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::{idling, rate};
+use gyronet_host_tests::{parallel, recordings};
+use gyronet_tools::ablation::{self, Score};
+use gyronet_tools::recording::Recording;
+use std::path::Path;
+
+/// One part in a million, and the code that rounding up adds: f32's own error.
+fn assert_sigma(found: AngularRate, rad_per_sec: f64, why: &str) {
+    let (found, code) = (found.rad_per_sec(), AngularRate(1).rad_per_sec());
+    let beyond = found - rad_per_sec;
+    assert!(
+        (-1e-6 * rad_per_sec..=1e-6 * rad_per_sec + code).contains(&beyond),
+        "{why}: {found:e} is not {rad_per_sec:e}"
+    );
+}
+
+fn uncertainty(scales: &[f64]) -> Uncertainty {
+    let mut uncertainty = Uncertainty::new(UncertaintyConfig::DEFAULT);
+    scales.iter().for_each(|scale| uncertainty.window(rate(*scale)));
+    uncertainty
+}
+
+#[test]
+fn a_rate_that_no_window_corrects_is_worth_what_it_is_without_one() {
+    // 2.5e-4 rad/s: 51 deg/h.
+    assert_sigma(uncertainty(&[]).sigma(true, 0.0), 2.5e-4, "no window yet");
+    assert_sigma(uncertainty(&[]).sigma(false, 0.0), 2.5e-4, "not corrected");
+    assert_sigma(uncertainty(&[0.01]).sigma(false, 0.0), 2.5e-4, "a window, but not corrected by it");
+}
+
+#[test]
+fn a_window_is_worth_a_quarter_of_its_scale() {
+    assert_sigma(uncertainty(&[0.004]).sigma(true, 0.0), 0.001, "one window");
+    assert_sigma(uncertainty(&[0.004; 50]).sigma(true, 0.0), 0.001, "fifty of the same");
+    assert_sigma(uncertainty(&[0.02]).sigma(true, 0.0), 0.005, "a rough road");
+}
+
+/// A twentieth of the difference in squares: from 16 to 18.4 (mrad/s)^2, a quarter of whose root is
+/// 1.072381 mrad/s.
+#[test]
+fn the_squares_of_twenty_windows_are_averaged() {
+    assert_sigma(uncertainty(&[0.004, 0.008]).sigma(true, 0.0), 1.072_380_5e-3, "one of 8 mrad/s");
+    // 16 + 48 (1 - 0.95^20) = 46.7927 (mrad/s)^2.
+    let mut scales = vec![0.004];
+    scales.extend([0.008; 20]);
+    assert_sigma(uncertainty(&scales).sigma(true, 0.0), 1.710_129_3e-3, "twenty of them");
+}
+
+/// 3-4-5 and its like: the parts are independent.
+#[test]
+fn a_bias_adds_in_squares() {
+    assert_sigma(uncertainty(&[]).sigma(false, 6e-4), 6.5e-4, "2.5, 6 and 6.5");
+    assert_sigma(uncertainty(&[0.012]).sigma(true, 4e-3), 5e-3, "3, 4 and 5");
+}
+
+#[test]
+fn a_sigma_is_rounded_up_and_ends_with_its_code() {
+    let config = UncertaintyConfig { per_scale: 1.0, uncorrected: 1.5 / AngularRate::PER_RAD_PER_SEC };
+    assert_eq!(Uncertainty::new(config).sigma(false, 0.0), AngularRate(2));
+    assert_eq!(Uncertainty::new(config).sigma(false, 1e9), AngularRate(i32::MAX));
+}
+
+/// The pipeline sends this very number: before the first window, that of an uncorrected rate and of the
+/// bias' own uncertainty; without updates of the bias, of the rate alone.
+#[test]
+fn the_pipeline_sends_it() {
+    let mut pipeline = Pipeline::new(PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT });
+    let mut noise = Noise::new(1);
+    for tick in 0..u64::from(STATIC_SAMPLES) + 5 {
+        let output = pipeline.process(idling(tick, 0.001, &mut noise)).expect("in time");
+        let known = tick >= u64::from(STATIC_SAMPLES);
+        assert_eq!(output.vehicle.prompt.sigma.is_some(), known, "sample {tick}");
+        if let Some(sigma) = output.vehicle.prompt.sigma {
+            assert_sigma(sigma, 2.5e-4, "not corrected yet");
+        }
+    }
+}
+
+/// Largest departure from the shares of the README (0.644, 0.917, 0.991 on both test drives together).
+const BANDS: [(f64, f64); 3] = [(0.644, 0.03), (0.917, 0.02), (0.991, 0.008)];
+/// The test trials.
+const TRIALS: [u32; 2] = [9, 11];
+
+/// The rate sent for navigation, default configuration.
+fn score(path: &Path) -> Score {
+    let recording = Recording::read(path).expect("a recording");
+    let mut network =
+        GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
+    let variants: Vec<_> = ablation::parts().into_iter().rev().take(1).collect();
+    let mut scores =
+        ablation::run(&recording, &mut network, &variants, || {}).expect("it stands still first");
+    scores.pop().expect("the trials have a reference")
+}
+
+#[test]
+fn recorded_errors_lie_inside_it_as_often_as_is_said() {
+    let paths =
+        TRIALS.map(|trial| recordings::trial("recorded_errors_lie_inside_it_as_often_as_is_said", trial));
+    let [Some(_), Some(_)] = paths else { return };
+    let paths: Vec<_> = paths.into_iter().flatten().collect();
+    let scores = parallel::map(&paths, |path| score(path));
+    let mean = ablation::mean(&scores.into_iter().map(|score| vec![score]).collect::<Vec<_>>());
+    let [score] = &mean.expect("two drives")[..] else { panic!("one variant") };
+    println!("inside one, two and three sigma: {:.3?}", score.inside_sigma);
+    for (share, (said, band)) in score.inside_sigma.iter().zip(BANDS) {
+        assert!((share - said).abs() <= band, "{share:.3} is not {said} +-{band}: {:?}", score.inside_sigma);
+    }
+}

@@ -1,0 +1,194 @@
+//! MTData2 messages: recorded frames, readings that cannot be, packets that are missing or of
+//! another kind.
+
+use gyronet::sample::{ImuSample, Validity};
+use gyronet::sensor::xsens::{MID_MT_DATA2, MtData2, XsensError};
+use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
+use gyronet_host_tests::noise::cases;
+use gyronet_host_tests::wire::{feed_new, message, real_frame, synthetic_frame};
+use proptest::prelude::*;
+
+/// A frame around packets.
+fn frame(packets: &[(u16, &[u8])]) -> Vec<u8> {
+    let mut data = Vec::new();
+    for (id, packet) in packets {
+        data.extend(id.to_be_bytes());
+        data.push(packet.len() as u8);
+        data.extend(*packet);
+    }
+    let mut frame = vec![0xFA, 0xFF, MID_MT_DATA2, data.len() as u8];
+    frame.extend(data);
+    frame.push(frame[1..].iter().fold(0u8, |sum, byte| sum.wrapping_sub(*byte)));
+    frame
+}
+
+fn vector(values: [f32; 3]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_be_bytes()).collect()
+}
+
+#[test]
+fn a_real_frame() {
+    let raw = real_frame();
+    let message = MtData2::parse(&raw[4..raw.len() - 1]).expect("it is intact");
+    assert_eq!(message.packet_counter, Some(43_398));
+    assert_eq!(message.sample_time_fine, Some(0x0314_ED53));
+    assert_eq!(message.status, Some(0x0180_0007));
+    assert_eq!(message.temperature, None);
+    for (values, printed) in [
+        (message.acceleration, [-0.017_374_2, -7.255_744_9, -1.209_552_5]),
+        (message.rate_of_turn, [-0.002_965_7, 0.002_203_5, 0.001_722_6]),
+    ] {
+        for (value, printed) in values.expect("it is there").iter().zip(printed) {
+            // Seven decimals were printed.
+            assert!((f64::from(*value) - printed).abs() <= 0.5e-7, "{value} is not {printed}");
+        }
+    }
+    let samples = feed_new(raw);
+    assert_eq!(samples.len(), 1);
+    let sample = samples[0].expect("a sample");
+    assert_eq!(sample.time, Micros(0x0314_ED53 * 100));
+    assert_eq!(
+        sample.specific_force[1],
+        SpecificForce((f64::from(f32::from_bits(0xC0E8_2F10)) * 1_048_576.0).round() as i32)
+    );
+    assert_eq!(
+        sample.angular_rate[2].0,
+        (f64::from(f32::from_bits(0x3AE1_C7E5)) * 134_217_728.0).round() as i32
+    );
+    assert_eq!((sample.temperature, sample.validity), (None, Validity::Good));
+}
+
+#[test]
+fn a_synthetic_frame() {
+    let expected = ImuSample {
+        time: Micros(10_000),
+        specific_force: [SpecificForce(0), SpecificForce(0), SpecificForce(10_286_531)],
+        angular_rate: [AngularRate(0), AngularRate(0), AngularRate(23_425_412)],
+        temperature: None,
+        validity: Validity::Good,
+    };
+    assert_eq!(feed_new(synthetic_frame()), [Ok(expected)]);
+    let made = MtData2 {
+        packet_counter: Some(1),
+        sample_time_fine: Some(100),
+        acceleration: Some([0.0, 0.0, 9.81]),
+        rate_of_turn: Some([0.0, 0.0, 10f32.to_radians()]),
+        temperature: None,
+        status: Some(3),
+    };
+    assert_eq!(made.emit()[..], synthetic_frame());
+}
+
+#[test]
+fn readings_that_cannot_be() {
+    use RangeError::{NotFinite, OutOfRange};
+    for (value, error) in
+        [(f32::NAN, NotFinite), (f32::INFINITY, NotFinite), (f32::NEG_INFINITY, NotFinite), (1e9, OutOfRange)]
+    {
+        for axis in 0..3 {
+            let mut vector = [0.0; 3];
+            vector[axis] = value;
+            let bad = MtData2 { acceleration: Some(vector), ..message(1) };
+            assert_eq!(feed_new(bad.emit()), [Err(XsensError::Reading { id: 0x4020, error })]);
+            let bad = MtData2 { rate_of_turn: Some(vector), ..message(1) };
+            assert_eq!(feed_new(bad.emit()), [Err(XsensError::Reading { id: 0x8020, error })]);
+        }
+    }
+    let edge = |rate| feed_new(MtData2 { rate_of_turn: Some([0.0, 0.0, rate]), ..message(1) }.emit())[0];
+    assert_eq!(edge(16.0), Err(XsensError::Reading { id: 0x8020, error: OutOfRange }));
+    assert_eq!(edge(-16.0).unwrap().angular_rate[2], AngularRate(i32::MIN));
+}
+
+#[test]
+fn missing_packets() {
+    let whole = message(1);
+    for (id, message) in [
+        (0x1060, MtData2 { sample_time_fine: None, ..whole }),
+        (0x4020, MtData2 { acceleration: None, ..whole }),
+        (0x8020, MtData2 { rate_of_turn: None, ..whole }),
+    ] {
+        assert_eq!(feed_new(message.emit()), [Err(XsensError::Missing { id })]);
+    }
+    let spare = MtData2 { packet_counter: None, temperature: None, status: None, ..whole };
+    assert!(feed_new(spare.emit())[0].is_ok());
+}
+
+#[test]
+fn any_coordinate_system() {
+    // The coordinate system is not the parser's business.
+    let (time, values) = (100u32.to_be_bytes(), vector([1.0, 2.0, 3.0]));
+    assert!(feed_new(frame(&[(0x1060, &time), (0x4024, &values), (0x8028, &values)]))[0].is_ok());
+}
+
+#[test]
+fn packets_of_a_wrong_length() {
+    for id in [0x1020u16, 0x1060, 0x0810, 0x4020, 0x8020, 0xE020] {
+        for len in [0, 1, 3, 5, 11, 13] {
+            assert_eq!(
+                feed_new(frame(&[(id, &vec![0; len])])),
+                [Err(XsensError::Format { id })],
+                "{len} bytes"
+            );
+        }
+    }
+    assert_eq!(MtData2::parse(&[0x40, 0x20, 12, 0]), Err(XsensError::Truncated { id: 0x4020 }));
+    assert_eq!(MtData2::parse(&[0x40]), Err(XsensError::Truncated { id: 0 }));
+    assert_eq!(MtData2::parse(&[]), Ok(MtData2::default()));
+}
+
+#[test]
+fn status_and_temperature() {
+    for bit in 0..32 {
+        let made = MtData2 { status: Some(1 << bit), ..message(1) };
+        let saturated = feed_new(made.emit())[0].unwrap().validity == Validity::Saturated;
+        assert_eq!(saturated, (8..14).contains(&bit), "bit {bit}");
+    }
+    for (degrees, code) in [
+        (25.344, Some(CentiCelsius(2_534))),
+        (-40.0, Some(CentiCelsius(-4_000))),
+        (f32::NAN, None),
+        (400.0, None),
+        (f32::INFINITY, None),
+    ] {
+        let made = MtData2 { temperature: Some(degrees), ..message(1) };
+        assert_eq!(feed_new(made.emit())[0].unwrap().temperature, code, "{degrees}");
+    }
+}
+
+fn float() -> impl Strategy<Value = f32> {
+    any::<u32>().prop_map(f32::from_bits).prop_filter("NaN is not equal to itself", |value| !value.is_nan())
+}
+
+proptest! {
+    #![proptest_config(cases(256))]
+
+    #[test]
+    fn emit_then_parse(
+        packet_counter: Option<u16>,
+        sample_time_fine: Option<u32>,
+        acceleration in prop::option::of(prop::array::uniform3(float())),
+        rate_of_turn in prop::option::of(prop::array::uniform3(float())),
+        temperature in prop::option::of(float()),
+        status: Option<u32>,
+    ) {
+        let made = MtData2 { packet_counter, sample_time_fine, acceleration, rate_of_turn, temperature, status };
+        let frame = made.emit();
+        prop_assert_eq!(frame[1..].iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)), 0);
+        prop_assert_eq!(MtData2::parse(&frame[4..frame.len() - 1]), Ok(made));
+    }
+
+    #[test]
+    fn any_message_is_read_or_refused(data in prop::collection::vec(any::<u8>(), 0..255)) {
+        let _ = MtData2::parse(&data);
+    }
+
+    #[test]
+    fn any_packets_in_a_frame_are_read_or_refused(
+        packets in prop::collection::vec(
+            (prop::sample::select(vec![0x1020u16, 0x1060, 0x0810, 0x4020, 0x8020, 0xE020, 0x4021, 0x2010]),
+             prop::collection::vec(any::<u8>(), 0..16)), 0..8)
+    ) {
+        let packets: Vec<(u16, &[u8])> = packets.iter().map(|(id, packet)| (*id, &packet[..])).collect();
+        prop_assert_eq!(feed_new(frame(&packets)).len(), 1);
+    }
+}

@@ -1,0 +1,79 @@
+//! GyroNet on windows whose outputs PyTorch has computed: the f32 reference layer by layer, and the integer network
+//! of the built-in weight file in its output.
+
+use gyronet::model::blob::HIDDEN;
+use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+use gyronet::units::{AngularRate, SpecificForce};
+use gyronet::window::{FEATURES, Features, WINDOW};
+use gyronet_host_tests::golden::{Golden, WINDOWS};
+use gyronet_host_tests::recordings::workspace;
+use gyronet_tools::checkpoint::Checkpoint;
+
+#[test]
+fn every_layer_equals_pytorch() {
+    let path = workspace().join("tools/weights/gyronet.safetensors");
+    let checkpoint = Checkpoint::read(&path).expect("the committed checkpoint");
+    let network = checkpoint.network();
+    let golden = Golden::read("gyronet");
+
+    let input = golden.tensor("input", &[WINDOWS, WINDOW, FEATURES]);
+    let (windows, _) = input.as_chunks::<FEATURES>().0.as_chunks::<WINDOW>();
+    let outputs: Vec<_> = windows.iter().map(|window| network.layers(window)).collect();
+    let flat = |layer: fn(&gyronet::model::gyronet_f32::LayerOutputs) -> Vec<f32>| {
+        outputs.iter().flat_map(layer).collect::<Vec<f32>>()
+    };
+    for (name, shape, ours) in [
+        ("normalised", &[WINDOWS, WINDOW, FEATURES][..], flat(|o| o.normalised.concat())),
+        ("layer1", &[WINDOWS, WINDOW, 2 * HIDDEN], flat(|o| o.layer1.concat())),
+        ("layer2", &[WINDOWS, WINDOW, 2 * HIDDEN], flat(|o| o.layer2.concat())),
+        ("gyro_error", &[WINDOWS, WINDOW], flat(|o| o.gyro_error.to_vec())),
+        ("log_scale", &[WINDOWS], flat(|o| vec![o.log_scale])),
+    ] {
+        golden.compare(name, shape, &ours);
+    }
+}
+
+/// Largest RMS of the difference of outputs, over the golden outputs' own RMS; 0.25 % is printed below.
+const OUTPUT: f64 = 0.01;
+/// Largest relative difference of an expected error.
+const SCALE: f64 = 0.05;
+
+/// A sample's features in codes. The order is that of the training: specific force x, y, z, angular rate x, y, z.
+fn codes(sample: &[f32; FEATURES]) -> Features {
+    let [fx, fy, fz, wx, wy, wz] = *sample;
+    let force = |value: f32| (value * SpecificForce::PER_METRE_PER_SEC2).round() as i32;
+    let rate = |value: f32| (value * AngularRate::PER_RAD_PER_SEC).round() as i32;
+    [force(fx), force(fy), force(fz), rate(wx), rate(wy), rate(wz)]
+}
+
+#[test]
+fn integer_network_equals_pytorch() {
+    let golden = Golden::read("gyronet");
+    let input = golden.tensor("input", &[WINDOWS, WINDOW, FEATURES]);
+    let error = golden.tensor("gyro_error", &[WINDOWS, WINDOW]);
+    let (windows, _) = input.as_chunks::<FEATURES>().0.as_chunks::<WINDOW>();
+    let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
+    let mut float = checkpoint.network();
+    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights"));
+    let (mut difference, mut size, mut compared) = (0.0, 0.0, 0);
+    for (window, due) in windows.iter().zip(error.as_chunks::<WINDOW>().0) {
+        let features = window.each_ref().map(codes);
+        let estimate = network.estimate(&features);
+        if estimate.clamped_inputs > 0 {
+            // Inputs beyond the integer network's range are clamped, which PyTorch does not do.
+            continue;
+        }
+        compared += 1;
+        for (ours, due) in estimate.corrections.iter().zip(due) {
+            let ours = f64::from(ours.0) / f64::from(AngularRate::PER_RAD_PER_SEC);
+            difference += (ours - f64::from(*due)).powi(2);
+            size += f64::from(*due).powi(2);
+        }
+        let ratio = f64::from(estimate.scale.0) / f64::from(float.estimate(&features).scale.0);
+        assert!((ratio - 1.0).abs() < SCALE, "expected error: {ratio} of the f32 network's");
+    }
+    let relative = (difference / size).sqrt();
+    println!("integer network: {:.2} % RMS from PyTorch's outputs in {compared} windows", 100.0 * relative);
+    assert!(compared >= WINDOWS / 2, "{compared} windows are inside the input's range");
+    assert!(relative < OUTPUT, "{relative}");
+}

@@ -1,0 +1,18 @@
+//! Tests of the library with the tools: recordings, simulated drives, reports.
+
+mod accuracy;
+mod campaign;
+mod fognet_golden;
+mod fognet_integer;
+mod fognet_simulated;
+mod gyronet_golden;
+mod mounting;
+mod recordings_bad_input;
+mod replay_via;
+mod sequence_cost;
+mod standstill;
+mod still_stretches;
+mod trajectory_evo;
+mod turns;
+mod unit_transfer;
+mod upsets;

@@ -1,0 +1,18 @@
+//! Olimex STM32-H405: STM32F405RG, 8 MHz crystal. QEMU's `olimex-stm32-h405` is this board.
+
+use super::{Board, Line};
+use crate::stm32f405::pins::Pin;
+
+/// The board.
+pub const BOARD: Board = Board {
+    name: "Olimex STM32-H405",
+    crystal_hz: 8_000_000,
+    // The LED hangs between the supply and the pin.
+    led: (Pin::new('C', 12), false),
+    imu: Line { tx: Pin::new('A', 9), rx: Pin::new('A', 10), baud: 115_200, fallback_baud: 115_200 },
+    slcan: Line { tx: Pin::new('A', 2), rx: Pin::new('A', 3), baud: 921_600, fallback_baud: 500_000 },
+    fog: Line { tx: Pin::new('B', 10), rx: Pin::new('B', 11), baud: 921_600, fallback_baud: 921_600 },
+    service: Line { tx: Pin::new('C', 6), rx: Pin::new('C', 7), baud: 115_200, fallback_baud: 115_200 },
+    can: [Pin::new('B', 8), Pin::new('B', 9)],
+    spi: [Pin::new('A', 5), Pin::new('A', 6), Pin::new('A', 7), Pin::new('A', 4)],
+};

@@ -1,0 +1,51 @@
+//! Cycles of the networks on this chip, by DWT_CYCCNT: the figures that the cycle model predicts.
+
+use crate::report::Report;
+use crate::stm32f405::watchdog;
+use core::hint::black_box;
+use cortex_m::peripheral::{DCB, DWT};
+use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
+use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+use gyronet::model::gyronet::GyroNetState;
+use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
+use gyronet::units::Angle;
+use gyronet::window::{FEATURES, WINDOW};
+
+/// Counts a window of each network.
+pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
+    dcb.enable_trace();
+    dwt.enable_cycle_counter();
+    gyronet(report);
+    fognet(report);
+}
+
+fn gyronet(report: &mut Report) {
+    let Ok(blob) = Blob::new_checked(&weights::DEFAULT.0) else {
+        return report.fail("GyroNet", format_args!("the weight file is refused"));
+    };
+    let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return };
+    let mut network = GyroNet::with_state(blob, state);
+    let features = [[0; FEATURES]; WINDOW];
+    let begin = DWT::cycle_count();
+    black_box(network.estimate(black_box(&features)));
+    let cycles = DWT::cycle_count().wrapping_sub(begin);
+    report.pass("GyroNet", format_args!("{cycles} cycles a window"));
+}
+
+fn fognet(report: &mut Report) {
+    let Some(state) = cortex_m::singleton!(: FogNetState = FogNetState::ZERO) else { return };
+    let Some(minute) = cortex_m::singleton!(: Minute = Minute::EMPTY) else { return };
+    let Ok(blob) = FogBlob::new_checked(&weights::FOGNET.0) else {
+        return report.fail("FoGNet", format_args!("the weight file is refused"));
+    };
+    let mut network = FogNet::new(blob, state);
+    for _ in 0..STEPS {
+        minute.push(Second { features: [0; _], turn: Angle::ZERO });
+    }
+    let Some(window) = minute.window(Padding::None) else { return };
+    watchdog::feed();
+    let begin = DWT::cycle_count();
+    black_box(network.estimate(black_box(&window)));
+    let cycles = DWT::cycle_count().wrapping_sub(begin);
+    report.pass("FoGNet", format_args!("{cycles} cycles a window"));
+}

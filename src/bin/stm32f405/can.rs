@@ -1,0 +1,287 @@
+//! bxCAN (RM0090 32) at 500 kbit/s.
+//!
+//! Nothing here waits except for initialisation mode, with a limit. A frame that a mailbox could not
+//! send within [`STALE_MS`] is aborted, so a bus that comes back does not get old values. After bus-off
+//! the controller is restarted at growing intervals: a node that is broken does not disturb the bus
+//! all the time.
+#![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
+
+use super::pac;
+use core::sync::atomic::{AtomicU32, Ordering};
+use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::service::event::CanFault;
+
+/// Bit rate of the segments below.
+pub const BITS_PER_SECOND: u32 = 500_000;
+/// Age at which a frame that waits for the bus is dropped, ms.
+pub const STALE_MS: u32 = 20;
+/// 42 MHz / 6 / (1 + 11 + 2) = 500 kbit/s, sampled at 85.7 %.
+const PRESCALER: u16 = 6;
+const SEGMENTS: [u8; 2] = [11, 2];
+/// Polls for a mode of the controller, which it enters within a frame's time.
+const POLLS: u32 = 10_000;
+const MAILBOXES: usize = 3;
+/// TSR: RQCP, TXOK and ABRQ of mailbox 0; the others are 8 and 16 bits on. TME of mailbox 0; the others follow.
+const REQUEST_COMPLETED: u32 = 1;
+const TRANSMITTED: u32 = 1 << 1;
+const ABORT: u32 = 1 << 7;
+const EMPTY: u32 = 1 << 26;
+/// Interval from bus-off to a restart, ms: the first one, and the longest. It doubles every time, until the
+/// controller has stayed on the bus for as long as the longest.
+const FIRST_RESTART_MS: u32 = 10;
+const LAST_RESTART_MS: u32 = 1_280;
+
+/// Frames that left a mailbox unsent. The transmit interrupt alone counts.
+static ABORTED: AtomicU32 = AtomicU32::new(0);
+
+/// How the controller takes part in the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// As a node.
+    Normal,
+    /// It hears its own frames and nothing else; the pin stays recessive.
+    Loopback,
+}
+
+/// The state of error confinement (ISO 11898-1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd)]
+pub enum State {
+    /// Few errors.
+    Active,
+    /// An error counter has reached 96.
+    Warning,
+    /// An error counter has passed 127: the controller no longer destroys frames.
+    Passive,
+    /// The controller has taken itself off the bus.
+    Off,
+}
+
+/// What is done about bus-off.
+#[derive(Debug, Clone, Copy)]
+enum Recovery {
+    /// The controller takes part in the bus since a time, ms.
+    On { since: u32 },
+    /// It is restarted at a time, ms.
+    Waits { until: u32 },
+    /// Initialisation mode is requested; leaving it starts the recovery (RM0090 32.7.6).
+    Restarts,
+}
+
+/// The sending half of the controller.
+pub struct Can {
+    registers: pac::CAN1,
+    /// When each mailbox got its frame, ms.
+    requested: [u32; MAILBOXES],
+    recovery: Recovery,
+    interval_ms: u32,
+}
+
+impl Can {
+    /// Initialises the controller, which takes part in the bus from [`Can::join`] on. The frames of up to 14
+    /// identifiers are received, and nothing else.
+    ///
+    /// # Errors
+    /// The step that the controller does not confirm.
+    pub fn start(can: pac::CAN1, ids: impl Iterator<Item = Id>, mode: Mode) -> Result<Self, CanFault> {
+        // It sleeps after a reset, and does not initialise before it is woken (RM0090 32.4).
+        can.mcr().modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
+        if !within(|| can.msr().read().slak().bit_is_clear()) {
+            return Err(CanFault::Sleeping);
+        }
+        if !within(|| can.msr().read().inak().bit_is_set()) {
+            return Err(CanFault::NotInitialising);
+        }
+        let [before, after] = SEGMENTS;
+        let loopback = mode == Mode::Loopback;
+        // SAFETY: fields hold the value less one (RM0090 32.9.2).
+        can.btr().write(|w| unsafe {
+            w.brp().bits(PRESCALER - 1).ts1().bits(before - 1).ts2().bits(after - 1).sjw().bits(0);
+            w.lbkm().bit(loopback).silm().bit(loopback)
+        });
+        receive_only(&can, ids);
+        can.ier().write(|w| w.fmpie0().set_bit().tmeie().set_bit());
+        // Frames leave in the order of their requests.
+        can.mcr().modify(|_, w| w.txfp().set_bit());
+        let recovery = Recovery::On { since: 0 };
+        Ok(Self { registers: can, requested: [0; MAILBOXES], recovery, interval_ms: FIRST_RESTART_MS })
+    }
+
+    /// Takes part in the bus. The controller waits for 11 recessive bits by itself. Called when received frames
+    /// can be taken: a receive FIFO holds three.
+    pub fn join(&self) {
+        self.registers.mcr().modify(|_, w| w.inrq().clear_bit());
+    }
+
+    /// The state of error confinement.
+    pub fn state(&self) -> State {
+        let errors = self.registers.esr().read();
+        if errors.boff().bit_is_set() || !matches!(self.recovery, Recovery::On { .. }) {
+            State::Off
+        } else if errors.epvf().bit_is_set() {
+            State::Passive
+        } else if errors.ewgf().bit_is_set() {
+            State::Warning
+        } else {
+            State::Active
+        }
+    }
+
+    /// Aborts frames that have become stale, and restarts the controller after bus-off. Called every
+    /// millisecond, with the time in milliseconds.
+    pub fn poll(&mut self, now: u32) {
+        let off = self.registers.esr().read().boff().bit_is_set();
+        self.recovery = match self.recovery {
+            Recovery::On { .. } if off => {
+                self.abort(|_| true);
+                let until = now.wrapping_add(self.interval_ms);
+                self.interval_ms = (2 * self.interval_ms).min(LAST_RESTART_MS);
+                Recovery::Waits { until }
+            }
+            Recovery::On { since } => {
+                if now.wrapping_sub(since) > LAST_RESTART_MS {
+                    self.interval_ms = FIRST_RESTART_MS;
+                }
+                self.abort(|requested| now.wrapping_sub(requested) > STALE_MS);
+                self.recovery
+            }
+            Recovery::Waits { until } if (now.wrapping_sub(until) as i32) < 0 => self.recovery,
+            Recovery::Waits { .. } => {
+                self.registers.mcr().modify(|_, w| w.inrq().set_bit());
+                Recovery::Restarts
+            }
+            Recovery::Restarts if self.registers.msr().read().inak().bit_is_set() => {
+                self.join();
+                Recovery::On { since: now }
+            }
+            Recovery::Restarts => Recovery::Restarts,
+        };
+    }
+
+    /// Aborts the frames whose time of request is chosen.
+    fn abort(&self, chosen: impl Fn(u32) -> bool) {
+        let pending = !self.registers.tsr().read().bits();
+        let bits = |bits: u32, (k, requested): (usize, &u32)| {
+            let chosen = pending & EMPTY << k != 0 && chosen(*requested);
+            bits | if chosen { ABORT << (8 * k) } else { 0 }
+        };
+        let bits = self.requested.iter().enumerate().fold(0, bits);
+        if bits != 0 {
+            // SAFETY: ones request an abort, zeros change nothing (RM0090 32.9.2).
+            // reset value: 0x1C00_0000, read-only bits
+            self.registers.tsr().write(|w| unsafe { w.bits(bits) });
+        }
+    }
+
+    /// Gives a frame to a mailbox; whether one was free. `now` is the time in milliseconds.
+    pub fn transmit(&mut self, frame: &DataFrame, now: u32) -> bool {
+        let status = self.registers.tsr().read().bits();
+        let Some(index) = (0..MAILBOXES).find(|k| status & EMPTY << k != 0) else { return false };
+        if let Some(requested) = self.requested.get_mut(index) {
+            *requested = now;
+        }
+        let mut data = [0; 8];
+        for (byte, from) in data.iter_mut().zip(frame.data()) {
+            *byte = *from;
+        }
+        let [a, b, c, d, e, f, g, h] = data;
+        let mailbox = self.registers.tx(index);
+        // SAFETY: an empty mailbox; a length up to 8, any data, an identifier, then the request.
+        unsafe {
+            mailbox.tdtr().write(|w| w.dlc().bits(frame.data().len() as u8));
+            mailbox.tdlr().write(|w| w.bits(u32::from_le_bytes([a, b, c, d])));
+            mailbox.tdhr().write(|w| w.bits(u32::from_le_bytes([e, f, g, h])));
+            mailbox.tir().write(|w| w.bits(word(frame.id())).txrq().set_bit());
+        }
+        true
+    }
+}
+
+fn within(ready: impl Fn() -> bool) -> bool {
+    (0..POLLS).any(|_| ready())
+}
+
+/// Sets one filter bank for each identifier, as a list that names it twice; all else is not received.
+fn receive_only(can: &pac::CAN1, ids: impl Iterator<Item = Id>) {
+    can.fmr().modify(|_, w| w.finit().set_bit());
+    // SAFETY: one bit for each bank that CAN1 has; `take` keeps to them.
+    unsafe {
+        can.fa1r().write(|w| w.bits(0));
+        let mut banks = 0;
+        for (k, (bank, id)) in can.fb_iter().zip(ids).take(14).enumerate() {
+            bank.fr1().write(|w| w.bits(word(id)));
+            bank.fr2().write(|w| w.bits(word(id)));
+            banks |= 1 << k;
+        }
+        can.fm1r().write(|w| w.bits(banks));
+        can.fs1r().write(|w| w.bits(banks));
+        can.ffa1r().write(|w| w.bits(0));
+        can.fa1r().write(|w| w.bits(banks));
+    }
+    can.fmr().modify(|_, w| w.finit().clear_bit());
+}
+
+/// An identifier as mailboxes and filters hold it (RM0090 32.9.3).
+fn word(id: Id) -> u32 {
+    match id {
+        Id::Standard(id) => u32::from(id.as_raw()) << 21,
+        Id::Extended(id) => id.as_raw() << 3 | 1 << 2,
+    }
+}
+
+/// Frames that left a mailbox unsent since the start.
+pub fn aborted() -> u32 {
+    ABORTED.load(Ordering::Relaxed)
+}
+
+/// Handles the transmit interrupt: clears it and counts frames that were aborted.
+pub fn transmitted() {
+    // SAFETY: the completion flags belong to this handler.
+    let can = unsafe { &*pac::CAN1::ptr() };
+    let status = can.tsr().read().bits();
+    let mut completed = 0;
+    for k in 0..MAILBOXES {
+        if status & REQUEST_COMPLETED << (8 * k) != 0 {
+            completed |= REQUEST_COMPLETED << (8 * k);
+            if status & TRANSMITTED << (8 * k) == 0 {
+                ABORTED.store(ABORTED.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
+            }
+        }
+    }
+    // SAFETY: a one in RQCP clears the flags of its mailbox and the interrupt.
+    // reset value: 0x1C00_0000, read-only bits
+    can.tsr().write(|w| unsafe { w.bits(completed) });
+}
+
+/// A frame from the receive FIFO.
+#[derive(Debug)]
+pub struct Received {
+    /// The frame; `None`: a remote frame.
+    pub frame: Option<DataFrame>,
+    /// Whether at least one frame was lost before it.
+    pub lost: bool,
+}
+
+/// Takes the oldest frame that has come. Called by the receive interrupt alone.
+pub fn receive() -> Option<Received> {
+    // SAFETY: the sending half touches none of these registers after `Can::start`.
+    let can = unsafe { &*pac::CAN1::ptr() };
+    let state = can.rfr(0).read();
+    if state.fmp().bits() == 0 {
+        return None;
+    }
+    let (mailbox, lost) = (can.rx(0), state.fovr().bit_is_set());
+    let head = mailbox.rir().read();
+    let id = match head.ide().bit_is_set() {
+        true => ExtendedId::new(head.bits() >> 3).map(Id::Extended),
+        false => StandardId::new((head.bits() >> 21) as u16).map(Id::Standard),
+    };
+    let words = [mailbox.rdlr().read().bits(), mailbox.rdhr().read().bits()];
+    let length = mailbox.rdtr().read().dlc().bits();
+    let data = (u64::from(words[1]) << 32 | u64::from(words[0])).to_le_bytes();
+    let bytes = data.get(..usize::from(length.min(8))).unwrap_or_default();
+    let frame = id.filter(|_| head.rtr().bit_is_clear()).and_then(|id| DataFrame::new(id, bytes));
+    // Written as a whole: the other bits are cleared by ones, and only those that were read.
+    can.rfr(0).write(|w| w.fovr().bit(lost).rfom().set_bit());
+    Some(Received { frame, lost })
+}

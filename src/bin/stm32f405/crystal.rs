@@ -1,0 +1,81 @@
+//! Measures the crystal against the internal oscillator (RM0090 7.2.11): TIM11 counts the internal
+//! 16 MHz and captures at every 248th period of the crystal.
+//!
+//! A crystal of another frequency still locks the PLL, and every bit rate would be wrong by the same
+//! factor. The internal oscillator is within -8 and +4.5 % from -40 to 105 degrees Celsius (DS8626
+//! table 39), so frequencies that differ by less than 10 % cannot be told apart.
+#![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
+
+use super::{clock_delay, clocks::INTERNAL_HZ, pac};
+use gyronet::service::event::ClockFault;
+
+/// The crystal's divider ahead of the timer (RTCPRE), and captures are of every eighth edge.
+const DIVIDER: u8 = 31;
+const EDGES: u32 = 8;
+/// Captures that are counted over: 32 take 31,744 counts with a crystal of 4 MHz, and 65,536 fit.
+const CAPTURES: u32 = 32;
+/// Polls for all captures, twice as many as with a crystal of 4 MHz.
+const POLLS: u32 = 20_000;
+/// Largest deviation, percent.
+const TOLERANCE: u32 = 10;
+
+/// Checks that the running crystal has a frequency, Hz, and gives what was measured.
+///
+/// # Errors
+/// [`ClockFault::CrystalFrequency`] with what was measured, kHz; 0 where nothing could be.
+pub fn check(rcc: &pac::RCC, expected_hz: u32) -> Result<u32, ClockFault> {
+    let measured = measure(rcc).unwrap_or(0);
+    let limit = expected_hz / 100 * TOLERANCE;
+    if measured.abs_diff(expected_hz) <= limit {
+        Ok(measured)
+    } else {
+        Err(ClockFault::CrystalFrequency { khz: (measured / 1_000).min(u16::MAX.into()) as u16 })
+    }
+}
+
+/// Measures the running crystal, Hz; the chip must be on its internal oscillator.
+fn measure(rcc: &pac::RCC) -> Option<u32> {
+    rcc.cfgr().modify(|_, w| w.rtcpre().set(DIVIDER));
+    rcc.apb2enr().modify(|_, w| w.tim11en().enabled());
+    clock_delay();
+    // SAFETY: the timer is used here alone, before interrupts are on.
+    let timer = unsafe { pac::TIM11::steal() };
+    // SAFETY: TI1_RMP = 10 selects the divided crystal (RM0090 19.5.11); CC1S = 01 makes channel 1 an
+    // input of it, IC1PSC = 11 captures every eighth edge (RM0090 19.5.4).
+    unsafe {
+        timer.or().write(|w| w.bits(0b10));
+        timer.ccmr1_input().write(|w| w.bits(0b11 << 2 | 0b01));
+        timer.ccer().write(|w| w.bits(1));
+        timer.cr1().write(|w| w.cen().set_bit());
+    }
+    let counts = count(&timer);
+    timer.cr1().write(|w| w.cen().clear_bit());
+    rcc.apb2enr().modify(|_, w| w.tim11en().disabled());
+    let periods = u64::from(u32::from(DIVIDER) * EDGES * CAPTURES);
+    let hz = (u64::from(INTERNAL_HZ) * periods).checked_div(counts?.into())?;
+    u32::try_from(hz).ok()
+}
+
+/// Counts of the timer over all captures; `None` when they do not come, or one was missed.
+fn count(timer: &pac::TIM11) -> Option<u16> {
+    // The first one ends an unknown part of a period, so the second begins the count.
+    let (mut seen, mut first) = (0, 0);
+    for _ in 0..POLLS {
+        let status = timer.sr().read();
+        if status.cc1of().bit_is_set() {
+            return None;
+        }
+        if status.cc1if().bit_is_set() {
+            // Reading the capture clears its flag (RM0090 19.5.3).
+            let captured = timer.ccr1().read().bits() as u16;
+            seen += 1;
+            if seen == 2 {
+                first = captured;
+            }
+            if seen == CAPTURES + 2 {
+                return Some(captured.wrapping_sub(first));
+            }
+        }
+    }
+    None
+}

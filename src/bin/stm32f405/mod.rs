@@ -1,0 +1,65 @@
+//! An STM32F405 (RM0090): its clocks, pins and peripherals, each driver in a file of its own.
+//!
+//! Nothing in here waits without a limit, and what does not come is reported. A register that is
+//! written as a whole begins at its reset value (svd2rust's `write`), so lines that write one whose
+//! reset value is not zero say so, and a test holds them to it.
+
+pub mod can;
+pub mod clocks;
+pub mod crystal;
+pub mod flash;
+pub mod pins;
+pub mod reset;
+pub mod spi;
+pub mod supply;
+pub mod timer;
+pub mod usart;
+pub mod watchdog;
+
+pub use stm32f4::stm32f405 as pac;
+
+use clocks::Clocks;
+use gyronet::service::event::ResetCause;
+
+/// What the chip reports of itself once its clocks run.
+pub struct Chip {
+    /// Frequencies, and why they are not the full ones.
+    pub clocks: Clocks,
+    /// DBGMCU_IDCODE (RM0090 38.6.1); `None` where it reads as zero, as in QEMU.
+    pub device_id: Option<u32>,
+    /// Why the chip has started.
+    pub reset: ResetCause,
+}
+
+impl Chip {
+    /// Starts the watchdog, the clock tree, board time and the clocks of all peripherals in use.
+    pub fn start(p: &pac::Peripherals, crystal_hz: u32) -> Self {
+        watchdog::start(&p.DBGMCU);
+        let id = p.DBGMCU.idcode().read().bits();
+        let device_id = (id != 0).then_some(id);
+        let reset = reset::cause(&p.RCC);
+        let clocks = match device_id {
+            Some(_) => Clocks::start(&p.RCC, &p.FLASH, &p.PWR, crystal_hz),
+            None => Clocks::EMULATED,
+        };
+        timer::start(&p.RCC, &p.TIM5, &clocks);
+        enable_peripherals(&p.RCC);
+        Self { clocks, device_id, reset }
+    }
+}
+
+/// Waits until a peripheral's clock that was switched on has come: 1 + 4 cycles of the slowest bus' prescaler
+/// (ES0182 2.1.13).
+pub fn clock_delay() {
+    cortex_m::asm::dsb();
+    cortex_m::asm::delay(16);
+}
+
+/// Switches on the clocks of ports and peripherals.
+fn enable_peripherals(rcc: &pac::RCC) {
+    rcc.ahb1enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
+    rcc.apb1enr().modify(|_, w| w.usart2en().enabled().usart3en().enabled().can1en().enabled());
+    rcc.apb2enr()
+        .modify(|_, w| w.usart1en().enabled().usart6en().enabled().spi1en().enabled().syscfgen().enabled());
+    clock_delay();
+}

@@ -1,0 +1,56 @@
+//! Board time: TIM5 (RM0090 18) as a free-running 32-bit counter of microseconds.
+//!
+//! The counter goes on while an erase of the flash stalls the processor, so no time is lost by one.
+//! It wraps every 71.6 minutes. [`Time::tick`], called every millisecond, counts the half-wraps;
+//! a reader combines both and is right at any priority, as long as it is at most half a wrap late.
+#![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
+
+use super::{clock_delay, clocks::Clocks, pac};
+use core::sync::atomic::{AtomicU32, Ordering};
+
+const HZ: u32 = 1_000_000;
+
+/// Half-wraps of the counter since the start.
+static HALVES: AtomicU32 = AtomicU32::new(0);
+
+/// Starts the counter at zero.
+pub fn start(rcc: &pac::RCC, timer: &pac::TIM5, clocks: &Clocks) {
+    rcc.apb1enr().modify(|_, w| w.tim5en().enabled());
+    clock_delay();
+    // SAFETY: any prescaler and any end of the count are valid; UG takes both over (RM0090 18.4.6).
+    unsafe {
+        timer.psc().write(|w| w.bits(clocks.timer_hz / HZ - 1));
+        timer.arr().write(|w| w.bits(u32::MAX));
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+    }
+}
+
+fn counter() -> u32 {
+    // SAFETY: the register is only read.
+    unsafe { &*pac::TIM5::ptr() }.cnt().read().bits()
+}
+
+/// Counts half-wraps. The SysTick handler calls it every millisecond.
+#[inline]
+pub fn tick() {
+    let halves = HALVES.load(Ordering::Relaxed);
+    if counter() >> 31 != halves & 1 {
+        HALVES.store(halves.wrapping_add(1), Ordering::Relaxed);
+    }
+}
+
+/// Microseconds since the start.
+#[inline]
+pub fn micros() -> u64 {
+    // Read first: a half-wrap that is counted in between is then seen in the counter alone.
+    let halves = HALVES.load(Ordering::Acquire);
+    let count = counter();
+    // A counter in the other half than the count says has just entered the next one.
+    (u64::from(halves) << 31) + u64::from(count ^ (halves & 1) << 31)
+}
+
+/// Milliseconds since the start; they wrap.
+pub fn milliseconds() -> u32 {
+    (micros() / 1_000) as u32
+}

@@ -1,0 +1,91 @@
+//! The frames of one sample of the inertial sensor, as they are configured.
+
+use super::DataFrame;
+use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};
+use super::config::{BoschSettings, Config, MAX_MESSAGES};
+use super::j1939::{Validity, Vdc2Encoder};
+use super::yaw::Quality;
+use super::yaw_encoder::YawEncoder;
+use crate::estimate::VehicleSample;
+use crate::health::count;
+use heapless::Vec;
+
+/// The encoder of every configured message. It carries the rounding residual of each signal.
+#[derive(Debug, Clone, Copy)]
+pub struct CanEncoder {
+    config: Config,
+    bosch: SetEncoder,
+    yaw: Option<YawEncoder>,
+    vdc2: Vdc2Encoder,
+    out_of_range: u32,
+}
+
+impl CanEncoder {
+    /// Begins before the first message.
+    #[must_use]
+    pub fn new(config: Config) -> Self {
+        let yaw = config.settings().yaw;
+        Self {
+            config,
+            bosch: SetEncoder::default(),
+            yaw: yaw.map(|yaw| YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw())),
+            vdc2: Vdc2Encoder::default(),
+            out_of_range: 0,
+        }
+    }
+
+    /// Messages that reported "failed" because a value does not fit its signal.
+    #[must_use]
+    pub fn out_of_range(&self) -> u32 {
+        self.out_of_range
+    }
+
+    /// Encodes the frames of one sample.
+    #[inline(never)]
+    pub fn encode(&mut self, sample: &VehicleSample) -> Vec<DataFrame, MAX_MESSAGES> {
+        let (status, validity) = match sample.prompt.quality {
+            Quality::Good | Quality::Degraded => (SignalStatus::OK, Validity::Valid),
+            Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
+            Quality::Unusable => (SignalStatus::FAILURE, Validity::Error),
+        };
+        // The accelerometer is in the same part as the gyro.
+        let unusable = sample.prompt.quality == Quality::Unusable;
+        let force_status = if unusable { SignalStatus::FAILURE } else { SignalStatus::OK };
+        let settings = *self.config.settings();
+        let mut frames = Vec::new();
+        // MAX_MESSAGES is what a configuration can have at most.
+        let mut send = |frame: Option<DataFrame>| frame.map(|frame| frames.push(frame).is_ok());
+        if let Some(BoschSettings { tx1_only }) = settings.bosch {
+            let messages = self.bosch.encode(&motion(sample, status, force_status));
+            let sent = if tx1_only { 1 } else { LAYOUTS.len() };
+            for (message, layout) in messages.iter().zip(&LAYOUTS).take(sent) {
+                let fits = message.rate_status == status && message.acceleration_status == force_status;
+                count(&mut self.out_of_range, u32::from(!fits));
+                send(message.frame(layout));
+            }
+        }
+        if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw) {
+            for frame in feed.frames(&sample.navigation, yaw.ids) {
+                send(Some(frame));
+            }
+        }
+        if let Some(vdc2) = settings.vdc2 {
+            let message = self.vdc2.encode(sample.prompt.rate, validity, &sample.specific_force);
+            count(&mut self.out_of_range, u32::from(validity != Validity::Error && message.has_error()));
+            send(message.frame(vdc2.source));
+        }
+        frames
+    }
+}
+
+/// The grid step is the counter, so that a receiver sees what is missing.
+fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
+    Motion {
+        angular_rate: [sample.roll_rate, sample.pitch_rate, sample.prompt.rate],
+        specific_force: sample.specific_force,
+        temperature: sample.temperature,
+        rate_status,
+        force_status,
+        counter: (sample.tick & 0x0F) as u8,
+    }
+}

@@ -1,0 +1,135 @@
+//! The sending side of the yaw messages: estimates in, three protected messages out.
+
+use super::DataFrame;
+use super::carry::{RoundingCarry, Scale};
+use super::e2e::{Profile, Protector};
+use super::yaw::{
+    AngleMessage, DetailMessage, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle,
+    encode_latency, encode_sigma,
+};
+use crate::estimate::YawEstimate;
+use crate::units::AngularRate;
+use embedded_can::{Frame, StandardId};
+
+/// The encoder of one set of messages for every `every` samples.
+///
+/// The rate and the correction are the mean over those samples: a receiver that multiplies by
+/// the period gets the whole angle, whatever the period.
+#[derive(Debug, Clone, Copy)]
+pub struct YawEncoder {
+    protectors: [Protector; 3],
+    sample_counter: u8,
+    every: u8,
+    samples: u8,
+    rate: Mean,
+    correction: Mean,
+    faults: Faults,
+}
+
+impl YawEncoder {
+    /// Begins before the first message. `profiles` are those of rate, angle and detail; `every` is the number of
+    /// samples per set, at least one.
+    #[must_use]
+    pub fn new(profiles: [Profile; 3], every: u8) -> Self {
+        Self {
+            protectors: profiles.map(Protector::new),
+            sample_counter: 0,
+            every: every.max(1),
+            samples: 0,
+            rate: Mean::new(Scale::MICRO_DEG_PER_SEC),
+            correction: Mean::new(Scale::FIFTH_MILLI_DEG_PER_SEC),
+            faults: Faults::NONE,
+        }
+    }
+
+    /// Encodes a sample as frames under identifiers (11 bits) of rate, angle and detail, when they are due.
+    pub fn frames(&mut self, sample: &YawEstimate, ids: [u16; 3]) -> impl Iterator<Item = DataFrame> {
+        let messages = self.encode(sample).into_iter().flatten();
+        messages.zip(ids).filter_map(|(message, id)| DataFrame::new(StandardId::new(id)?, &message))
+    }
+
+    /// Takes a sample, and returns the messages of rate, angle and detail when they are due.
+    #[inline(never)]
+    pub fn encode(&mut self, sample: &YawEstimate) -> Option<[[u8; 8]; 3]> {
+        self.rate.sum += i64::from(sample.rate.0);
+        self.correction.sum += i64::from(sample.correction.0);
+        // A fault that lasted one sample must not fall between two messages.
+        self.faults = self.faults.with(sample.faults);
+        self.samples += 1;
+        if self.samples < self.every {
+            return None;
+        }
+        self.samples = 0;
+        let faults = core::mem::take(&mut self.faults);
+        let rate = self.rate.take(self.every);
+        let correction = self.correction.take(self.every);
+        let rate = match sample.quality {
+            Quality::Good | Quality::Degraded => rate,
+            Quality::Initialising => {
+                // Nobody sums these up.
+                self.rate.reset();
+                rate
+            }
+            Quality::Unusable => {
+                self.rate.reset();
+                RATE_NOT_AVAILABLE
+            }
+        };
+        let correction = self.limit(correction);
+        let messages = [
+            RateMessage { rate, source: sample.source, quality: sample.quality }.emit(),
+            AngleMessage { yaw: encode_angle(sample.yaw), faults }.emit(),
+            DetailMessage {
+                correction,
+                sigma: encode_sigma(sample.sigma),
+                latency: encode_latency(sample.latency_us),
+            }
+            .emit(),
+        ];
+        Some(self.protect(messages))
+    }
+
+    fn limit(&mut self, correction: i32) -> i16 {
+        let limited = correction.clamp(-i32::from(i16::MAX), i16::MAX.into());
+        if limited != correction {
+            self.correction.reset();
+        }
+        limited as i16
+    }
+
+    fn protect(&mut self, mut messages: [[u8; 8]; 3]) -> [[u8; 8]; 3] {
+        for (message, protector) in messages.iter_mut().zip(&mut self.protectors) {
+            message[2] = self.sample_counter;
+            // Eight bytes fit every profile.
+            let _ = protector.protect(message);
+        }
+        self.sample_counter = self.sample_counter.wrapping_add(1);
+        messages
+    }
+}
+
+/// Mean of some samples, nothing lost: what the division leaves stays in the sum, what the
+/// rounding leaves in the carry.
+#[derive(Debug, Clone, Copy)]
+struct Mean {
+    sum: i64,
+    carry: RoundingCarry,
+}
+
+impl Mean {
+    const fn new(scale: Scale) -> Self {
+        Self { sum: 0, carry: RoundingCarry::new(scale) }
+    }
+
+    fn take(&mut self, samples: u8) -> i32 {
+        let mean = self.sum.checked_div_euclid(samples.into()).unwrap_or(0);
+        self.sum -= mean * i64::from(samples);
+        // A mean of i32 is one.
+        self.carry.encode(AngularRate(mean as i32))
+    }
+
+    fn reset(&mut self) {
+        self.sum = 0;
+        self.carry.reset();
+    }
+}

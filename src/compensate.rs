@@ -1,0 +1,302 @@
+//! From the network's estimates to the rates that go out.
+//!
+//! A sample's best estimate is the mean of what the windows that cover it say ([`Mode`]). It is
+//! known some samples later; two rates go out for every sample all the same:
+//!
+//! - the **prompt** one at once, for a receiver that steers by it. It starts from the mean of the
+//!   last window, for no window has seen the sample yet.
+//! - the **navigation** one [`CompensateConfig::lag`] samples later, for a receiver that sums it
+//!   up to a heading. Most of what there is to know is known by then.
+//!
+//! What a later window changes is not lost: the revision is carried into the rates that follow,
+//! so that the sum of the rates arrives at the sum of the best estimates. One rate carries at
+//! most a bounded part of it, so that none jumps. With c_k(t) the estimate for sample k as known
+//! at sample t, and L the lag:
+//! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`.
+//!
+//! | when | prompt | navigation |
+//! |---|---|---|
+//! | the first window is not full yet | gyro less bias | nothing for the lag, then gyro less bias |
+//! | after a gap, clipping, a late or implausible estimate | gyro less bias until the next window | the best estimate of each sample, gyro less bias where it has none |
+//! | clipped sample | gyro less bias, marked; nothing is carried into it | the same |
+//! | wheels prove that the vehicle stands | as ever | zero |
+//!
+//! Samples are counted, not time: a gap delays the samples before it, it swallows none.
+
+mod mode;
+
+pub use mode::{DELAY, Hop, Lag, Mode, OutOfRange};
+
+use crate::model::Corrections;
+use crate::sample::Validity;
+use crate::units::AngularRate;
+use crate::window::WINDOW;
+use serde::{Deserialize, Serialize};
+
+/// How estimates of the gyro's error become rates that go out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CompensateConfig {
+    /// Which estimates.
+    pub mode: Mode,
+    /// How late the navigation rate goes out.
+    pub lag: Lag,
+    /// A window whose mean correction is larger is not believed (rad/s code). Vibration makes
+    /// single corrections large; their mean is bias-like and small.
+    pub max_mean: AngularRate,
+    /// Neither is one with a single correction that is larger.
+    pub max_single: AngularRate,
+    /// Largest part of the revisions that one rate carries.
+    pub max_carry: AngularRate,
+}
+
+impl CompensateConfig {
+    /// A window every five samples, both estimates of a sample averaged; 70 ms, the least lag
+    /// that costs nothing on the validation drive (`cargo gyronet evaluate --lags`); 3 deg/s for
+    /// a window's mean, 30 deg/s for one correction, 1 deg/s of carry.
+    pub const DEFAULT: Self = Self {
+        mode: Mode::Overlap { hop: Hop::HALF },
+        lag: match Lag::new(7) {
+            Some(lag) => lag,
+            None => Lag::MAX,
+        },
+        max_mean: AngularRate(7_027_624),
+        max_single: AngularRate(70_276_240),
+        max_carry: AngularRate(2_342_541),
+    };
+}
+
+/// Samples over which a carry may be spread before it is reported: 0.25 deg with the default bound.
+const LONG: u64 = 25;
+/// Samples that are kept: the newest, and as many before it as a window can still change.
+const KEPT: usize = Lag::MAX.samples() + 1;
+
+/// One sample and the best estimate for it so far.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    tick: u32,
+    /// Gyro less static bias.
+    rate: i32,
+    validity: Validity,
+    /// The navigation rate went out as zero, whatever the estimate.
+    held: bool,
+    sum: i64,
+    count: i32,
+    /// The estimate; the prior where `count` is 0.
+    estimate: i32,
+}
+
+/// A compensated rate and what was taken off for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Compensated {
+    /// Grid step of the sample.
+    pub tick: u32,
+    /// The corrected rate.
+    pub rate: AngularRate,
+    /// What was taken off the gyro less its static bias.
+    pub correction: AngularRate,
+    /// A window has covered this very sample.
+    pub covered: bool,
+    /// Whether the sample's reading could be used.
+    pub validity: Validity,
+}
+
+/// A sample that no window will change any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Settled {
+    /// Grid step of the sample.
+    pub tick: u32,
+    /// Gyro less static bias.
+    pub rate: AngularRate,
+    /// What the network's estimates take off it.
+    pub correction: AngularRate,
+    /// Whether it is good: a window has covered it, and the part was not saturated.
+    pub good: bool,
+}
+
+impl Settled {
+    /// The rate that is left when the correction is taken off; `None` where it is not good.
+    #[must_use]
+    pub fn left(&self) -> Option<AngularRate> {
+        self.good.then_some(AngularRate(self.rate.0.saturating_sub(self.correction.0)))
+    }
+}
+
+/// A window's estimate was rejected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Implausible {
+    /// The mean correction of the window.
+    pub mean: AngularRate,
+    /// Its largest one.
+    pub largest: AngularRate,
+}
+
+/// Estimates of the samples that a window can still reach, and what is left to carry.
+#[derive(Debug, Clone)]
+pub struct Compensator {
+    config: CompensateConfig,
+    /// The newest sample last.
+    kept: [Option<Entry>; KEPT],
+    /// Mean of the last window: what a sample goes out with before a window has covered it.
+    prior: i32,
+    /// Revisions not yet in the prompt rate, and in the navigation rate.
+    prompt_carry: i64,
+    navigation_carry: i64,
+    /// What standing took off the navigation rate beyond the estimates: in the second before
+    /// the last [`Compensator::confirm_standstill`], and since.
+    held: [i64; 2],
+}
+
+impl Compensator {
+    /// No estimate yet.
+    #[must_use]
+    pub fn new(config: CompensateConfig) -> Self {
+        Self { config, kept: [None; KEPT], prior: 0, prompt_carry: 0, navigation_carry: 0, held: [0; 2] }
+    }
+
+    /// Revises the samples of the window that ended [`Mode::delay`] samples before the next one.
+    ///
+    /// # Errors
+    /// [`Implausible`]: nothing was revised, and the prior falls back to zero.
+    pub fn revise(&mut self, corrections: &Corrections) -> Result<(), Implausible> {
+        let CompensateConfig { mode, lag, max_mean, max_single, .. } = self.config;
+        let average = mean(corrections);
+        let largest = corrections.iter().max_by_key(|c| c.0.unsigned_abs()).copied().unwrap_or_default();
+        if average.unsigned_abs() > max_mean.0.unsigned_abs()
+            || largest.0.unsigned_abs() > max_single.0.unsigned_abs()
+        {
+            self.prior = 0;
+            return Err(Implausible { mean: AngularRate(average), largest });
+        }
+        let used = mode.used();
+        self.prior = mean(corrections.get(used.clone()).unwrap_or(corrections));
+        let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
+        for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
+            let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
+            entry.sum += i64::from(correction.0);
+            entry.count += 1;
+            let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
+            let revision = estimate - i64::from(entry.estimate);
+            entry.estimate = estimate as i32;
+            self.prompt_carry += revision;
+            let age = KEPT - 1 - (oldest + place);
+            match (age >= lag.samples(), entry.held) {
+                (true, false) => self.navigation_carry += revision,
+                (true, true) => self.held[1] -= revision,
+                (false, _) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes in a sample: its gyro rate less static bias.
+    pub fn push(&mut self, tick: u32, rate: AngularRate, validity: Validity) {
+        self.kept.rotate_left(1);
+        let estimate = self.prior;
+        self.kept[KEPT - 1] =
+            Some(Entry { tick, rate: rate.0, validity, held: false, sum: 0, count: 0, estimate });
+    }
+
+    /// The rate of the newest sample, less a bias that is taken off beside the estimate.
+    ///
+    /// What is owed is not paid in a rate that a receiver drops: a clipped one.
+    pub fn prompt(&mut self, bias: AngularRate) -> Option<Compensated> {
+        let entry = self.kept[KEPT - 1]?;
+        let taken = i64::from(entry.estimate) + i64::from(bias.0);
+        Some(emit(&entry, taken, &mut self.prompt_carry, self.config.max_carry))
+    }
+
+    /// The rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before
+    /// there is one. Call it once for each sample.
+    ///
+    /// `stands`: the vehicle has stood since before that sample was taken, so its rate is zero.
+    pub fn navigation(&mut self, bias: AngularRate, stands: bool) -> Option<Compensated> {
+        let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
+        entry.held = stands && entry.validity.is_good();
+        let mut taken = i64::from(entry.estimate) + i64::from(bias.0);
+        if entry.held {
+            self.held[1] += i64::from(entry.rate) - taken;
+            taken = i64::from(entry.rate);
+        }
+        Some(emit(entry, taken, &mut self.navigation_carry, self.config.max_carry))
+    }
+
+    /// The newest sample that no window will change any more; each sample is it once.
+    #[must_use]
+    pub fn settled(&self) -> Option<Settled> {
+        let entry = self.kept.iter().nth_back(self.config.mode.settled_after())?.as_ref()?;
+        Some(Settled {
+            tick: entry.tick,
+            rate: AngularRate(entry.rate),
+            correction: AngularRate(entry.estimate),
+            good: entry.count > 0 && entry.validity.is_good(),
+        })
+    }
+
+    /// No estimate came: the last one is not held on to.
+    pub fn forget(&mut self) {
+        self.prior = 0;
+    }
+
+    /// Confirms that the vehicle stood until the last call of this function; it still stands.
+    pub fn confirm_standstill(&mut self) {
+        self.held = [self.held[1], 0];
+    }
+
+    /// Notes that the vehicle stands no more. It may have moved before that was noticed, so the confirmed
+    /// part of what was held at zero stays zero, and the rest is carried into the next rates.
+    pub fn end_standstill(&mut self) {
+        let [before, since] = core::mem::take(&mut self.held);
+        self.navigation_carry -= before + since;
+    }
+
+    /// Whether the navigation rates have more to carry than a window revises, because the wheels stood while
+    /// the vehicle turned. The rates are off until it is carried.
+    #[must_use]
+    pub fn carry_exceeds_limit(&self) -> bool {
+        let much = LONG * u64::from(self.config.max_carry.0.unsigned_abs());
+        self.navigation_carry.unsigned_abs() > much
+    }
+
+    /// What the sum of the prompt rates has yet to get, codes x samples: revisions that are not
+    /// carried yet.
+    #[must_use]
+    pub fn prompt_owed(&self) -> i64 {
+        -self.prompt_carry
+    }
+
+    /// What the sum of the navigation rates has yet to get: such revisions, and the samples that
+    /// wait for their turn.
+    #[must_use]
+    pub fn navigation_owed(&self, bias: AngularRate) -> i64 {
+        let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
+        let best = |entry: &Entry| i64::from(entry.rate) - i64::from(entry.estimate) - i64::from(bias.0);
+        waiting.map(best).sum::<i64>() - self.navigation_carry
+    }
+}
+
+/// Takes off the estimate and a bounded part of the carry. What the code cannot hold stays owed.
+fn emit(entry: &Entry, taken: i64, carry: &mut i64, max_carry: AngularRate) -> Compensated {
+    // A negative bound would be none.
+    let bound = if entry.validity.is_good() { i64::from(max_carry.0).max(0) } else { 0 };
+    let carried = (*carry).clamp(-bound, bound);
+    let wanted = i64::from(entry.rate) - taken - carried;
+    let rate = wanted.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+    *carry += rate - wanted - carried;
+    let correction = (i64::from(entry.rate) - rate).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+    Compensated {
+        tick: entry.tick,
+        rate: AngularRate(rate as i32),
+        correction: AngularRate(correction as i32),
+        covered: entry.count > 0,
+        validity: entry.validity,
+    }
+}
+
+/// Mean of some corrections, towards zero.
+fn mean(corrections: &[AngularRate]) -> i32 {
+    let sum: i64 = corrections.iter().map(|c| i64::from(c.0)).sum();
+    (sum / corrections.len().max(1) as i64) as i32
+}

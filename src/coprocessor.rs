@@ -1,0 +1,391 @@
+//! The coprocessor: readings, CAN frames and time in; CAN frames, windows for the networks and observations out.
+//!
+//! [`Coprocessor`] owns the order in which the parts of the product work, and does no input or output itself: the
+//! firmware image, a replay of a recorded drive, the fault campaign and a board of your own are adapters around
+//! it, so all of them run the same code. It owns the monitor of the inertial sensor, the pipeline, the wheels, the
+//! way of the fibre-optic gyro, the encoders of the messages, and the rule for late windows.
+//!
+//! Use it in this order:
+//!
+//! 1. Give it what has come: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]; and call
+//!    [`Coprocessor::poll`] every millisecond or so, because silence is found there.
+//! 2. After each of these calls send what [`Coprocessor::next_frame`] returns, until it returns `None`.
+//! 3. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_window`] through the networks, at once or in
+//!    a task of lower priority, and give the estimates to [`Coprocessor::deliver`] and [`Coprocessor::deliver_fog`].
+//!
+//! A window's estimate is used [`crate::compensate::Mode::delay`] samples after it, however early it comes, so the
+//! frames do not depend on the speed of the machine. Should samples come faster than 100 times a second,
+//! [`Coprocessor::is_ready`] says when the next one has to wait for the estimate before it.
+
+mod config;
+mod handover;
+mod timeline;
+
+pub use config::{Clock, Config, InputError, StorageFaults};
+
+use crate::bias::StaticError;
+use crate::can::DataFrame;
+use crate::can::config::MAX_MESSAGES;
+use crate::can::encoder::CanEncoder;
+use crate::can::fog_encoder::FogEncoder;
+use crate::can::wheel::WheelReceiver;
+use crate::compensate::Settled;
+use crate::estimate::{VehicleSample, YawEstimate};
+use crate::fog::seconds::SecondsWindow;
+use crate::fog::{FogCounters, FogPipeline};
+use crate::health::{BoardFaults, InputCounters, WatchCounters, count};
+use crate::model::Estimate;
+use crate::model::fognet::FogEstimate;
+use crate::monitor::{SensorMonitor, TIMEOUT_US};
+use crate::pipeline::{DueWindow, Pipeline};
+use crate::sample::{FogSample, ImuSample, Standstill, WheelSample};
+use crate::units::Micros;
+use handover::Handover;
+use heapless::Deque;
+use timeline::Timeline;
+
+/// Frames that may wait for [`Coprocessor::next_frame`]: those of a sample and of a step of the fibre-optic gyro.
+const FRAMES: usize = MAX_MESSAGES + 3;
+
+/// A frame to send.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimedFrame {
+    /// The frame.
+    pub frame: DataFrame,
+    /// The sensor's time of the sample that it belongs to.
+    pub time: Micros,
+}
+
+/// The results of one sample, or of its absence, for a log or a service line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// The sample with its validity; `None` where the sensor is silent.
+    pub sample: Option<ImuSample>,
+    /// Everything that is sent for it.
+    pub vehicle: VehicleSample,
+    /// Whether the vehicle stands by its wheels.
+    pub wheels: Standstill,
+    /// The sample whose estimate is final with this one.
+    pub settled: Option<Settled>,
+    /// The reason why static initialisation was refused with this sample.
+    pub refused: Option<StaticError>,
+}
+
+/// The bus as the caller sees it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bus {
+    lost: u32,
+    is_off: bool,
+    /// The lost frames that the messages have reported.
+    reported: u32,
+}
+
+/// The coprocessor of one vehicle.
+#[derive(Debug, Clone)]
+pub struct Coprocessor {
+    clock: Clock,
+    storage: StorageFaults,
+    bus: Bus,
+    timeline: Timeline,
+    monitor: SensorMonitor,
+    pipeline: Pipeline,
+    handover: Handover,
+    wheels: Option<WheelReceiver>,
+    /// The newest report of the wheels.
+    known_wheels: Option<WheelSample>,
+    fog: FogPipeline,
+    /// The newest rate of the fibre-optic gyro.
+    fog_estimate: Option<YawEstimate>,
+    encoder: CanEncoder,
+    fog_encoder: FogEncoder,
+    frames: Deque<TimedFrame, FRAMES>,
+    /// The newest sample: its own time, and when it came.
+    sample_time: Micros,
+    heard: Micros,
+    /// Rates are withheld.
+    paused: bool,
+    counters: InputCounters,
+}
+
+impl Coprocessor {
+    /// Begins before the first input, at time 0.
+    #[must_use]
+    #[inline(never)]
+    pub fn new(config: Config) -> Self {
+        let mut fog = FogPipeline::new(config.fog, config.has_fognet);
+        if config.fog_expected {
+            fog.expect(Micros(0));
+        }
+        Self {
+            clock: config.clock,
+            storage: config.storage,
+            bus: Bus::default(),
+            timeline: Timeline::default(),
+            monitor: SensorMonitor::new(config.clock_ratio.filter(|_| config.clock == Clock::Outside)),
+            handover: Handover::new(config.has_gyronet, config.pipeline.compensate.mode.delay()),
+            pipeline: Pipeline::new(config.pipeline),
+            wheels: config.wheels,
+            known_wheels: None,
+            fog,
+            fog_estimate: None,
+            encoder: CanEncoder::new(config.can),
+            fog_encoder: FogEncoder::new(config.fog_ids),
+            frames: Deque::new(),
+            sample_time: Micros(0),
+            heard: Micros(0),
+            paused: false,
+            counters: InputCounters::default(),
+        }
+    }
+
+    /// Takes a sample of the inertial sensor that has come at `now`.
+    ///
+    /// # Errors
+    /// [`InputError::Imu`] when its time stamp has no place on the grid, [`InputError::ClockWentBack`]. The sample is
+    /// counted and not used, and no frame is sent for it; the next ones report a gap.
+    #[inline(never)]
+    pub fn imu(&mut self, sample: ImuSample, now: Micros) -> Result<Observation, InputError> {
+        let now = self.advance(now)?;
+        self.sample_time = sample.time;
+        if let Some(wheels) = self.poll_wheels() {
+            self.pipeline.wheels(wheels);
+        }
+        let sample = ImuSample { validity: self.monitor.judge(&sample), ..sample };
+        self.report_board();
+        let output = self.pipeline.process(sample).map_err(InputError::Imu)?;
+        self.monitor.heard(sample.time, now);
+        self.heard = now;
+        self.send(&output.vehicle, sample.time);
+        if let Some(window) = output.window {
+            let replaced = self.handover.offer(window, now);
+            count(&mut self.counters.replaced_windows, u32::from(replaced));
+        }
+        let (settled, refused) = (output.settled, output.refused);
+        let wheels = self.standstill();
+        Ok(Observation { sample: Some(sample), vehicle: output.vehicle, wheels, settled, refused })
+    }
+
+    /// Counts bytes of the inertial sensor that were no sample.
+    pub fn imu_error(&mut self) {
+        count(&mut self.counters.imu_errors, 1);
+    }
+
+    /// Takes a sample of the fibre-optic gyro that has come at `now`.
+    ///
+    /// # Errors
+    /// [`InputError::Fog`] when it is a duplicate or out of order, [`InputError::ClockWentBack`]; it is counted and
+    /// not used.
+    pub fn fog(&mut self, sample: FogSample, now: Micros) -> Result<(), InputError> {
+        self.advance(now)?;
+        self.fog.push(self.time(), sample).map_err(InputError::Fog)
+    }
+
+    /// Counts bytes of the fibre-optic gyro that were no sample.
+    pub fn fog_error(&mut self) {
+        count(&mut self.counters.fog_errors, 1);
+    }
+
+    /// Takes a frame that has come over the bus at `now`. Frames that carry no wheel speed are passed over.
+    ///
+    /// # Errors
+    /// [`InputError::Wheels`] when a wheel frame is damaged or says that a speed is not valid,
+    /// [`InputError::ClockWentBack`]; it is counted. The wheels then fall silent by and by, which is reported.
+    pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<(), InputError> {
+        self.advance(now)?;
+        let time = self.time();
+        match self.wheels.as_mut().and_then(|wheels| wheels.process(frame, time)) {
+            Some(Err(error)) => {
+                count(&mut self.counters.wheel_errors, 1);
+                Err(InputError::Wheels(error))
+            }
+            Some(Ok(_)) | None => Ok(()),
+        }
+    }
+
+    /// Looks for what is due at `now` without an input: messages of a silent sensor.
+    ///
+    /// # Errors
+    /// [`InputError::ClockWentBack`]; it is counted.
+    pub fn poll(&mut self, now: Micros) -> Result<Option<Observation>, InputError> {
+        let now = self.advance(now)?;
+        let Some(steps) = self.monitor.poll(now) else { return Ok(None) };
+        self.report_board();
+        let vehicle = self.pipeline.silent(steps);
+        self.send(&vehicle, Micros(self.sample_time.0.saturating_add(now.0 - self.heard.0)));
+        let wheels = self.standstill();
+        Ok(Some(Observation { sample: None, vehicle, wheels, settled: None, refused: None }))
+    }
+
+    /// Whether the next sample of the inertial sensor can be taken at `now`. Where it cannot, it belongs to the turn of
+    /// an estimate that is still under way: leave it where it waits. It is late, and the sensor is not silent.
+    pub fn is_ready(&mut self, now: Micros) -> bool {
+        let now = self.timeline.at(now);
+        let waits = self.handover.must_wait(self.pipeline.tick(), now);
+        if waits {
+            self.monitor.hold(now);
+        }
+        !waits
+    }
+
+    /// Returns the next frame to send. Call it until `None` after every input: the steps of the fibre-optic gyro
+    /// are worked on here, one at a time.
+    pub fn next_frame(&mut self) -> Option<TimedFrame> {
+        if self.frames.is_empty() {
+            self.step_fog();
+        }
+        self.frames.pop_front()
+    }
+
+    /// Returns the window that is due for GyroNet, once.
+    pub fn window(&mut self) -> Option<DueWindow> {
+        self.handover.take()
+    }
+
+    /// Takes GyroNet's estimate of the window that ended with sample `end`.
+    ///
+    /// # Errors
+    /// [`InputError::NoWindow`] when no window waits for it: it is too late, or there never was one. It is counted and
+    /// not used.
+    pub fn deliver(&mut self, end: u32, estimate: Estimate) -> Result<(), InputError> {
+        let wanted = self.handover.close(end) && self.pipeline.deliver(end, estimate);
+        self.claim(wanted, end)
+    }
+
+    /// Returns the window that is due for FoGNet and its number, once.
+    pub fn fog_window(&mut self) -> Option<(u32, SecondsWindow<'_>)> {
+        self.fog.window()
+    }
+
+    /// Takes FoGNet's estimate of a window.
+    ///
+    /// # Errors
+    /// [`InputError::NoWindow`], as [`Coprocessor::deliver`].
+    pub fn deliver_fog(&mut self, number: u32, estimate: FogEstimate) -> Result<(), InputError> {
+        let wanted = self.fog.deliver(number, estimate);
+        self.claim(wanted, number)
+    }
+
+    /// Notes that GyroNet's weights are damaged: no window is due any more, and the messages report it.
+    pub fn weights_damaged(&mut self) {
+        self.handover.stop();
+    }
+
+    /// Notes the number of frames lost on the bus since the start, and whether the controller is off the bus. The next
+    /// messages report it.
+    pub fn bus(&mut self, lost: u32, is_off: bool) {
+        self.bus = Bus { lost, is_off, ..self.bus };
+    }
+
+    /// The pipeline, to read its state.
+    #[must_use]
+    pub fn pipeline(&self) -> &Pipeline {
+        &self.pipeline
+    }
+
+    /// The rate of the fibre-optic gyro that the newest frames of [`Coprocessor::next_frame`] belong to.
+    #[must_use]
+    pub fn fog_estimate(&self) -> Option<&YawEstimate> {
+        self.fog_estimate.as_ref()
+    }
+
+    /// The numbers of faults that the sensor monitor has found.
+    #[must_use]
+    pub fn monitor_counters(&self) -> &WatchCounters {
+        self.monitor.counters()
+    }
+
+    /// The numbers of events of the fibre-optic gyro.
+    #[must_use]
+    pub fn fog_counters(&self) -> &FogCounters {
+        self.fog.counters()
+    }
+
+    /// Withholds the rates, or sends them again. With the first call that withholds them, and in place of each sample's
+    /// message set from then on, a set without a rate is sent: the caller is about to be silent, to erase flash.
+    pub fn pause(&mut self, paused: bool) {
+        let begins = paused && !self.paused;
+        self.paused = paused;
+        if begins {
+            let vehicle = self.pipeline.silent(0);
+            self.send(&vehicle, self.sample_time);
+        }
+    }
+
+    /// The numbers of inputs that were refused or replaced.
+    #[must_use]
+    pub fn input_counters(&self) -> &InputCounters {
+        &self.counters
+    }
+
+    fn advance(&mut self, now: Micros) -> Result<Micros, InputError> {
+        self.timeline.advance(now).map_err(|by_us| {
+            count(&mut self.counters.clock_back, 1);
+            InputError::ClockWentBack { by_us }
+        })
+    }
+
+    /// The time that wheels and the fibre-optic gyro are judged by.
+    fn time(&self) -> Micros {
+        match self.clock {
+            Clock::Outside => self.timeline.now(),
+            Clock::Sensor => self.sample_time.min(timeline::END),
+        }
+    }
+
+    fn poll_wheels(&mut self) -> Option<WheelSample> {
+        let time = self.time();
+        self.known_wheels = self.wheels.as_mut().and_then(|wheels| wheels.poll(time));
+        self.known_wheels
+    }
+
+    fn standstill(&self) -> Standstill {
+        self.known_wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill)
+    }
+
+    /// Works on the next step of the fibre-optic gyro, if it is complete or due.
+    fn step_fog(&mut self) {
+        let time = self.time();
+        let wheels = self.poll_wheels();
+        let silent = self.timeline.now().0.saturating_sub(self.heard.0) >= TIMEOUT_US;
+        let fresh = self.clock == Clock::Sensor || !silent;
+        let inertial = self.pipeline.inertial().filter(|_| fresh);
+        let Some(estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
+        self.fog_estimate = Some(estimate);
+        for frame in &self.fog_encoder.encode(&estimate) {
+            self.queue(*frame, self.sample_time);
+        }
+    }
+
+    fn report_board(&mut self) {
+        let stored = self.storage.damaged || !self.handover.has_network();
+        let configuration_lost = self.storage.configuration_lost;
+        let bus = self.bus.is_off || self.bus.lost != self.bus.reported;
+        let clock = self.monitor.is_clock_off();
+        self.pipeline.board(BoardFaults { bus, clock, stored, configuration_lost });
+        self.pipeline.set_clock_ratio(self.monitor.clock_ratio());
+    }
+
+    fn send(&mut self, vehicle: &VehicleSample, time: Micros) {
+        let withheld = self.paused.then(|| self.pipeline.silent(0));
+        for frame in &self.encoder.encode(withheld.as_ref().unwrap_or(vehicle)) {
+            self.queue(*frame, time);
+        }
+        self.counters.out_of_range = self.encoder.out_of_range();
+        self.bus.reported = self.bus.lost;
+    }
+
+    /// Queues a frame; the oldest one makes way where nobody has taken them.
+    fn queue(&mut self, frame: DataFrame, time: Micros) {
+        if self.frames.is_full() {
+            self.frames.pop_front();
+            count(&mut self.counters.replaced_frames, 1);
+        }
+        // There is room now.
+        let _ = self.frames.push_back(TimedFrame { frame, time });
+    }
+
+    fn claim(&mut self, wanted: bool, end: u32) -> Result<(), InputError> {
+        count(&mut self.counters.unclaimed_estimates, u32::from(!wanted));
+        if wanted { Ok(()) } else { Err(InputError::NoWindow { end }) }
+    }
+}

@@ -1,0 +1,113 @@
+//! Everything that can be set about a coprocessor, and every way to use it wrongly.
+
+use crate::align::AlignError;
+use crate::align::clock::ClockError;
+use crate::align::clock_ratio::ClockRatioConfig;
+use crate::can;
+use crate::can::wheel::{WheelError, WheelReceiver};
+use crate::can::yaw::FOG_IDS;
+use crate::fog::FogConfig;
+use crate::pipeline::PipelineConfig;
+
+/// The clock that `now` comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Clock {
+    /// `now` is a clock of its own, and inputs come when they are measured: a board in a vehicle.
+    #[default]
+    Outside,
+    /// Inputs come at another pace than they were measured at (an emulator, a recorded drive), so the time stamps of
+    /// the inertial sensor are the only time that means something. Wheels and fibre-optic gyro are judged by them;
+    /// `now` still serves to find a silent sensor and a late window.
+    Sensor,
+}
+
+/// Stored data that was found damaged at the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct StorageFaults {
+    /// Weights, configuration or calibration are damaged; the messages report it.
+    pub damaged: bool,
+    /// The configuration is lost, and the built-in one stands in for it: no rate is better than degraded.
+    pub configuration_lost: bool,
+}
+
+/// The configuration of a coprocessor. It holds from the start on.
+#[derive(Debug, Clone, Copy)]
+pub struct Config {
+    /// The way from samples to rates.
+    pub pipeline: PipelineConfig,
+    /// The messages that are sent for each sample.
+    pub can: can::config::Config,
+    /// The receiver of the vehicle's wheel speeds; `None` where there are none.
+    pub wheels: Option<WheelReceiver>,
+    /// The way from the fibre-optic gyro's samples to its rate.
+    pub fog: FogConfig,
+    /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
+    pub fog_ids: [u16; 3],
+    /// Whether a fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
+    /// Otherwise they are sent from its first sample on.
+    pub fog_expected: bool,
+    /// Whether somebody runs GyroNet. Without it no window is due, and the messages report damaged data.
+    pub has_gyronet: bool,
+    /// Whether somebody runs FoGNet, likewise.
+    pub has_fognet: bool,
+    /// The clock that `now` comes from.
+    pub clock: Clock,
+    /// The limit of the sensor's clock against an outside one; `None` where the outside one is no better. Without
+    /// an outside clock it is not used.
+    pub clock_ratio: Option<ClockRatioConfig>,
+    /// Stored data that was found damaged.
+    pub storage: StorageFaults,
+}
+
+impl Config {
+    /// A MEMS part on a car, x forward, y left, z up; the Bosch set and our own messages; no wheels.
+    pub const DEFAULT: Self = Self {
+        pipeline: PipelineConfig::DEFAULT,
+        can: can::config::Config::DEFAULT,
+        wheels: None,
+        fog: FogConfig::DEFAULT,
+        fog_ids: FOG_IDS,
+        fog_expected: false,
+        has_gyronet: true,
+        has_fognet: true,
+        clock: Clock::Outside,
+        clock_ratio: None,
+        storage: StorageFaults { damaged: false, configuration_lost: false },
+    };
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// The reason why an input is not used.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum InputError {
+    /// `now` is before the newest time; the following times are taken as going on from there.
+    #[error("the clock goes back by {by_us} us")]
+    ClockWentBack {
+        /// Microseconds.
+        by_us: u64,
+    },
+    /// The time stamp of an inertial sample has no place on the grid.
+    #[error("inertial sensor: {0}")]
+    Imu(#[source] AlignError),
+    /// The time stamp of a fibre-optic gyro's sample is a duplicate or out of order.
+    #[error("fibre-optic gyro: {0}")]
+    Fog(#[source] ClockError),
+    /// A wheel frame is damaged, or says that a speed is not valid.
+    #[error("wheel speeds: {0}")]
+    Wheels(#[source] WheelError),
+    /// No window waits for this estimate.
+    #[error("no window waits for estimate {end}")]
+    NoWindow {
+        /// The sample that the window ended with, or the number of FoGNet's window.
+        end: u32,
+    },
+}

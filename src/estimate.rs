@@ -1,0 +1,53 @@
+//! The corrected yaw rate and what it is worth. Every frame is made from these values alone.
+
+use crate::health::{Faults, Quality, Source, Status};
+use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
+
+/// The corrected yaw rate of one sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct YawEstimate {
+    /// Grid step of the sample that the rate belongs to.
+    pub tick: u32,
+    /// The corrected rate. It is the gyro's own rate in [`Status::Init`], and zero where there is none.
+    pub rate: AngularRate,
+    /// The part that was taken off the gyro less its static bias: the network's estimate, the bias found
+    /// by zero-rate updates, revisions of earlier samples.
+    pub correction: AngularRate,
+    /// The sum of all these rates since the bias became known, each over a step of the sensor's clock
+    /// ([`crate::align::clock_ratio`]).
+    pub yaw: Yaw,
+    /// The expected error of the mean rate over one second, 1 sigma, once the bias is known.
+    pub sigma: Option<AngularRate>,
+    /// The state of the rate.
+    pub status: Status,
+    /// The origin of the rate.
+    pub source: Source,
+    /// The worth of the rate to a receiver.
+    pub quality: Quality,
+    /// Everything that is wrong at present.
+    pub faults: Faults,
+    /// The time from the sample to the message in microseconds, where it is known.
+    pub latency_us: Option<u32>,
+}
+
+/// Everything that is sent for one sample of the inertial sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct VehicleSample {
+    /// The rate of this very sample, for receivers that steer by it: the Bosch messages and VDC2.
+    pub prompt: YawEstimate,
+    /// The rate of the sample [`crate::compensate::CompensateConfig::lag`] before it, for receivers that
+    /// integrate it to a heading: our own messages.
+    pub navigation: YawEstimate,
+    /// The rate about x (forward) less its bias.
+    pub roll_rate: AngularRate,
+    /// The rate about y (left) less its bias.
+    pub pitch_rate: AngularRate,
+    /// The specific force along x, y, z.
+    pub specific_force: [SpecificForce; 3],
+    /// The temperature of the part, where it reports one.
+    pub temperature: Option<CentiCelsius>,
+    /// Grid step of this sample.
+    pub tick: u32,
+}

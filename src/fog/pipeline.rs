@@ -1,0 +1,251 @@
+//! A fibre-optic gyro from its samples to the rate that is sent every 10 ms.
+//!
+//! The gyro's increments are summed on the grid of the time that the caller gives ([`Streams`]). The newest
+//! readings of inertial sensor and wheels stand for those of the step: they are a step or two old, which is
+//! nothing to their means over a second. FoGNet runs beside that, as GyroNet does: [`FogPipeline::window`]
+//! is the window that is due, whoever has time runs it, [`FogPipeline::deliver`] takes the estimate.
+//!
+//! | state | rate | source | quality | faults |
+//! |---|---|---|---|---|
+//! | an estimate is in use | less the correction | FoGNet | good | |
+//! | none yet, late, rejected, no weights, no wheels | as it is | raw | degraded | LATE, IMPLAUSIBLE, STORED, WHEELS |
+//! | increments are missing in the step, or none have come yet ([`FogPipeline::expect`]) | not available | raw | unusable | GAP |
+//! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
+//!
+//! Increments are compared as the gyro sends them, not as they are summed: on the grid one that straddles two
+//! steps is split, and the rounding of that makes sums differ that come from equal increments.
+
+use super::seconds::{FogFrame, SecondsWindow};
+use super::{FogConfig, FogCorrector, FogOutput, IncrementRate};
+use crate::align::clock::ClockError;
+use crate::align::streams::{Fitted, Streams};
+use crate::estimate::YawEstimate;
+use crate::health::{Faults, Quality, Source, Status, count};
+use crate::model::fognet::FogEstimate;
+use crate::sample::{FogSample, PERIOD_US, WheelSample};
+use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};
+use crate::window::Features;
+use serde::{Deserialize, Serialize};
+
+/// Increments in a row, equal to the one before, after which the gyro is stuck, if they last [`STUCK_US`]. A
+/// DSP-3000's noise in 10 ms is a hundred of its units, which repeats an increment once in four hundred, and four
+/// times in a row once in years.
+pub const STUCK_AFTER: u8 = 4;
+/// The time of these increments, microseconds: ten of a DSP-1760, whose noise in 1 ms is hundreds of thousands of its
+/// units and never repeats itself.
+pub const STUCK_US: u32 = 10_000;
+
+/// The numbers of events since the start. They saturate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FogCounters {
+    /// Samples taken.
+    pub samples: u32,
+    /// Samples refused: duplicate or out of order.
+    pub misplaced: u32,
+    /// Grid steps without a turn: increments are missing, or the gyro is stuck.
+    pub gaps: u32,
+    /// Times that the gyro was stuck.
+    pub stuck: u32,
+    /// Windows whose estimate came in time.
+    pub windows: u32,
+    /// Windows whose estimate did not.
+    pub late: u32,
+    /// Estimates rejected.
+    pub implausible: u32,
+    /// Windows that ended before their time: a gap, or too little of the other sensors.
+    pub broken: u32,
+}
+
+/// The way from a fibre-optic gyro's samples to its corrected rate.
+#[derive(Debug, Clone)]
+pub struct FogPipeline {
+    streams: Streams,
+    corrector: FogCorrector,
+    has_network: bool,
+    rate: IncrementRate,
+    correction: IncrementRate,
+    yaw: Yaw,
+    repeats: Repeats,
+    /// An increment of the next step was stuck.
+    stuck_in_step: bool,
+    due: Option<u32>,
+    /// An estimate is to come with the end of the second.
+    awaited: bool,
+    /// The fault of the newest estimate.
+    estimate_faults: Faults,
+    counters: FogCounters,
+}
+
+impl FogPipeline {
+    /// Begins before the first sample. Without a network no window is due, and the messages report that.
+    #[must_use]
+    pub fn new(config: FogConfig, has_network: bool) -> Self {
+        Self {
+            streams: Streams::new(Fitted { imu: false, fog: true }),
+            corrector: FogCorrector::new(config),
+            has_network,
+            rate: IncrementRate::default(),
+            correction: IncrementRate::default(),
+            yaw: Yaw::default(),
+            repeats: Repeats::default(),
+            stuck_in_step: false,
+            due: None,
+            awaited: false,
+            estimate_faults: Faults::NONE,
+            counters: FogCounters::default(),
+        }
+    }
+
+    /// Expects a gyro whether it is heard or not: messages are sent from `now` on, and its silence is reported.
+    pub fn expect(&mut self, now: Micros) {
+        self.streams.begin(now);
+    }
+
+    /// Takes a sample that has arrived at `now`. Call [`FogPipeline::next_step`] until `None` after it.
+    ///
+    /// # Errors
+    /// [`ClockError`]: the sample is a duplicate or out of order. It is counted and not used.
+    pub fn push(&mut self, now: Micros, mut sample: FogSample) -> Result<(), ClockError> {
+        let repeats = self.repeats.after(&sample);
+        let stuck = repeats.are_stuck();
+        if stuck {
+            let [.., up] = &mut sample.increment;
+            *up = None;
+        }
+        self.streams.push_fog(now, sample).inspect_err(|_| count(&mut self.counters.misplaced, 1))?;
+        count(&mut self.counters.samples, 1);
+        count(&mut self.counters.stuck, u32::from(stuck && !self.repeats.are_stuck()));
+        self.repeats = repeats;
+        self.stuck_in_step |= stuck;
+        Ok(())
+    }
+
+    /// Returns the rate of the next 10 ms, if they are complete or due; nothing before the first sample of a
+    /// gyro that is not expected. Call it every few milliseconds too, because silence is found here.
+    #[inline(never)]
+    pub fn next_step(
+        &mut self,
+        now: Micros,
+        inertial: Option<Features>,
+        wheels: Option<&WheelSample>,
+    ) -> Option<YawEstimate> {
+        let step = self.streams.next_step(now)?;
+        let [.., turn] = step.fog.angle;
+        let turn = turn.filter(|_| u64::from(step.fog.covered) == PERIOD_US);
+        let stuck = turn.is_none() && self.stuck_in_step;
+        self.stuck_in_step = self.repeats.are_stuck();
+        let wheels = wheels.and_then(rear);
+        let output = self.corrector.correct(&FogFrame { turn, inertial, wheels });
+        self.note(&output);
+        let latency_us = u32::try_from(now.0.saturating_sub(step.time.0)).ok();
+        let faults = self
+            .estimate_faults
+            .with(Faults::STUCK.when(stuck))
+            .with(Faults::GAP.when(turn.is_none() && !stuck))
+            .with(Faults::WHEELS.when(wheels.is_none()))
+            .with(Faults::STORED.when(!self.has_network));
+        let (status, source, quality) = match (output.turn, output.corrected) {
+            (None, _) if stuck => (Status::Stuck, Source::Raw, Quality::Unusable),
+            (None, _) => (Status::Silent, Source::Raw, Quality::Unusable),
+            (Some(_), true) => (Status::Ready, Source::FogNet, Quality::Good),
+            (Some(_), false) => (Status::Degraded, Source::Raw, Quality::Degraded),
+        };
+        let (rate, correction) = match output.turn {
+            Some(turn) => (self.rate.rate(turn), self.correction.rate(output.correction)),
+            None => (AngularRate::ZERO, AngularRate::ZERO),
+        };
+        self.yaw.0 = self.yaw.0.wrapping_add(i64::from(rate.0));
+        let (tick, yaw) = ((step.time.0 / PERIOD_US) as u32, self.yaw);
+        Some(YawEstimate {
+            tick,
+            rate,
+            correction,
+            yaw,
+            sigma: None,
+            status,
+            source,
+            quality,
+            faults,
+            latency_us,
+        })
+    }
+
+    /// Returns the window that is due and its number, once.
+    pub fn window(&mut self) -> Option<(u32, SecondsWindow<'_>)> {
+        let number = self.due.take()?;
+        Some((number, self.corrector.window()?))
+    }
+
+    /// Takes the estimate of a window. Returns whether it will be used: an estimate for no window, or one
+    /// that comes too late or twice, is not.
+    pub fn deliver(&mut self, number: u32, estimate: FogEstimate) -> bool {
+        self.corrector.deliver(number, estimate)
+    }
+
+    /// Event counters since start.
+    #[must_use]
+    pub fn counters(&self) -> &FogCounters {
+        &self.counters
+    }
+
+    fn note(&mut self, output: &FogOutput) {
+        let FogOutput { corrected, due, broken, implausible, late, .. } = output;
+        if let Some(number) = due.filter(|_| self.has_network) {
+            let used = self.awaited && !*late && implausible.is_none();
+            count(&mut self.counters.windows, u32::from(used));
+            self.due = Some(number);
+            self.awaited = true;
+        }
+        count(&mut self.counters.gaps, u32::from(output.turn.is_none()));
+        count(&mut self.counters.broken, u32::from(broken.is_some()));
+        // A window ends with its second; its estimate is judged with the end of the next one.
+        if implausible.is_some() {
+            count(&mut self.counters.implausible, 1);
+            self.estimate_faults = Faults::IMPLAUSIBLE;
+        } else if *late && self.has_network {
+            count(&mut self.counters.late, 1);
+            self.estimate_faults = Faults::LATE;
+        } else if *corrected {
+            self.estimate_faults = Faults::NONE;
+        }
+        if broken.is_some() {
+            self.due = None;
+            self.awaited = false;
+            self.estimate_faults = Faults::NONE;
+        }
+    }
+}
+
+/// The newest increment, and the number and time of those that were equal to the one before.
+#[derive(Debug, Clone, Copy, Default)]
+struct Repeats {
+    newest: Option<Angle>,
+    equal: u8,
+    equal_us: u32,
+}
+
+impl Repeats {
+    /// The state after a further sample.
+    fn after(self, sample: &FogSample) -> Self {
+        let [.., newest] = sample.increment;
+        if newest.is_none() || newest != self.newest {
+            return Self { newest, ..Self::default() };
+        }
+        Self {
+            newest,
+            equal: self.equal.saturating_add(1),
+            equal_us: self.equal_us.saturating_add(sample.span),
+        }
+    }
+
+    fn are_stuck(self) -> bool {
+        self.equal >= STUCK_AFTER && self.equal_us >= STUCK_US
+    }
+}
+
+/// Left and right wheel of the rear axle, which is not steered; of the front one where it has none.
+fn rear(wheels: &WheelSample) -> Option<[WheelSpeed; 2]> {
+    let [front_left, front_right, rear_left, rear_right] = wheels.speeds;
+    Some([rear_left.or(front_left)?, rear_right.or(front_right)?])
+}

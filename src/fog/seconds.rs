@@ -1,0 +1,204 @@
+//! The last minute in steps of a second, as FoGNet sees it.
+//!
+//! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged; all
+//! in integers, the gyro's increments to the last bit. A gap in the gyro ends the window, for an
+//! angle that was turned in it is in no sum; so does a second that has inertial samples or wheel
+//! speeds in less than half of its frames.
+
+use crate::sample::RATE_HZ;
+use crate::units::{Angle, WheelSpeed};
+use crate::window;
+
+/// Steps of a FoGNet window: a minute (section III-C of the paper).
+pub const STEPS: usize = 60;
+/// Features of a step besides the gyro's increment: specific force x, y, z; angular rate x, y, z
+/// less the static bias; way of the left and of the right wheel.
+pub const FEATURES: usize = 8;
+/// Frames in a step.
+pub const FRAMES: u32 = RATE_HZ;
+
+/// What one 10 ms frame adds to a second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FogFrame {
+    /// Angle turned about z (up) since the frame before; `None` where some of it is not known.
+    pub turn: Option<Angle>,
+    /// The inertial sensor, its gyro less its static bias ([`window::features`]).
+    pub inertial: Option<window::Features>,
+    /// Left and right wheel.
+    pub wheels: Option<[WheelSpeed; 2]>,
+}
+
+/// One second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Second {
+    /// Means in the codes of [`crate::units`]. A wheel's mean speed is its way: a second has one.
+    pub features: [i32; FEATURES],
+    /// Angle turned.
+    pub turn: Angle,
+}
+
+/// Why the window ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Incomplete {
+    /// The gyro's increments have a gap.
+    Gyro,
+    /// Less than half of the second's frames had an inertial sample.
+    Inertial,
+    /// Less than half of the second's frames had wheel speeds.
+    Wheels,
+}
+
+/// Sums of the second that is under way.
+#[derive(Debug, Clone, Copy)]
+pub struct SecondSums {
+    frames: u32,
+    turn: i64,
+    inertial: Mean<{ window::FEATURES }>,
+    wheels: Mean<2>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Mean<const N: usize> {
+    sums: [i64; N],
+    count: u32,
+}
+
+impl<const N: usize> Mean<N> {
+    const ZERO: Self = Self { sums: [0; N], count: 0 };
+
+    fn add(&mut self, codes: Option<[i32; N]>) {
+        for (sum, code) in self.sums.iter_mut().zip(codes.unwrap_or([0; N])) {
+            *sum += i64::from(code);
+        }
+        self.count += u32::from(codes.is_some());
+    }
+
+    /// Means to the nearest code; `None` when they are of less than half a second's frames.
+    fn take(&self) -> Option<[i32; N]> {
+        let count = i64::from(self.count.max(1));
+        // A mean of int32s fits an int32.
+        (2 * self.count >= FRAMES).then(|| self.sums.map(|sum| (sum + count / 2).div_euclid(count) as i32))
+    }
+}
+
+impl SecondSums {
+    /// Before the first frame of a second.
+    pub const ZERO: Self = Self { frames: 0, turn: 0, inertial: Mean::ZERO, wheels: Mean::ZERO };
+
+    /// Takes a frame; returns the second that it completes.
+    ///
+    /// # Errors
+    /// [`Incomplete`] when the frame, or the second that it ends, is of no use; the next frame
+    /// begins a new second.
+    pub fn push(&mut self, frame: &FogFrame) -> Result<Option<Second>, Incomplete> {
+        let Some(turn) = frame.turn else {
+            *self = Self::ZERO;
+            return Err(Incomplete::Gyro);
+        };
+        self.frames += 1;
+        self.turn = self.turn.saturating_add(turn.0);
+        self.inertial.add(frame.inertial);
+        self.wheels.add(frame.wheels.map(|wheels| wheels.map(|speed| speed.0)));
+        if self.frames < FRAMES {
+            return Ok(None);
+        }
+        let Self { turn, inertial, wheels, .. } = core::mem::replace(self, Self::ZERO);
+        let [fx, fy, fz, rx, ry, rz] = inertial.take().ok_or(Incomplete::Inertial)?;
+        let [left, right] = wheels.take().ok_or(Incomplete::Wheels)?;
+        Ok(Some(Second { features: [fx, fy, fz, rx, ry, rz, left, right], turn: Angle(turn) }))
+    }
+}
+
+/// What stands in a window before there are [`STEPS`] seconds (Fig. 8 of the paper, which shows
+/// that there is a padding but not which).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Padding {
+    /// The seconds that there are, over and over, in their order.
+    #[default]
+    Repeat,
+    /// The oldest second.
+    Edge,
+    /// Nothing: no window before the first minute is over.
+    None,
+}
+
+/// A ring of the last [`STEPS`] seconds without a gap between them.
+#[derive(Debug, Clone)]
+pub struct Minute {
+    ring: [Second; STEPS],
+    next: usize,
+    filled: usize,
+}
+
+impl Minute {
+    /// No second yet.
+    pub const EMPTY: Self =
+        Self { ring: [Second { features: [0; FEATURES], turn: Angle::ZERO }; STEPS], next: 0, filled: 0 };
+
+    /// Forgets everything: a gap breaks the window.
+    pub fn clear(&mut self) {
+        self.next = 0;
+        self.filled = 0;
+    }
+
+    /// Adds the newest second.
+    pub fn push(&mut self, second: Second) {
+        if let Some(place) = self.ring.get_mut(self.next) {
+            *place = second;
+        }
+        self.next = (self.next + 1) % STEPS;
+        self.filled = (self.filled + 1).min(STEPS);
+    }
+
+    /// Seconds in it.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.filled
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.filled == 0
+    }
+
+    /// The window, oldest second first, padded to [`STEPS`]; `None` where the padding gives none.
+    #[must_use]
+    pub fn window(&self, padding: Padding) -> Option<SecondsWindow<'_>> {
+        let enough = self.filled == STEPS || self.filled > 0 && padding != Padding::None;
+        enough.then_some(SecondsWindow { minute: self, padding })
+    }
+}
+
+/// [`STEPS`] seconds to be read, in place.
+#[derive(Debug, Clone, Copy)]
+pub struct SecondsWindow<'m> {
+    minute: &'m Minute,
+    padding: Padding,
+}
+
+impl<'m> SecondsWindow<'m> {
+    /// The seconds, oldest first: [`STEPS`] of them.
+    pub fn iter(&self) -> impl Iterator<Item = &'m Second> + use<'m> {
+        let Self { minute: &Minute { ref ring, next, filled }, padding } = *self;
+        let missing = STEPS - filled;
+        (0..STEPS).filter_map(move |step| {
+            let age = match (step.checked_sub(missing), padding) {
+                (Some(row), _) => row,
+                (None, Padding::Repeat) => {
+                    // Counted from the newest end, so that the repetition ends where the data begin.
+                    let seconds = filled.max(1);
+                    (filled - missing % seconds + step) % seconds
+                }
+                (None, Padding::Edge | Padding::None) => 0,
+            };
+            // A ring that is not full begins at place 0.
+            ring.get(if filled == STEPS { (next + age) % STEPS } else { age })
+        })
+    }
+}

@@ -1,0 +1,142 @@
+//! The monitor of the inertial sensor: it judges readings one by one and notices silence.
+//!
+//! A part can go wrong in ways that no single sample shows: it falls silent, it repeats itself, it has just been
+//! saturated. Time comes in as an argument by an outside clock, because the part's own clock stops with the part.
+//!
+//! | fault | found when | then | over when |
+//! |---|---|---|---|
+//! | silent | no sample for [`TIMEOUT_US`], or for [`START_US`] since the start | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
+//! | saturated | the part reports it | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
+//! | stuck | [`STUCK_AFTER`] samples equal to the one before in gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
+//! | clock off | the sensor's clock departs from the outside one by more than [`ClockRatioConfig::limit_ppm`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | it does no longer |
+//! | implausible | a reading is further from the last one than a vehicle goes in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
+//!
+//! [`Status::Silent`]: crate::health::Status::Silent
+//! [`Status::Clipped`]: crate::health::Status::Clipped
+//! [`Status::Stuck`]: crate::health::Status::Stuck
+
+mod jump;
+mod stuck;
+
+pub use jump::{JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE};
+pub use stuck::{AXIS_STUCK_AFTER, STUCK_AFTER};
+
+use crate::align::clock_ratio::{ClockRatio, ClockRatioConfig, RatioEstimator};
+use crate::health::{WatchCounters, count};
+use crate::sample::{ImuSample, PERIOD_US, Validity};
+use crate::units::Micros;
+
+/// The sensor is silent after this time without a sample: two samples are missing, and that is reported
+/// before the third one would come.
+pub const TIMEOUT_US: u64 = 29_000;
+/// An MTi needs about a second after a start before it sends.
+pub const START_US: u64 = 2_000_000;
+/// Samples after saturation that are not used: 50 ms, in which the part's filter recovers.
+pub const HOLD: u8 = 5;
+
+/// The state of the sensor as its readings and their times show it.
+#[derive(Debug, Clone)]
+pub struct SensorMonitor {
+    repeats: stuck::Repeats,
+    jump: jump::Jump,
+    stuck: bool,
+    /// Samples until the part has recovered from saturation.
+    recovering: u8,
+    /// The time of the newest sample by the outside clock.
+    heard: Option<Micros>,
+    /// When the next message set without a sample is due.
+    due: Option<u64>,
+    /// The sensor's clock against the outside one, where that is the better one.
+    clock: Option<RatioEstimator>,
+    counters: WatchCounters,
+}
+
+impl SensorMonitor {
+    /// Begins before the first sample. With `clock` the sensor's clock is held against the outside one.
+    #[must_use]
+    pub fn new(clock: Option<ClockRatioConfig>) -> Self {
+        Self {
+            repeats: stuck::Repeats::new(),
+            jump: jump::Jump::new(),
+            stuck: false,
+            recovering: 0,
+            heard: None,
+            due: None,
+            clock: clock.map(RatioEstimator::new),
+            counters: WatchCounters::default(),
+        }
+    }
+
+    /// The numbers of faults found.
+    #[must_use]
+    pub fn counters(&self) -> &WatchCounters {
+        &self.counters
+    }
+
+    /// Judges a sample. Each sample is judged once, in the order of their coming.
+    pub fn judge(&mut self, sample: &ImuSample) -> Validity {
+        let stuck = self.repeats.are_stuck(sample);
+        let began = !core::mem::replace(&mut self.stuck, stuck) && stuck;
+        count(&mut self.counters.stuck, u32::from(began));
+        let saturated = !sample.validity.is_good();
+        self.recovering = if saturated { HOLD + 1 } else { self.recovering.saturating_sub(1) };
+        let recovering = !saturated && self.recovering > 0;
+        count(&mut self.counters.held, u32::from(recovering));
+        // A reading from beyond the range is none to hold others against.
+        let implausible = !saturated && !recovering && self.jump.is_implausible(sample);
+        count(&mut self.counters.wrong, u32::from(implausible));
+        match (saturated, stuck, recovering, implausible) {
+            (true, ..) => sample.validity,
+            (_, true, ..) => Validity::Stuck,
+            (_, _, true, _) => Validity::Recovering,
+            (.., true) => Validity::Implausible,
+            _ => Validity::Good,
+        }
+    }
+
+    /// Notes that a sample of `time` by the sensor's clock has come at `now` and was used.
+    pub fn heard(&mut self, time: Micros, now: Micros) {
+        self.heard = Some(now);
+        self.due = None;
+        if let Some(clock) = &mut self.clock {
+            let before = clock.fault();
+            clock.observe(time, now);
+            count(&mut self.counters.clock_off, u32::from(!before && clock.fault()));
+        }
+    }
+
+    /// The length of the steps of the sensor's clock, by the samples heard so far.
+    #[must_use]
+    pub fn clock_ratio(&self) -> ClockRatio {
+        self.clock.as_ref().map_or(ClockRatio::ONE, RatioEstimator::ratio)
+    }
+
+    /// Whether the sensor's clock is at fault, by the samples heard so far.
+    #[must_use]
+    pub fn is_clock_off(&self) -> bool {
+        self.clock.as_ref().is_some_and(RatioEstimator::fault)
+    }
+
+    /// Notes that samples wait to be read: the sensor is not silent.
+    pub fn hold(&mut self, now: Micros) {
+        self.heard = self.heard.and(Some(now));
+    }
+
+    /// Returns the grid steps that have passed since the newest message set, when a set without a sample
+    /// is due at `now`. Call it every millisecond or so.
+    pub fn poll(&mut self, now: Micros) -> Option<u32> {
+        let due = match (self.due, self.heard) {
+            (Some(due), _) => due,
+            (None, Some(heard)) => heard.0.saturating_add(TIMEOUT_US),
+            (None, None) => START_US,
+        };
+        if now.0 < due {
+            return None;
+        }
+        let first = self.due.is_none();
+        count(&mut self.counters.silences, u32::from(first));
+        // No catching up: a set that nobody had time for is of no use later.
+        self.due = Some(now.0.saturating_add(PERIOD_US));
+        Some(if first { TIMEOUT_US.div_ceil(PERIOD_US) as u32 } else { 1 })
+    }
+}

@@ -1,0 +1,57 @@
+//! Readings that no vehicle can have.
+//!
+//! A part without a checksum, or with a short one, delivers a wrong bit as a reading. The largest
+//! steps from one sample to the next on the six drives of training and validation are 0.46 rad/s
+//! and 10.9 m/s^2.
+
+use crate::sample::ImuSample;
+use crate::units::{AngularRate, SpecificForce};
+
+/// Largest step of a gyro axis in 10 ms: 1 rad/s.
+pub const JUMP_RATE: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
+/// Largest step of an accelerometer axis in 10 ms: 30 m/s^2.
+pub const JUMP_FORCE: SpecificForce = SpecificForce(30 << 20);
+/// Readings in a row that are rejected; the next one is accepted, wherever it is.
+pub const JUMP_PATIENCE: u8 = 3;
+/// Greatest age of the last good reading for a comparison, microseconds.
+const OLD_US: u32 = 50_000;
+
+/// The last reading that was accepted.
+#[derive(Debug, Clone)]
+pub(super) struct Jump {
+    angular_rate: [AngularRate; 3],
+    specific_force: [SpecificForce; 3],
+    /// Its time, modulo 2^32.
+    at: u32,
+    known: bool,
+    /// Readings in a row that were rejected.
+    rejected: u8,
+}
+
+impl Jump {
+    /// Begins before the first reading.
+    pub const fn new() -> Self {
+        let (angular_rate, specific_force) = ([AngularRate::ZERO; 3], [SpecificForce(0); 3]);
+        Self { angular_rate, specific_force, at: 0, known: false, rejected: 0 }
+    }
+
+    /// Takes a reading and decides whether it is too far from the last accepted one.
+    pub fn is_implausible(&mut self, sample: &ImuSample) -> bool {
+        if self.known && self.jumps(sample) && self.rejected < JUMP_PATIENCE {
+            self.rejected += 1;
+            return true;
+        }
+        let ImuSample { angular_rate, specific_force, time, .. } = *sample;
+        *self = Self { angular_rate, specific_force, at: time.0 as u32, known: true, rejected: 0 };
+        false
+    }
+
+    fn jumps(&self, to: &ImuSample) -> bool {
+        let age = (to.time.0 as u32).wrapping_sub(self.at) as i32;
+        let rates = self.angular_rate.iter().zip(to.angular_rate);
+        let forces = self.specific_force.iter().zip(to.specific_force);
+        let mut far = rates.map(|(from, to)| from.0.abs_diff(to.0) > JUMP_RATE.0.unsigned_abs());
+        let mut hard = forces.map(|(from, to)| from.0.abs_diff(to.0) > JUMP_FORCE.0.unsigned_abs());
+        age.unsigned_abs() <= OLD_US && (far.any(|far| far) || hard.any(|hard| hard))
+    }
+}

@@ -1,0 +1,60 @@
+//! Readings that repeat themselves.
+
+use crate::sample::ImuSample;
+
+/// Samples in a row, equal to the one before in all axes of the gyro, or of the accelerometer, or in
+/// one axis that hardly ever repeats itself, after which the part is stuck.
+///
+/// Noise of half a bit lets an axis repeat nearly every second reading at rest; that three axes
+/// do so seven times in a row takes two days even then, and months where an axis repeats one
+/// reading in thirty. No navigation rate of these samples has gone out yet.
+pub const STUCK_AFTER: u8 = 7;
+/// The same for one axis alone that often repeats itself.
+pub const AXIS_STUCK_AFTER: u8 = 30;
+
+/// Accelerometer x, y, z, gyro x, y, z.
+const AXES: usize = 6;
+/// Samples over which the frequency of repetitions is averaged, as a power of two.
+const AVERAGE: u32 = 8;
+const ALWAYS: u16 = 1 << 15;
+/// An axis that repeats itself less often than this, [`STUCK_AFTER`] times in a row included, has
+/// noise enough.
+const SELDOM: u16 = ALWAYS / 16;
+
+/// The repetitions of each axis.
+#[derive(Debug, Clone)]
+pub(super) struct Repeats {
+    last: Option<[i32; AXES]>,
+    /// Samples in a row that were equal to the one before.
+    equal: [u8; AXES],
+    /// The share of such samples, [`ALWAYS`] for all.
+    repeats: [u16; AXES],
+    stuck: [bool; AXES],
+}
+
+impl Repeats {
+    /// Begins with nothing known of the part: it may be a coarse one.
+    pub const fn new() -> Self {
+        Self { last: None, equal: [0; AXES], repeats: [ALWAYS; AXES], stuck: [false; AXES] }
+    }
+
+    /// Takes a sample and decides whether the part is stuck.
+    pub fn are_stuck(&mut self, sample: &ImuSample) -> bool {
+        let ([fx, fy, fz], [wx, wy, wz]) = (sample.specific_force, sample.angular_rate);
+        let axes = [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0];
+        let last = self.last.replace(axes);
+        let pairs = last.unwrap_or(axes).into_iter().zip(axes);
+        let counts = self.equal.iter_mut().zip(&mut self.repeats).zip(&mut self.stuck);
+        for ((before, now), ((equal, repeats), stuck)) in pairs.zip(counts) {
+            let repeated = last.is_some() && before == now;
+            *equal = if repeated { equal.saturating_add(1) } else { 0 };
+            *repeats -= *repeats >> AVERAGE;
+            *repeats += if repeated { ALWAYS >> AVERAGE } else { 0 };
+            let seldom = *repeats < SELDOM && *equal >= STUCK_AFTER;
+            *stuck = repeated && (*stuck || seldom || *equal >= AXIS_STUCK_AFTER);
+        }
+        let (accelerometer, gyro) = self.equal.split_at(AXES / 2);
+        let stands = |part: &[u8]| part.iter().all(|equal| *equal >= STUCK_AFTER);
+        stands(accelerometer) || stands(gyro) || self.stuck.contains(&true)
+    }
+}

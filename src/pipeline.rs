@@ -1,0 +1,318 @@
+//! One sample of the inertial sensor in, its corrected yaw rates out.
+//!
+//! This file owns the order of the stages (grid, mounting, initialisation, window, compensation, zero-rate
+//! updates, report) and nothing else. The stages do not import each other; they share the types of samples,
+//! windows and units. No clock is read: the samples' own time stamps drive everything.
+//!
+//! The network runs beside the samples, not inside their turn: [`Output::window`] is a window that is due,
+//! whoever has time runs it, and [`Pipeline::deliver`] takes its estimate. The estimate is used exactly
+//! [`crate::compensate::Mode::delay`] samples after the window's newest one, so fast and slow machines send
+//! the same frames.
+
+mod config;
+mod initialised;
+mod output;
+mod report;
+mod wheels;
+mod windows;
+
+pub use config::PipelineConfig;
+pub use output::{DueWindow, Output, Owed};
+
+use crate::align::clock_ratio::ClockRatio;
+use crate::align::{AlignError, Aligner};
+use crate::bias::{StandstillSource, StaticInit, ZeroPoint, ZeroRate, ZeroRateOutcome};
+use crate::compensate::{Compensated, Compensator, Implausible, Settled};
+use crate::health::{BoardFaults, Counters, Faults, count};
+use crate::model::Estimate;
+use crate::mounting::Rotation;
+use crate::sample::{Frame, ImuSample, Standstill, WheelSample};
+use crate::uncertainty::Uncertainty;
+use crate::units::{AngularRate, Yaw};
+use crate::window::{self, Features, WINDOW};
+use initialised::Initialised;
+use wheels::Wheels;
+use windows::Windows;
+
+/// The way from samples to corrected rates for one vehicle.
+#[derive(Debug, Clone)]
+pub struct Pipeline {
+    config: PipelineConfig,
+    state: State,
+}
+
+/// Everything that changes from sample to sample.
+#[derive(Debug, Clone)]
+struct State {
+    aligner: Aligner,
+    static_init: StaticInit,
+    initialised: Option<Initialised>,
+    windows: Windows,
+    compensator: Compensator,
+    uncertainty: Uncertainty,
+    wheels: Wheels,
+    /// Samples for which the vehicle has stood.
+    stood: u32,
+    /// The sums of the rates that went out.
+    prompt_yaw: Yaw,
+    navigation_yaw: Yaw,
+    /// The length of the steps by which both are summed.
+    clock_ratio: ClockRatio,
+    /// Grid step of the newest message set.
+    tick: u32,
+    /// Samples for which a gap is still less than a whole window away.
+    gap_within: u32,
+    /// The newest sample as the networks see it.
+    inertial: Option<Features>,
+    board: BoardFaults,
+    counters: Counters,
+}
+
+/// The rates of one sample before they are reported.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rates {
+    prompt: Option<Compensated>,
+    navigation: Option<Compensated>,
+    settled: Option<Settled>,
+}
+
+impl Pipeline {
+    /// Begins before the first sample.
+    #[must_use]
+    pub fn new(config: PipelineConfig) -> Self {
+        let state = State {
+            aligner: Aligner::default(),
+            static_init: StaticInit::new(config.static_init),
+            initialised: None,
+            windows: Windows::default(),
+            compensator: Compensator::new(config.compensate),
+            uncertainty: Uncertainty::new(config.uncertainty),
+            wheels: Wheels::default(),
+            stood: 0,
+            prompt_yaw: Yaw::default(),
+            navigation_yaw: Yaw::default(),
+            clock_ratio: ClockRatio::ONE,
+            tick: 0,
+            gap_within: 0,
+            inertial: None,
+            board: BoardFaults::default(),
+            counters: Counters::default(),
+        };
+        Self { config, state }
+    }
+
+    /// Takes one sample of the inertial sensor, whose validity has been judged ([`crate::monitor`]).
+    ///
+    /// # Errors
+    /// [`AlignError`] when its time stamp has no place on the grid; it is counted and not used. Unless it was
+    /// a duplicate, the samples after it report [`Faults::GAP`] for as long as after a missing one.
+    pub fn process(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
+        let mut frame = self.state.aligner.process(sample).inspect_err(|error| self.refuse(*error))?;
+        frame.sample = self.config.mounting.sample(&sample);
+        count(&mut self.state.counters.samples, 1);
+        if frame.missing > 0 {
+            count(&mut self.state.counters.missing, frame.missing);
+            self.gap();
+        }
+        if !sample.validity.is_good() {
+            count(&mut self.state.counters.invalid, 1);
+            self.break_window();
+        }
+        let implausible = self.use_estimate(frame.tick);
+        let initialised = self.state.initialised.as_mut();
+        let quiet = initialised.is_some_and(|known| known.quiet.process(&frame.sample));
+        let (rates, refused) = match self.level(&mut frame.sample) {
+            None => (Rates::default(), self.initialise(&frame)),
+            Some(zero) => (self.correct(&frame, &zero, quiet), None),
+        };
+        let vehicle = self.report(&frame, &rates);
+        let hop = self.config.compensate.mode.hop();
+        let window = self.state.windows.due(frame.tick, hop);
+        self.state.gap_within = self.state.gap_within.saturating_sub(1);
+        Ok(Output { vehicle, settled: rates.settled, window, refused, implausible })
+    }
+
+    /// Takes what is known of the wheels, from [`crate::can::wheel::WheelReceiver`]. Call it before each
+    /// sample where wheel speeds are configured, since the wheels' silence is found here too.
+    pub fn wheels(&mut self, wheels: WheelSample) {
+        self.state.wheels.update(wheels);
+    }
+
+    /// Takes the faults of the board beside the sensor; they are reported with every message set from now on.
+    pub fn board(&mut self, faults: BoardFaults) {
+        self.state.board = faults;
+    }
+
+    /// Sets the true length of the steps of the sensor's clock, for the samples that follow.
+    pub fn set_clock_ratio(&mut self, ratio: ClockRatio) {
+        self.state.clock_ratio = ratio;
+    }
+
+    /// Takes the estimate of a window that [`Output::window`] announced. Returns whether it will be used: an
+    /// estimate for no window, or one that comes too late or twice, is not. A window without an
+    /// estimate is counted when its turn has passed.
+    pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
+        self.state.windows.deliver(end, estimate)
+    }
+
+    /// The newest sample as the networks see it, for [`crate::fog`]; `None` before the bias is known
+    /// and while the reading cannot be used.
+    #[must_use]
+    pub fn inertial(&self) -> Option<Features> {
+        self.state.inertial
+    }
+
+    /// Grid step of the newest message set.
+    #[must_use]
+    pub fn tick(&self) -> u32 {
+        self.state.tick
+    }
+
+    /// Event counters since the start.
+    #[must_use]
+    pub fn counters(&self) -> &Counters {
+        &self.state.counters
+    }
+
+    /// What the sums of the rates would lack if the drive were over now.
+    #[must_use]
+    pub fn owed(&self) -> Owed {
+        Owed {
+            prompt: Yaw(self.state.compensator.prompt_owed()),
+            navigation: Yaw(self.state.compensator.navigation_owed(self.bias())),
+        }
+    }
+
+    /// The gyro's static bias, once known.
+    #[must_use]
+    pub fn gyro_bias(&self) -> Option<[AngularRate; 3]> {
+        self.state.initialised.as_ref().map(|known| known.zero.bias())
+    }
+
+    /// The bias that the zero-rate updates take off beside it.
+    #[must_use]
+    pub fn bias(&self) -> AngularRate {
+        self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
+    }
+
+    /// The tilt that levelling took out, once known.
+    #[must_use]
+    pub fn levelling(&self) -> Option<Rotation> {
+        self.state.initialised.as_ref().map(|known| known.levelling)
+    }
+
+    fn zero_rate(&self) -> Option<&ZeroRate> {
+        self.state.initialised.as_ref()?.zero_rate.as_ref()
+    }
+
+    fn refuse(&mut self, error: AlignError) {
+        if let AlignError::Jump { .. } = error {
+            count(&mut self.state.counters.clock_jumps, 1);
+            self.state.static_init.restart();
+        } else {
+            count(&mut self.state.counters.misplaced, 1);
+        }
+        // Whatever was wrong with its stamp, it may be of time that no other sample is of.
+        if !matches!(error, AlignError::Duplicate { .. }) {
+            self.gap();
+        }
+    }
+
+    fn gap(&mut self) {
+        self.state.gap_within = WINDOW as u32;
+        self.break_window();
+        if let Some(known) = &mut self.state.initialised {
+            known.quiet.restart();
+            known.zero_rate.as_mut().map(ZeroRate::restart);
+        }
+    }
+
+    /// A window must not reach across a gap; neither must static initialisation.
+    fn break_window(&mut self) {
+        self.state.windows.break_off();
+        self.state.compensator.forget();
+        if self.state.initialised.is_none() {
+            self.state.static_init.restart();
+        }
+    }
+
+    /// Uses the estimate whose turn it is.
+    fn use_estimate(&mut self, tick: u32) -> Option<Implausible> {
+        let State { windows, compensator, uncertainty, counters, .. } = &mut self.state;
+        let Some(estimate) = windows.take_estimate(tick, self.config.compensate.mode.delay())? else {
+            count(&mut counters.late, 1);
+            windows.reject(Faults::LATE);
+            compensator.forget();
+            return None;
+        };
+        count(&mut counters.windows, 1);
+        count(&mut counters.clamped_inputs, u32::from(estimate.clamped_inputs));
+        match compensator.revise(&estimate.corrections) {
+            Ok(()) => {
+                windows.accept();
+                uncertainty.window(estimate.scale);
+                None
+            }
+            Err(implausible) => {
+                count(&mut counters.implausible, 1);
+                windows.reject(Faults::IMPLAUSIBLE);
+                Some(implausible)
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn correct(&mut self, frame: &Frame, zero: &ZeroPoint, quiet: bool) -> Rates {
+        let sample = &frame.sample;
+        let features = window::features(sample, &zero.reading());
+        let [.., rate] = features.map(AngularRate);
+        let good = sample.validity.is_good();
+        self.state.compensator.push(frame.tick, rate, sample.validity);
+        self.state.inertial = good.then_some(features);
+        if good {
+            self.state.windows.push(features);
+        }
+        let settled = self.state.compensator.settled();
+        self.update_bias(settled.as_ref(), good.then_some(rate), quiet, sample);
+        let bias = self.bias();
+        let stands = self.state.stood as usize > self.config.compensate.lag.samples();
+        let prompt = self.state.compensator.prompt(bias);
+        let navigation = self.state.compensator.navigation(bias, stands);
+        Rates { prompt, navigation, settled }
+    }
+
+    fn update_bias(
+        &mut self,
+        settled: Option<&Settled>,
+        rate: Option<AngularRate>,
+        quiet: bool,
+        sample: &ImuSample,
+    ) {
+        let source = match self.state.wheels.standstill() {
+            Some(Standstill::Still) => StandstillSource::Wheels,
+            // Where there are wheels they decide.
+            Some(_) => StandstillSource::None,
+            None if quiet => StandstillSource::Inertial,
+            None => StandstillSource::None,
+        };
+        let State { initialised, compensator, stood, counters, .. } = &mut self.state;
+        let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
+        let (Some(zero_rate), Some(settled)) = (zero_rate, settled) else { return };
+        match zero_rate.process(settled.left(), source, sample.temperature) {
+            Some(ZeroRateOutcome::Used) => {
+                count(&mut counters.zero_rate_updates, 1);
+                compensator.confirm_standstill();
+            }
+            Some(ZeroRateOutcome::Refused) => count(&mut counters.contradicted, 1),
+            Some(ZeroRateOutcome::Waits) | None => {}
+        }
+        if rate.is_some_and(|rate| zero_rate.contradicts_wheels(rate)) {
+            count(&mut counters.contradicted, 1);
+        }
+        if zero_rate.stands() {
+            *stood = stood.saturating_add(1);
+        } else if core::mem::take(stood) > 0 {
+            compensator.end_standstill();
+        }
+    }
+}

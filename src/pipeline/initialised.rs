@@ -1,0 +1,55 @@
+//! Static initialisation, and what is known once it has succeeded.
+
+use super::{Pipeline, PipelineConfig};
+use crate::bias::{QuietDetector, Rest, StaticError, ZeroPoint, ZeroRate};
+use crate::health::count;
+use crate::mounting::Rotation;
+use crate::sample::{Frame, ImuSample, Standstill};
+
+/// Everything that static initialisation has found.
+#[derive(Debug, Clone)]
+pub(super) struct Initialised {
+    /// The rotation beyond the configured mounting.
+    pub(super) levelling: Rotation,
+    pub(super) zero: ZeroPoint,
+    pub(super) quiet: QuietDetector,
+    pub(super) zero_rate: Option<ZeroRate>,
+}
+
+impl Pipeline {
+    /// Levels a sample and returns what the gyro reads at rest; `None` before that is known.
+    pub(super) fn level(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
+        let known = self.state.initialised.as_ref()?;
+        *sample = known.levelling.sample(sample);
+        Some(known.zero)
+    }
+
+    /// Takes a sample into static initialisation, and returns the reason if that is refused with it.
+    #[inline(never)]
+    pub(super) fn initialise(&mut self, frame: &Frame) -> Option<StaticError> {
+        let judged = if self.state.wheels.standstill() == Some(Standstill::Moving) {
+            self.state.static_init.refuse_wheels().map(Err)
+        } else if frame.sample.validity.is_good() {
+            self.state.static_init.process(&frame.sample)
+        } else {
+            // The reading says nothing about the bias; the gap it leaves has restarted the initialisation.
+            None
+        };
+        let refused = judged.and_then(|rest| rest.and_then(|rest| self.accept(&rest)).err());
+        count(&mut self.state.counters.moving, u32::from(refused.is_some()));
+        refused
+    }
+
+    #[inline(never)]
+    fn accept(&mut self, rest: &Rest) -> Result<(), StaticError> {
+        let PipelineConfig { levelling, static_init, earth_rate, zero_rate, quiet, .. } = self.config;
+        let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
+        self.state.initialised = Some(Initialised {
+            levelling,
+            zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
+            quiet: QuietDetector::new(quiet, &static_init, rest),
+            zero_rate: zero_rate.map(ZeroRate::new),
+        });
+        Ok(())
+    }
+}

@@ -1,0 +1,81 @@
+//! GyroNet's windows: the samples of the next one, the one that is out, and whether the newest estimate counts.
+
+use super::DueWindow;
+use crate::health::Faults;
+use crate::model::Estimate;
+use crate::window::{Features, Window};
+
+/// The samples of the next window and the state of the last one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Windows {
+    window: Window,
+    /// Samples since the last window.
+    since: u32,
+    /// Tick of the window that is out, and its estimate when it has been delivered.
+    out: Option<(u32, Option<Estimate>)>,
+    accepted: bool,
+    faults: Faults,
+}
+
+impl Windows {
+    /// Adds a good sample.
+    pub fn push(&mut self, features: Features) {
+        self.window.push(features);
+        self.since += 1;
+    }
+
+    /// Drops samples, the window that is out and its estimate.
+    pub fn break_off(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Returns the window that ends with this tick, if it is full, `hop` samples after the last one, and no
+    /// other is out.
+    #[inline(never)]
+    pub fn due(&mut self, tick: u32, hop: u32) -> Option<DueWindow> {
+        if self.since < hop || self.out.is_some() {
+            return None;
+        }
+        let features = self.window.snapshot()?;
+        self.since = 0;
+        self.out = Some((tick, None));
+        Some(DueWindow { end: tick, features })
+    }
+
+    /// Takes the estimate of the window that is out; false where none waits for this one.
+    pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
+        match &mut self.out {
+            Some((due, slot @ None)) if *due == end => {
+                *slot = Some(estimate);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns the estimate that is to be used with this tick: `Some(None)` where it has not come in time.
+    pub fn take_estimate(&mut self, tick: u32, delay: u32) -> Option<Option<Estimate>> {
+        let (_, estimate) = self.out.take_if(|(end, _)| tick.wrapping_sub(*end) >= delay)?;
+        Some(estimate)
+    }
+
+    /// Notes that the newest estimate is in use.
+    pub fn accept(&mut self) {
+        (self.accepted, self.faults) = (true, Faults::NONE);
+    }
+
+    /// Notes that the newest estimate is not in use.
+    pub fn reject(&mut self, fault: Faults) {
+        (self.accepted, self.faults) = (false, fault);
+    }
+
+    /// Whether an estimate is in use.
+    pub fn is_accepted(&self) -> bool {
+        self.accepted
+    }
+
+    /// The fault of the newest estimate.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+}

@@ -1,0 +1,73 @@
+//! A crash of the image: why it stopped and where, kept in RAM over the reset that follows.
+
+use core::fmt;
+use serde::{Deserialize, Serialize};
+
+/// Bytes of a source file's path that are kept: its end.
+pub const FILE: usize = 24;
+
+/// Why the image stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum CrashKind {
+    /// The program panicked.
+    Panic,
+    /// A bus, usage or memory fault escalated to a hard fault.
+    HardFault,
+    /// An exception or interrupt without a handler was raised; its number (ICSR.VECTACTIVE).
+    Unhandled(u16),
+    /// The crystal stopped (clock security system, RM0090 7.2.7).
+    CrystalStopped,
+    /// The supply fell below 2.9 V.
+    SupplyLow,
+}
+
+/// A crash of the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Crash {
+    /// Why the image stopped.
+    pub kind: CrashKind,
+    /// The program counter at a fault, or the line of a panic; 0 where neither is known.
+    pub place: u32,
+    /// The link register at a fault: the caller, roughly.
+    pub link: u32,
+    /// The fault status register CFSR (PM0214 4.4.10).
+    pub status: u32,
+    /// The address that was accessed, where CFSR marks one as valid.
+    pub address: u32,
+    /// The end of a panic's source file, padded with zeros.
+    pub file: [u8; FILE],
+    /// Crashes since power came on.
+    pub count: u32,
+}
+
+impl Crash {
+    /// The end of the source file's path.
+    #[must_use]
+    pub fn file(&self) -> &str {
+        let text = core::str::from_utf8(&self.file).unwrap_or_default();
+        text.trim_end_matches('\0')
+    }
+}
+
+impl fmt::Display for Crash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, place, link, status, address, count, .. } = self;
+        match kind {
+            CrashKind::Panic => write!(f, "panic in line {place} of {}", self.file())?,
+            CrashKind::HardFault => {
+                write!(f, "hard fault at {place:#010x}, called from {link:#010x}, CFSR {status:#010x}")?;
+                // BFARVALID or MMARVALID.
+                if status & (1 << 15 | 1 << 7) != 0 {
+                    write!(f, ", address {address:#010x}")?;
+                }
+            }
+            CrashKind::Unhandled(number) => write!(f, "exception {number} without a handler")?,
+            CrashKind::CrystalStopped => f.write_str("the crystal stopped")?,
+            CrashKind::SupplyLow => f.write_str("the supply fell below 2.9 V")?,
+        }
+        write!(f, ", {count} since power came on")
+    }
+}

@@ -1,0 +1,55 @@
+//! Whether the flash may be written: an erase stalls the processor for up to 2 s, so it waits for standstill.
+//!
+//! Wheels prove standstill or motion. Without wheels the inertial sensor must have been as quiet as at
+//! static initialisation for three seconds. While the sensor is silent no rate is sent that a receiver
+//! could miss, so writing is allowed on a bench without a sensor.
+
+use crate::bias::{QuietConfig, QuietDetector, Rest, StaticConfig};
+use crate::sample::{ImuSample, Standstill};
+
+/// Judges standstill by what the output task observes.
+#[derive(Debug)]
+pub struct StandstillGate {
+    quiet: Option<QuietDetector>,
+    open: bool,
+}
+
+impl StandstillGate {
+    /// Starts open: no rate is valid yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { quiet: None, open: true }
+    }
+
+    /// Whether the flash may be written now.
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        self.open
+    }
+
+    /// Takes a sample of the sensor, `None` while it is silent, and what the wheels show.
+    pub fn observe(&mut self, sample: Option<&ImuSample>, wheels: Standstill, limits: &StaticConfig) {
+        let quiet =
+            self.quiet.get_or_insert_with(|| QuietDetector::new(QuietConfig::DEFAULT, limits, &ANY_REST));
+        let still = sample.is_none_or(|sample| quiet.process(sample));
+        self.open = match wheels {
+            Standstill::Still => true,
+            Standstill::Moving => false,
+            Standstill::Unknown => still,
+        };
+    }
+}
+
+impl Default for StandstillGate {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A rest that leaves the limits of static initialisation as they are.
+const ANY_REST: Rest = Rest {
+    angular_rate: [crate::units::AngularRate(0); 3],
+    specific_force: [crate::units::SpecificForce(0); 3],
+    gyro_std: [f32::INFINITY; 3],
+    accel_std: [f32::INFINITY; 3],
+};

@@ -1,0 +1,98 @@
+//! Both networks of the board, and a memory of what they say of an undamaged drive.
+
+use gyronet::fog::seconds::{Second, SecondsWindow};
+use gyronet::model::fognet::{FogEstimate, FogNetState, MinuteNetwork};
+use gyronet::model::{Blob, Estimate, FogBlob, FogNet, GyroNet, SCALE_MIN, WindowNetwork, weights};
+use gyronet::units::{Angle, AngularRate};
+use gyronet::window::{Features, WINDOW};
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+/// Whatever runs the windows that a board hands out.
+pub trait Networks {
+    /// Runs a window of GyroNet.
+    fn window(&mut self, window: &[Features; WINDOW]) -> Estimate;
+    /// Runs a window of FoGNet.
+    fn minute(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
+}
+
+/// The integer networks.
+pub struct Integer<'a> {
+    gyronet: GyroNet<'a>,
+    fognet: FogNet<'static, 'static>,
+}
+
+impl<'a> Integer<'a> {
+    /// GyroNet on these weights, FoGNet on the library's.
+    ///
+    /// # Panics
+    /// When the library's own weights are refused.
+    #[must_use]
+    pub fn new(blob: Blob<'a>) -> Self {
+        let fog = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
+        // One for each thread, for as long as the program runs.
+        let state = Box::leak(Box::new(FogNetState::ZERO));
+        Self { gyronet: GyroNet::new(blob), fognet: FogNet::new(fog, state) }
+    }
+}
+
+impl Networks for Integer<'_> {
+    fn window(&mut self, window: &[Features; WINDOW]) -> Estimate {
+        self.gyronet.estimate(window)
+    }
+
+    fn minute(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+        self.fognet.estimate(window)
+    }
+}
+
+/// The windows of an undamaged drive, and what the networks say of each once they have been asked.
+#[derive(Debug, Clone, Default)]
+pub struct Known {
+    /// GyroNet's windows, at whatever sample they end.
+    pub windows: HashMap<[Features; WINDOW], OnceLock<Estimate>>,
+    minutes: HashMap<Vec<Second>, OnceLock<FogEstimate>>,
+}
+
+/// Networks that are asked once about what an undamaged drive shows them: little of a run is new.
+pub struct Remembering<'a, N> {
+    /// The networks themselves.
+    pub networks: &'a mut N,
+    /// What they need not be asked twice.
+    pub known: &'a Known,
+}
+
+impl<N: Networks> Networks for Remembering<'_, N> {
+    fn window(&mut self, window: &[Features; WINDOW]) -> Estimate {
+        let Self { networks, known } = self;
+        match known.windows.get(window) {
+            Some(answer) => *answer.get_or_init(|| networks.window(window)),
+            None => networks.window(window),
+        }
+    }
+
+    fn minute(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+        let Self { networks, known } = self;
+        let seconds: Vec<Second> = window.iter().copied().collect();
+        match known.minutes.get(&seconds) {
+            Some(answer) => *answer.get_or_init(|| networks.minute(window)),
+            None => networks.minute(window),
+        }
+    }
+}
+
+/// Corrects nothing and takes note of what it is asked.
+#[derive(Debug, Default)]
+pub struct Collecting(pub Known);
+
+impl Networks for Collecting {
+    fn window(&mut self, window: &[Features; WINDOW]) -> Estimate {
+        self.0.windows.insert(*window, OnceLock::new());
+        Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 }
+    }
+
+    fn minute(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+        self.0.minutes.insert(window.iter().copied().collect(), OnceLock::new());
+        FogEstimate { correction: Angle::ZERO, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 }
+    }
+}

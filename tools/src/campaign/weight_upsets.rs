@@ -1,0 +1,245 @@
+//! Single bits that flip in a weight file: refused when it is loaded, found in the background when it is in use.
+//!
+//! Weights lie in flash under a CRC-32, which is checked when they are loaded and again, piece by
+//! piece, while they are used ([`gyronet::model::background`]). Until that finds a flipped bit,
+//! the limits of [`gyronet::compensate::CompensateConfig`] are what bounds its effect.
+
+use super::draw::Draw;
+use gyronet::compensate::CompensateConfig;
+use gyronet::model::background::BackgroundCheck;
+use gyronet::model::blob::{HEADER_LEN, HIDDEN};
+use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork};
+use gyronet::nn::bilstm::Layer;
+use gyronet::nn::dense::Dense;
+use gyronet::nn::lstm::Direction;
+use gyronet::uncertainty::UncertaintyConfig;
+use gyronet::units::AngularRate;
+use gyronet::window::{FEATURES, Features, WINDOW};
+use serde::Serialize;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Bytes that the image's idle task checks in a millisecond: a pass is 9.7 s.
+pub const PIECE: usize = 13;
+
+/// What flipped bits of a weight file do.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct WeightUpsets {
+    /// Bits of the header, provenance included.
+    pub header_bits: usize,
+    /// Of those, refused when loaded.
+    pub header_refused: usize,
+    /// Bits of weights that were flipped, one at a time.
+    pub weight_bits: usize,
+    /// Of those, refused when loaded.
+    pub weight_refused: usize,
+    /// What they do when they flip after that.
+    pub effects: Effects,
+    /// From a flip to the moment that the background check tells, median and most, s.
+    pub found_after: [f64; 2],
+    /// Flips that it has not found in two passes.
+    pub not_found: usize,
+}
+
+/// A weight file in memory that bits flip in.
+struct Memory {
+    words: Vec<u32>,
+    bytes: usize,
+}
+
+impl Memory {
+    fn new(file: &[u8]) -> Self {
+        let mut words = vec![0; file.len().div_ceil(4)];
+        bytemuck::cast_slice_mut(&mut words)[..file.len()].copy_from_slice(file);
+        Self { words, bytes: file.len() }
+    }
+
+    fn flip(&mut self, bit: usize) {
+        bytemuck::cast_slice_mut::<u32, u8>(&mut self.words)[bit / 8] ^= 1 << (bit % 8);
+    }
+
+    fn file(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..self.bytes]
+    }
+
+    /// The weights in use, whatever has become of them: what was read from the header at the start
+    /// is not read again.
+    fn in_use<'m>(&'m self, loaded: &Blob<'m>) -> Option<Blob<'m>> {
+        let mut at = first_weight(self.file()) / 4;
+        let mut take = |words: usize| {
+            at += words;
+            self.words.get(at - words..at)
+        };
+        let mut direction = |inputs| {
+            let input = take(Direction::input_words(HIDDEN, inputs))?;
+            Direction::new(HIDDEN, inputs, input, take(Direction::recurrent_words(HIDDEN))?)
+        };
+        let mut layer = |inputs| Some(Layer { forward: direction(inputs)?, backward: direction(inputs)? });
+        let layers = [layer(FEATURES)?, layer(2 * HIDDEN)?];
+        let mut dense = || {
+            let weights = bytemuck::cast_slice(take(HIDDEN)?);
+            let &[bias, multiplier] = take(2)? else { return None };
+            Some(Dense { weights, bias: bias as i32, multiplier: multiplier as i32 })
+        };
+        let (gyro_error, log_scale) = (dense()?, dense()?);
+        let &[scale_unit] = take(1)? else { return None };
+        let content = self.file().get(..self.bytes - 4)?;
+        Some(Blob { layers, gyro_error, log_scale, scale_unit, content, ..*loaded })
+    }
+}
+
+/// Where the header and its provenance end.
+fn first_weight(file: &[u8]) -> usize {
+    let length =
+        file.get(20..24).map_or(0, |bytes| bytes.iter().rev().fold(0, |n, byte| n << 8 | usize::from(*byte)));
+    HEADER_LEN + length
+}
+
+impl WeightUpsets {
+    /// Every bit of the header, and `bits` of the weights, drawn by a seed. Each damaged network is
+    /// asked about some windows. `tick` is called once for each bit.
+    #[must_use]
+    pub fn new(
+        file: &[u8],
+        loaded: &Blob<'_>,
+        windows: &[[Features; WINDOW]],
+        (bits, seed): (usize, u64),
+        mut tick: impl FnMut(),
+    ) -> Self {
+        let mut upsets = Self::default();
+        let mut memory = Memory::new(file);
+        let first = 8 * first_weight(file);
+        for bit in 0..first {
+            memory.flip(bit);
+            upsets.header_bits += 1;
+            upsets.header_refused += usize::from(Blob::new_checked(memory.file()).is_err());
+            memory.flip(bit);
+            tick();
+        }
+        let mut network = GyroNet::new(*loaded);
+        let undamaged: Vec<Estimate> = windows.iter().map(|window| network.estimate(window)).collect();
+        let mut draw = Draw::new(seed, 0);
+        let mut found = Vec::new();
+        for _ in 0..bits {
+            let bit = first + draw.below(8 * (file.len() - 4) - first);
+            memory.flip(bit);
+            upsets.weight_bits += 1;
+            upsets.weight_refused += usize::from(Blob::new_checked(memory.file()).is_err());
+            if let Some(blob) = memory.in_use(loaded) {
+                let effect = catch_unwind(AssertUnwindSafe(|| effect(&blob, windows, &undamaged)));
+                match effect {
+                    Ok((told, moved, sigmas)) => upsets.effects.count(told, moved, sigmas),
+                    Err(_) => upsets.effects.panics += 1,
+                }
+                match found_after(&blob, bit / 8, draw.below(file.len())) {
+                    Some(milliseconds) => found.push(milliseconds as f64 * 1e-3),
+                    None => upsets.not_found += 1,
+                }
+            }
+            memory.flip(bit);
+            tick();
+        }
+        found.sort_by(f64::total_cmp);
+        let median = found.get(found.len() / 2).copied().unwrap_or_default();
+        upsets.found_after = [median, found.last().copied().unwrap_or_default()];
+        upsets
+    }
+}
+
+/// Whether the estimates are believed, and what a second of the worst of them moves yaw by, rad and
+/// stated sigmas.
+fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate]) -> (bool, f64, f64) {
+    let limits = CompensateConfig::DEFAULT;
+    let mut network = GyroNet::new(*blob);
+    let (mut told, mut moved, mut sigmas) = (false, 0f64, 0f64);
+    for (window, before) in windows.iter().zip(undamaged) {
+        let estimate = network.estimate(window);
+        let mean = |estimate: &Estimate| {
+            estimate.corrections.iter().map(|correction| correction.rad_per_sec()).sum::<f64>()
+                / WINDOW as f64
+        };
+        let largest = estimate.corrections.iter().map(|correction| correction.0.unsigned_abs()).max();
+        told |= mean(&estimate).abs() > limits.max_mean.rad_per_sec()
+            || largest.unwrap_or_default() > limits.max_single.0.unsigned_abs();
+        let by = (mean(&estimate) - mean(before)).abs();
+        let sigma = f64::from(UncertaintyConfig::DEFAULT.per_scale) * before.scale.rad_per_sec();
+        moved = moved.max(by);
+        sigmas = sigmas.max(by / sigma.max(AngularRate(1).rad_per_sec()));
+    }
+    (told, moved, sigmas)
+}
+
+/// Milliseconds until the background check tells, of a flip that happens when it has come to byte
+/// `at`; `None` after two passes.
+///
+/// Only the bytes of the pass in which the flip is seen need be looked at: the sum of a pass does
+/// not fit from that pass on.
+fn found_after(damaged: &Blob<'_>, flipped: usize, at: usize) -> Option<usize> {
+    let mut check = BackgroundCheck::new(damaged);
+    let length = check.len();
+    let finds = check.advance(length)?.is_err();
+    // What has been passed already is seen in the next pass.
+    let rest = length.saturating_sub(at);
+    let bytes = if flipped >= at { rest } else { rest + length };
+    finds.then_some(bytes.div_ceil(PIECE))
+}
+
+impl fmt::Display for WeightUpsets {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [median, most] = self.found_after;
+        writeln!(f, "header: {} of {} bits refused when loaded", self.header_refused, self.header_bits)?;
+        writeln!(f, "weights: {} of {} bits refused when loaded", self.weight_refused, self.weight_bits)?;
+        writeln!(f, "flipped in use: {}", self.effects)?;
+        writeln!(
+            f,
+            "background check: told after {median:.1} s, at most {most:.1} s; {} not found",
+            self.not_found
+        )
+    }
+}
+
+/// What flipped bits did.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Effects {
+    /// Bits flipped.
+    pub bits: usize,
+    /// Nothing changed.
+    pub nothing: usize,
+    /// The estimate was not believed: a receiver is told.
+    pub told: usize,
+    /// Yaw moved by no more than the stated sigma.
+    pub within: usize,
+    /// It moved further, and nothing told.
+    pub beyond: usize,
+    /// The most that it moved in a second where nothing told, rad.
+    pub most: f64,
+    /// Arithmetic that overflowed; the board's wraps.
+    pub panics: usize,
+}
+
+impl Effects {
+    fn count(&mut self, told: bool, moved: f64, sigmas: f64) {
+        self.bits += 1;
+        if told {
+            self.told += 1;
+            return;
+        }
+        self.most = self.most.max(moved);
+        match sigmas {
+            0.0 => self.nothing += 1,
+            ..=1.0 => self.within += 1,
+            _ => self.beyond += 1,
+        }
+    }
+}
+
+impl fmt::Display for Effects {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bits, nothing, told, within, beyond, most, panics } = self;
+        write!(
+            f,
+            "{bits} bits: {nothing} changed nothing, {within} moved yaw by at most the stated sigma, {beyond} by \
+             more, at most {most:.1e} rad in a second, {told} were told of, {panics} panics"
+        )
+    }
+}
