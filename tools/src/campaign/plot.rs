@@ -2,7 +2,7 @@
 
 use super::Run;
 use super::fault::Kind;
-use crate::plot::PlotError;
+use crate::plot::drive::PlotError;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 

@@ -1,8 +1,8 @@
 //! `gyronet import`: a sequence of a data set as one drive.
 
 use super::{Common, WriteError, print_json, progress, remark};
-use gyronet_tools::figures;
-use gyronet_tools::sequence::{self, Sequence};
+use gyronet_tools::paper::sequence::{self, Sequence};
+use gyronet_tools::plot::figures;
 use gyronet_tools::simulate::layout::Layout;
 use std::fs::File;
 use std::io::{BufWriter, Write};

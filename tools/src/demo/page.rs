@@ -3,10 +3,10 @@
 use super::board::Outcome;
 use super::trajectory::Trajectories;
 use super::{Cost, Demo, Message};
-use crate::methods::Method;
-use crate::metrics::DT;
-use crate::page::chart::{Chart, Curve};
-use crate::page::{document, escaped, grouped, table};
+use crate::drive::DT;
+use crate::evaluate::methods::Method;
+use crate::plot::page::chart::{Chart, Curve};
+use crate::plot::page::{document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
 
 /// Whose curves are drawn, from back to front.
