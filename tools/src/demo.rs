@@ -4,6 +4,7 @@ pub mod board;
 mod can_excerpt;
 mod costs;
 mod page;
+pub mod picture;
 mod trajectory;
 
 use crate::drive::recording::Recording;

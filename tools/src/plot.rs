@@ -1,6 +1,6 @@
-//! Pictures and pages.
+//! Pictures and pages of anything: [`svg`] draws figures for a file, [`page`] writes HTML with charts that can be zoomed.
+//! Neither knows what it shows; each product draws its own pictures with them.
 
-mod curve;
-pub mod drive;
-pub mod figures;
+pub mod curve;
 pub mod page;
+pub mod svg;

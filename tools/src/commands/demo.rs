@@ -6,10 +6,11 @@ use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::Demo;
 use gyronet_tools::demo::board::{Agreement, BoardError, Difference, Figures, Outcome};
+use gyronet_tools::demo::picture;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::methods::{self, Rates};
 use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError, Report};
-use gyronet_tools::plot::drive;
+
 use gyronet_tools::target::bench;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -70,7 +71,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
     let frames = replay::write_file(&rates.drive, &log)?;
-    std::fs::write(&picture, drive::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
+    std::fs::write(&picture, picture::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
     let board = board(args, common, &recording, &mut integer)?;
     let simulated = args.file.is_none();
     let demo = Demo::new(&recording, simulated, &rates, errors.as_ref(), (Config::DEFAULT, frames), board);

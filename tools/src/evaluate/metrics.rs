@@ -50,6 +50,16 @@ impl YawError {
     }
 }
 
+/// Returns the angle after each sample of a rate, rad.
+#[must_use]
+pub fn integral(rates: &[f64]) -> Vec<f64> {
+    let step = |angle: &mut f64, rate: &f64| {
+        *angle += rate * DT;
+        Some(*angle)
+    };
+    rates.iter().scan(0.0, step).collect()
+}
+
 /// The same angle within -pi to pi.
 pub(crate) fn wrap(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI

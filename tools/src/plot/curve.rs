@@ -1,7 +1,7 @@
 //! Points of a curve: fewer of them, and how far they reach.
 
 /// Every n-th point so that about `most` are left, and the last one.
-pub(crate) fn thinned(
+pub fn thinned(
     points: impl ExactSizeIterator<Item = (f64, f64)> + DoubleEndedIterator + Clone,
     most: usize,
 ) -> impl Iterator<Item = (f64, f64)> + Clone {
@@ -11,7 +11,7 @@ pub(crate) fn thinned(
 }
 
 /// From the least to the most, with a share of that as air on either side; 0 to 1 of no values.
-pub(crate) fn range(values: impl Iterator<Item = f64>, air: f64) -> (f64, f64) {
+pub fn range(values: impl Iterator<Item = f64>, air: f64) -> (f64, f64) {
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
     if low > high {
         return (0.0, 1.0);
