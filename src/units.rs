@@ -10,26 +10,17 @@ use serde::{Deserialize, Serialize};
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
 /// Why a reading cannot be taken over into fixed point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RangeError {
     /// The reading is NaN or infinite.
+    #[error("not a finite number")]
     NotFinite,
     /// The reading is finite but beyond what any part of this kind can measure.
+    #[error("out of range")]
     OutOfRange,
 }
-
-impl core::fmt::Display for RangeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::NotFinite => "not a finite number",
-            Self::OutOfRange => "out of range",
-        })
-    }
-}
-
-impl core::error::Error for RangeError {}
 
 /// Angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]

@@ -86,21 +86,14 @@ impl From<Lag> for u8 {
 }
 
 /// A number of samples that makes no sense.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("{} samples are not within {} to {}", .samples, .low, .high)]
 pub struct OutOfRange {
     samples: u8,
     low: u8,
     high: u8,
 }
-
-impl core::fmt::Display for OutOfRange {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} samples are not within {} to {}", self.samples, self.low, self.high)
-    }
-}
-
-impl core::error::Error for OutOfRange {}
 
 /// How the estimate of a sample is chosen from the windows that cover it.
 ///
