@@ -4,8 +4,6 @@
 //! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
 //! and the scaled reading are different methods.
 
-use serde::{Deserialize, Serialize};
-
 /// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
@@ -23,7 +21,8 @@ pub enum RangeError {
 }
 
 /// Angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngularRate(pub i32);
 
@@ -51,7 +50,8 @@ impl AngularRate {
 }
 
 /// Specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpecificForce(pub i32);
 
@@ -165,7 +165,8 @@ impl WheelSpeed {
 }
 
 /// Temperature of the part, in 1/100 deg C.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CentiCelsius(pub i16);
 

@@ -10,7 +10,6 @@ use super::spread::Spread;
 use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
-use serde::{Deserialize, Serialize};
 
 /// Samples of the static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
@@ -19,7 +18,8 @@ const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 /// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
 /// none of 656 (overlapping) stretches with standing wheels and a running engine is refused, and
 /// 3,177 of 3,247 driven ones are.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StaticConfig {
     /// Standard deviation of each gyro axis, rad/s.
     pub gyro_std: f32,

@@ -2,7 +2,6 @@
 
 use crate::window::WINDOW;
 use core::ops::Range;
-use serde::{Deserialize, Serialize};
 
 /// An estimate is used this many samples after its window's newest one, whatever the time the
 /// network took: the board's frames then do not depend on its speed. A window every sample has
@@ -10,8 +9,9 @@ use serde::{Deserialize, Serialize};
 pub const DELAY: u32 = 2;
 
 /// Samples between two windows: 1 to [`WINDOW`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "u8", into = "u8")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hop(u8);
 
@@ -47,8 +47,9 @@ impl From<Hop> for u8 {
 }
 
 /// Samples between one that was taken and the frame with its rate: 0 to [`Lag::MAX`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "u8", into = "u8")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lag(u8);
 
@@ -99,7 +100,8 @@ pub struct OutOfRange {
 ///
 /// The newest output of a window knows only the past and is the worst, those in the middle know
 /// both sides. `cargo gyronet evaluate --ablation` compares the modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
     /// A window every sample, of which the newest output is used: the obvious online choice.

@@ -20,7 +20,6 @@
 
 use crate::nn::lstm::{Direction, ROW_LIMIT, row_bound};
 use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
-use serde::{Deserialize, Serialize};
 
 /// First bytes of a weight file.
 pub const MAGIC: [u8; 4] = *b"GYRN";
@@ -40,7 +39,8 @@ compile_error!("weights are read in place as little-endian words");
 pub type Topology = [u16; 5];
 
 /// Why a weight file is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BlobError {

@@ -1,10 +1,10 @@
 //! Why settings are refused.
 
 use super::{MAX_PERIOD_MS, SAMPLE_MS};
-use serde::{Deserialize, Serialize};
 
 /// Why settings are no configuration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ConfigError {
