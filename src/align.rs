@@ -28,16 +28,18 @@ pub const TOLERANCE_US: u64 = 2_000;
 pub const MAX_GAP: u32 = 100;
 
 /// Why a sample found no place on the grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum AlignError {
     /// The last sample once more.
+    #[error("the sample of {} us has come twice", .at.0)]
     Duplicate {
         /// The time stamp, microseconds.
         at: Micros,
     },
     /// Time stamp before the last one.
+    #[error("time goes backwards, from {} to {} us", .last.0, .at.0)]
     Backwards {
         /// The last time stamp.
         last: Micros,
@@ -45,6 +47,7 @@ pub enum AlignError {
         at: Micros,
     },
     /// Not within [`TOLERANCE_US`] of any grid step.
+    #[error("time stamp {} us, {} us after the last one, fits no 100 Hz step", .at.0, .at.0 - .last.0)]
     OffGrid {
         /// The last time stamp.
         last: Micros,
@@ -52,6 +55,7 @@ pub enum AlignError {
         at: Micros,
     },
     /// More than [`MAX_GAP`] steps away from the last sample, either way.
+    #[error("time jumps from {} to {} us, more than 1 s", .last.0, .at.0)]
     Jump {
         /// The last time stamp.
         last: Micros,
@@ -59,28 +63,6 @@ pub enum AlignError {
         at: Micros,
     },
 }
-
-impl core::fmt::Display for AlignError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Duplicate { at } => write!(f, "the sample of {} us has come twice", at.0),
-            Self::Backwards { last, at } => {
-                write!(f, "time goes backwards, from {} to {} us", last.0, at.0)
-            }
-            Self::OffGrid { last, at } => write!(
-                f,
-                "time stamp {} us, {} us after the last one, fits no 100 Hz step",
-                at.0,
-                at.0 - last.0
-            ),
-            Self::Jump { last, at } => {
-                write!(f, "time jumps from {} to {} us, more than 1 s", last.0, at.0)
-            }
-        }
-    }
-}
-
-impl core::error::Error for AlignError {}
 
 /// The last sample that has a place on the grid, or that the grid was laid anew from.
 #[derive(Debug, Clone, Copy)]

@@ -31,10 +31,10 @@ use crate::model::Corrections;
 use crate::sample::Validity;
 use crate::units::AngularRate;
 use crate::window::WINDOW;
-use serde::{Deserialize, Serialize};
 
 /// How estimates of the gyro's error become rates that go out.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CompensateConfig {
     /// Which estimates.
     pub mode: Mode,

@@ -1,7 +1,6 @@
 //! What the board thinks of itself: status, source and one counter for each kind of event.
 
 use crate::sample::Validity;
-use serde::{Deserialize, Serialize};
 
 #[cfg(target_has_atomic = "8")]
 pub mod supervisor;
@@ -23,7 +22,8 @@ pub mod supervisor;
 /// | fault | `Silent` | 29 ms without a sample, by the board's clock; 2 s after the start without the first | none, every 10 ms, `GAP` | the next sample | `silences` |
 ///
 /// From a fault it goes back to init where no bias is known, else to degraded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {
     /// No bias yet: the rate is shown but not good.
@@ -186,7 +186,8 @@ pub const fn judge(status: Status) -> (Source, Quality) {
 }
 
 /// How often each kind of event happened since start. They saturate, they do not wrap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
     /// Samples that became frames.
@@ -216,7 +217,8 @@ pub struct Counters {
 }
 
 /// How often the sensor was found at fault ([`crate::monitor`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WatchCounters {
     /// Times that it fell silent.
@@ -232,7 +234,8 @@ pub struct WatchCounters {
 }
 
 /// The numbers of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct InputCounters {
     /// Messages of the inertial sensor that were no sample.

@@ -77,7 +77,16 @@
 //!
 //! # Features, unsafe code, panics
 //!
-//! No feature is on by default. `defmt`: `defmt::Format` on the public types. `stm32f405`,
+//! No feature is on by default, and without one the library goes from sensor bytes to CAN frames.
+//!
+//! | feature | adds |
+//! |---|---|
+//! | `store` | [`store`]: configuration, calibration and weights in flash (serde, postcard, embedded-storage) |
+//! | `service` | [`service`]: the service line, and `store` (cobs) |
+//! | `serde` | `Serialize` and `Deserialize` for configuration and counters |
+//! | `defmt` | `defmt::Format` for the public types |
+//!
+//! `stm32f405`,
 //! `netduino-plus-2`, `olimex-stm32-h405` and `rtt` build the images of the repository; a user of the
 //! library needs none of them.
 //!
@@ -87,6 +96,7 @@
 //! Nothing that comes from outside can make the library panic: bad bytes, times and weights are typed
 //! errors or counted, and what is wrong is said on the bus. Errors implement [`core::error::Error`].
 #![cfg_attr(not(test), no_std)]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod align;
 pub mod bias;
@@ -104,7 +114,9 @@ pub mod odometry;
 pub mod pipeline;
 pub mod sample;
 pub mod sensor;
+#[cfg(feature = "service")]
 pub mod service;
+#[cfg(feature = "store")]
 pub mod store;
 pub mod uncertainty;
 pub mod units;

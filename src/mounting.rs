@@ -51,30 +51,17 @@ impl Levelling {
 }
 
 /// Why the accelerometer shows no vertical.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LevelError {
     /// The mean specific force is not gravity, m/s^2.
+    #[error("the accelerometer shows {0:.2} m/s^2 at standstill instead of gravity")]
     NotGravity(f32),
     /// The board hangs upside down, degrees: its mounting has to be configured.
+    #[error("the sensor is tilted by {0:.0} deg: configure how it is mounted")]
     UpsideDown(f32),
 }
-
-impl core::fmt::Display for LevelError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::NotGravity(force) => {
-                write!(f, "the accelerometer shows {force:.2} m/s^2 at standstill instead of gravity")
-            }
-            Self::UpsideDown(tilt) => {
-                write!(f, "the sensor is tilted by {tilt:.0} deg: configure how it is mounted")
-            }
-        }
-    }
-}
-
-impl core::error::Error for LevelError {}
 
 /// A rotation of the sensor's axes into the vehicle's (x forward, y left, z up).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,35 +4,25 @@
 //! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
 //! and the scaled reading are different methods.
 
-use serde::{Deserialize, Serialize};
-
 /// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
 /// Why a reading cannot be taken over into fixed point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RangeError {
     /// The reading is NaN or infinite.
+    #[error("not a finite number")]
     NotFinite,
     /// The reading is finite but beyond what any part of this kind can measure.
+    #[error("out of range")]
     OutOfRange,
 }
 
-impl core::fmt::Display for RangeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::NotFinite => "not a finite number",
-            Self::OutOfRange => "out of range",
-        })
-    }
-}
-
-impl core::error::Error for RangeError {}
-
 /// Angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngularRate(pub i32);
 
@@ -60,7 +50,8 @@ impl AngularRate {
 }
 
 /// Specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpecificForce(pub i32);
 
@@ -174,7 +165,8 @@ impl WheelSpeed {
 }
 
 /// Temperature of the part, in 1/100 deg C.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CentiCelsius(pub i16);
 

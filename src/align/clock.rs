@@ -30,16 +30,18 @@ pub const PATIENCE_US: u64 = 1_000_000;
 pub const JITTER_US: u64 = 2_000;
 
 /// Why a sample is not used: its time stamp has no place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ClockError {
     /// Time stamp equal to the last one.
+    #[error("two samples carry the time stamp {} us", .at.0)]
     Duplicate {
         /// The time stamp.
         at: Micros,
     },
     /// Time stamp before the last one.
+    #[error("a sample of {} us comes after one of {} us", .at.0, .last.0)]
     OutOfOrder {
         /// The last time stamp.
         last: Micros,
@@ -47,19 +49,6 @@ pub enum ClockError {
         at: Micros,
     },
 }
-
-impl core::fmt::Display for ClockError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Duplicate { at } => write!(f, "two samples carry the time stamp {} us", at.0),
-            Self::OutOfOrder { last, at } => {
-                write!(f, "a sample of {} us comes after one of {} us", at.0, last.0)
-            }
-        }
-    }
-}
-
-impl core::error::Error for ClockError {}
 
 /// How often each kind of event happened. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

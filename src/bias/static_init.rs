@@ -10,7 +10,6 @@ use super::spread::Spread;
 use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
-use serde::{Deserialize, Serialize};
 
 /// Samples of the static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
@@ -19,7 +18,8 @@ const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 /// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
 /// none of 656 (overlapping) stretches with standing wheels and a running engine is refused, and
 /// 3,177 of 3,247 driven ones are.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StaticConfig {
     /// Standard deviation of each gyro axis, rad/s.
     pub gyro_std: f32,
@@ -40,11 +40,12 @@ impl StaticConfig {
 }
 
 /// What gave the vehicle's motion away; `axis` is 0, 1, 2 for x, y, z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StaticError {
     /// Gyro too restless, rad/s.
+    #[error("the vehicle moves during static initialisation: gyro {} has a spread of {std:.4} rad/s", name(*.axis))]
     GyroNoise {
         /// The axis.
         axis: u8,
@@ -52,6 +53,10 @@ pub enum StaticError {
         std: f32,
     },
     /// Accelerometer too restless, m/s^2.
+    #[error(
+        "the vehicle moves during static initialisation: accelerometer {} has a spread of {std:.3} m/s^2",
+        name(*.axis)
+    )]
     AccelNoise {
         /// The axis.
         axis: u8,
@@ -59,6 +64,7 @@ pub enum StaticError {
         std: f32,
     },
     /// The gyro's mean changed from one second to another, rad/s.
+    #[error("the vehicle moves during static initialisation: gyro {} changes its mean by {spread:.4} rad/s", name(*.axis))]
     GyroDrift {
         /// The axis.
         axis: u8,
@@ -66,6 +72,10 @@ pub enum StaticError {
         spread: f32,
     },
     /// The accelerometer's mean changed from one second to another, m/s^2.
+    #[error(
+        "the vehicle moves during static initialisation: accelerometer {} changes its mean by {spread:.3} m/s^2",
+        name(*.axis)
+    )]
     AccelDrift {
         /// The axis.
         axis: u8,
@@ -73,6 +83,7 @@ pub enum StaticError {
         spread: f32,
     },
     /// The mean is more than any bias: a steady turn, rad/s.
+    #[error("the vehicle moves during static initialisation: gyro {} shows a steady {mean:.4} rad/s", name(*.axis))]
     GyroBias {
         /// The axis.
         axis: u8,
@@ -80,39 +91,17 @@ pub enum StaticError {
         mean: f32,
     },
     /// The wheels turn.
+    #[error("the vehicle moves during static initialisation: the wheels turn")]
     Wheels,
     /// The accelerometer shows no vertical.
+    #[error(transparent)]
     Level(LevelError),
 }
 
-impl core::fmt::Display for StaticError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let name = |axis: u8| ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?");
-        if let Self::Level(error) = self {
-            return error.fmt(f);
-        }
-        f.write_str("the vehicle moves during static initialisation: ")?;
-        match *self {
-            Self::GyroNoise { axis, std } => write!(f, "gyro {} has a spread of {std:.4} rad/s", name(axis)),
-            Self::AccelNoise { axis, std } => {
-                write!(f, "accelerometer {} has a spread of {std:.3} m/s^2", name(axis))
-            }
-            Self::GyroDrift { axis, spread } => {
-                write!(f, "gyro {} changes its mean by {spread:.4} rad/s", name(axis))
-            }
-            Self::AccelDrift { axis, spread } => {
-                write!(f, "accelerometer {} changes its mean by {spread:.3} m/s^2", name(axis))
-            }
-            Self::GyroBias { axis, mean } => {
-                write!(f, "gyro {} shows a steady {mean:.4} rad/s", name(axis))
-            }
-            Self::Wheels => f.write_str("the wheels turn"),
-            Self::Level(_) => Ok(()),
-        }
-    }
+/// Returns the letter of an axis.
+fn name(axis: u8) -> &'static str {
+    ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?")
 }
-
-impl core::error::Error for StaticError {}
 
 /// One axis.
 #[derive(Debug, Clone, Copy, Default)]

@@ -53,17 +53,10 @@ pub struct Vdc2 {
 }
 
 /// Not eight bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("VDC2 has {} bytes instead of 8", .0)]
 pub struct Vdc2Length(pub usize);
-
-impl core::fmt::Display for Vdc2Length {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "VDC2 has {} bytes instead of 8", self.0)
-    }
-}
-
-impl core::error::Error for Vdc2Length {}
 
 impl Vdc2 {
     /// The eight bytes.

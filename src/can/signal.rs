@@ -11,22 +11,15 @@ pub enum ByteOrder {
 }
 
 /// The value does not lie inside eight bytes, or has no bits, or over 32.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("{} bits from bit {} do not lie inside a frame", .len, .start)]
 pub struct OutsideFrame {
     /// Start bit as given.
     pub start: u8,
     /// Length as given.
     pub len: u8,
 }
-
-impl core::fmt::Display for OutsideFrame {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} bits from bit {} do not lie inside a frame", self.len, self.start)
-    }
-}
-
-impl core::error::Error for OutsideFrame {}
 
 /// Bits of a frame that are one value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

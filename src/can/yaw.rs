@@ -42,26 +42,17 @@ const ANGLE_PER_YAW_Q56: i128 = 3_669_863_129_102_502;
 const SIGMA_PER_CODE_Q32: u64 = 183_346_494;
 
 /// Why bytes are no yaw message. The E2E check comes before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum YawError {
     /// Not eight bytes.
+    #[error("yaw message has {0} bytes instead of 8")]
     Length(usize),
     /// A source that this version does not know.
+    #[error("yaw rate from an unknown source ({0})")]
     Source(u8),
 }
-
-impl core::fmt::Display for YawError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Length(len) => write!(f, "yaw message has {len} bytes instead of 8"),
-            Self::Source(source) => write!(f, "yaw rate from an unknown source ({source})"),
-        }
-    }
-}
-
-impl core::error::Error for YawError {}
 
 /// The rate message: 1e-6 deg/s a code, where the rate comes from, what it is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,6 @@
 
 use crate::window::WINDOW;
 use core::ops::Range;
-use serde::{Deserialize, Serialize};
 
 /// An estimate is used this many samples after its window's newest one, whatever the time the
 /// network took: the board's frames then do not depend on its speed. A window every sample has
@@ -10,8 +9,9 @@ use serde::{Deserialize, Serialize};
 pub const DELAY: u32 = 2;
 
 /// Samples between two windows: 1 to [`WINDOW`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "u8", into = "u8")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hop(u8);
 
@@ -47,8 +47,9 @@ impl From<Hop> for u8 {
 }
 
 /// Samples between one that was taken and the frame with its rate: 0 to [`Lag::MAX`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "u8", into = "u8")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lag(u8);
 
@@ -86,27 +87,21 @@ impl From<Lag> for u8 {
 }
 
 /// A number of samples that makes no sense.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("{} samples are not within {} to {}", .samples, .low, .high)]
 pub struct OutOfRange {
     samples: u8,
     low: u8,
     high: u8,
 }
 
-impl core::fmt::Display for OutOfRange {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} samples are not within {} to {}", self.samples, self.low, self.high)
-    }
-}
-
-impl core::error::Error for OutOfRange {}
-
 /// How the estimate of a sample is chosen from the windows that cover it.
 ///
 /// The newest output of a window knows only the past and is the worst, those in the middle know
 /// both sides. `cargo gyronet evaluate --ablation` compares the modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
     /// A window every sample, of which the newest output is used: the obvious online choice.

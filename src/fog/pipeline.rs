@@ -25,7 +25,6 @@ use crate::model::fognet::FogEstimate;
 use crate::sample::{FogSample, PERIOD_US, WheelSample};
 use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};
 use crate::window::Features;
-use serde::{Deserialize, Serialize};
 
 /// Increments in a row, equal to the one before, after which the gyro is stuck, if they last [`STUCK_US`]. A
 /// DSP-3000's noise in 10 ms is a hundred of its units, which repeats an increment once in four hundred, and four
@@ -36,7 +35,8 @@ pub const STUCK_AFTER: u8 = 4;
 pub const STUCK_US: u32 = 10_000;
 
 /// The numbers of events since the start. They saturate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogCounters {
     /// Samples taken.

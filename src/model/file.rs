@@ -20,7 +20,6 @@
 
 use crate::nn::lstm::{Direction, ROW_LIMIT, row_bound};
 use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
-use serde::{Deserialize, Serialize};
 
 /// First bytes of a weight file.
 pub const MAGIC: [u8; 4] = *b"GYRN";
@@ -40,15 +39,23 @@ compile_error!("weights are read in place as little-endian words");
 pub type Topology = [u16; 5];
 
 /// Why a weight file is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BlobError {
     /// Does not begin with [`MAGIC`].
+    #[error("weight file: this is none, it begins with {0:02x?}, not {MAGIC:02x?}")]
     Magic([u8; 4]),
     /// A format version that this code does not read.
+    #[error("weight file: format version {0}, this reads {VERSION}")]
     Version(u16),
     /// Not the network that was asked for, or not its shape.
+    #[error(
+        "weight file: network {} with window {}, {} inputs, {} units, {} layers is not {} ({}: {}, {}, {}, {})",
+        .found[0], .found[1], .found[2], .found[3], .found[4],
+        network_name(.expected), .expected[0], .expected[1], .expected[2], .expected[3], .expected[4]
+    )]
     Topology {
         /// As found.
         found: Topology,
@@ -56,6 +63,7 @@ pub enum BlobError {
         expected: Topology,
     },
     /// Shorter or longer than its header and shape say.
+    #[error("weight file: {found} bytes, should be {expected}")]
     Length {
         /// Bytes there should be.
         expected: usize,
@@ -63,8 +71,10 @@ pub enum BlobError {
         found: usize,
     },
     /// The bytes do not begin on a 4-byte boundary.
+    #[error("weight file: not on a 4-byte boundary")]
     Misaligned,
     /// The checksum does not fit the content.
+    #[error("weight file: checksum is {computed:08x}, the file says {stored:08x}")]
     Crc {
         /// Computed over the content.
         computed: u32,
@@ -72,10 +82,13 @@ pub enum BlobError {
         stored: u32,
     },
     /// The provenance is not UTF-8.
+    #[error("weight file: provenance is not UTF-8")]
     Provenance,
     /// The input clamp is not within 1 to 32767, or an output could overflow.
+    #[error("weight file: input clamp or output scale out of range")]
     Scale,
     /// A gate row could overflow its accumulator.
+    #[error("weight file: layer {layer}, direction {direction}, unit {unit} could overflow its accumulator")]
     RowBound {
         /// Layer, 0 or 1; those of FoGNet's LSTM2 are 2 and 3.
         layer: u8,
@@ -86,41 +99,10 @@ pub enum BlobError {
     },
 }
 
-impl core::fmt::Display for BlobError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match *self {
-            Self::Magic(found) => {
-                write!(f, "weight file: this is none, it begins with {found:02x?}, not {MAGIC:02x?}")
-            }
-            Self::Version(found) => write!(f, "weight file: format version {found}, this reads {VERSION}"),
-            Self::Topology { found, expected } => {
-                let [network, window, inputs, hidden, layers] = found;
-                let [n, w, i, h, l] = expected;
-                let name = if n == FOGNET { "FoGNet" } else { "GyroNet" };
-                write!(
-                    f,
-                    "weight file: network {network} with window {window}, {inputs} inputs, {hidden} units, \
-                     {layers} layers is not {name} ({n}: {w}, {i}, {h}, {l})"
-                )
-            }
-            Self::Length { expected, found } => {
-                write!(f, "weight file: {found} bytes, should be {expected}")
-            }
-            Self::Misaligned => f.write_str("weight file: not on a 4-byte boundary"),
-            Self::Crc { computed, stored } => {
-                write!(f, "weight file: checksum is {computed:08x}, the file says {stored:08x}")
-            }
-            Self::Provenance => f.write_str("weight file: provenance is not UTF-8"),
-            Self::Scale => f.write_str("weight file: input clamp or output scale out of range"),
-            Self::RowBound { layer, direction, unit } => write!(
-                f,
-                "weight file: layer {layer}, direction {direction}, unit {unit} could overflow its accumulator"
-            ),
-        }
-    }
+/// Returns the name of the network that a topology belongs to.
+fn network_name([network, ..]: &Topology) -> &'static str {
+    if *network == FOGNET { "FoGNet" } else { "GyroNet" }
 }
-
-impl core::error::Error for BlobError {}
 
 /// How a feature becomes a network input: `(code - offset) * multiplier / 2^31`, rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -46,8 +46,8 @@
 //! 5. Test it with recorded or published frames both ways, every truncation and every flipped
 //!    bit, noise with frames strewn in, a mocked bus; add a fuzz target (`host-tests/fuzz`) and
 //!    a line in the bench image (`src/bin/support/parsers.rs`).
-//! 6. For the image of this repository: a name in [`crate::store::ImuPart`] or
-//!    [`crate::store::FogPart`], and an arm where the image reads its part (`imu.rs` or `output.rs` in
+//! 6. For the image of this repository: a name in `store::ImuPart` or
+//!    `store::FogPart`, and an arm where the image reads its part (`imu.rs` or `output.rs` in
 //!    `src/bin/coprocessor`, the list of what it drives in `start.rs`).
 
 pub mod adis16465;

@@ -51,25 +51,16 @@ pub trait Dialogue {
 }
 
 /// What can go wrong on a line: the port or the part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SerialError<P, E> {
     /// The port failed: an overrun, a framing error.
+    #[error("the serial port failed: {0:?}")]
     Port(P),
     /// What came over it, or did not, is wrong.
+    #[error(transparent)]
     Part(E),
 }
-
-impl<P: core::fmt::Debug, E: core::fmt::Display> core::fmt::Display for SerialError<P, E> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Port(error) => write!(f, "the serial port failed: {error:?}"),
-            Self::Part(error) => error.fmt(f),
-        }
-    }
-}
-
-impl<P: core::fmt::Debug, E: core::error::Error> core::error::Error for SerialError<P, E> {}
 
 /// Leads a dialogue to its end. Time is counted by `delay`.
 ///

@@ -16,35 +16,26 @@ pub const MAX_FRAME: usize = MAX_CONTENT + MAX_CONTENT / 254 + 1 + 2;
 pub type Frame = Vec<u8, MAX_FRAME>;
 
 /// Why what stood between two zeros is no message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FrameError {
     /// Longer than any frame.
+    #[error("service frame: too long")]
     TooLong,
     /// Not COBS.
+    #[error("service frame: not COBS")]
     Encoding,
     /// The checksum does not fit.
+    #[error("service frame: wrong checksum")]
     Crc,
     /// Intact, but no message of this protocol.
+    #[error("service frame: not a message of this protocol")]
     Message {
         /// The number that it came under.
         number: u8,
     },
 }
-
-impl core::fmt::Display for FrameError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::TooLong => f.write_str("service frame: too long"),
-            Self::Encoding => f.write_str("service frame: not COBS"),
-            Self::Crc => f.write_str("service frame: wrong checksum"),
-            Self::Message { .. } => f.write_str("service frame: not a message of this protocol"),
-        }
-    }
-}
-
-impl core::error::Error for FrameError {}
 
 /// Finds frames in a stream of bytes.
 #[derive(Debug)]

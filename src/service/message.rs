@@ -145,12 +145,14 @@ pub enum Reply {
 }
 
 /// Why a request is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
     /// Not a request of this protocol version.
+    #[error("not a request of protocol {PROTOCOL}")]
     Unknown,
     /// Another layout of the configuration.
+    #[error("configuration layout {found}, the board has {expected}")]
     Version {
         /// Of the request.
         found: u8,
@@ -158,31 +160,18 @@ pub enum Refusal {
         expected: u8,
     },
     /// From the store, or a value of the configuration.
+    #[error(transparent)]
     Store(StoreError),
     /// From the weight slots.
+    #[error(transparent)]
     Slot(SlotError),
     /// Nothing has been found that could be stored.
+    #[error("no calibration has been found that could be stored")]
     NothingFound,
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
+    #[error("the vehicle is not proven to stand still")]
     Moving,
 }
-
-impl core::fmt::Display for Refusal {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Unknown => write!(f, "not a request of protocol {PROTOCOL}"),
-            Self::Version { found, expected } => {
-                write!(f, "configuration layout {found}, the board has {expected}")
-            }
-            Self::Store(error) => error.fmt(f),
-            Self::Slot(error) => error.fmt(f),
-            Self::Moving => f.write_str("the vehicle is not proven to stand still"),
-            Self::NothingFound => f.write_str("no calibration has been found that could be stored"),
-        }
-    }
-}
-
-impl core::error::Error for Refusal {}
 
 impl From<StoreError> for Refusal {
     fn from(error: StoreError) -> Self {

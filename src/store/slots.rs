@@ -95,55 +95,44 @@ impl Record for Accepted {
 }
 
 /// Why a slot, or what is uploaded to it, is not used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SlotError {
     /// No flash controller answers (the emulator has none).
+    #[error("no flash controller answers: nothing can be stored")]
     NoFlash,
     /// The flash reports an error.
+    #[error("flash: {0}")]
     Flash(FlashFault),
     /// Nothing was written to it since it was erased.
+    #[error("the slot is empty")]
     Empty,
     /// A file that is longer than a slot, or no whole number of words.
+    #[error("{0} bytes are no whole number of words up to {SLOT_SIZE}")]
     Length(u32),
     /// A block that does not continue the upload.
+    #[error("the next block must begin at {expected}")]
     Offset {
         /// Where the next block must begin; what is before it is written.
         expected: u32,
     },
     /// No upload is under way.
+    #[error("no upload is under way")]
     NotBegun,
     /// The upload has not reached its end.
+    #[error("only {written} bytes have come")]
     Incomplete {
         /// Bytes written.
         written: u32,
     },
     /// Not the checksum under which the file was announced or accepted.
+    #[error("file {0:08x} is not the one that was accepted")]
     NotAccepted(u32),
     /// The file is refused.
+    #[error(transparent)]
     Blob(BlobError),
 }
-
-impl core::fmt::Display for SlotError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::NoFlash => f.write_str("no flash controller answers: nothing can be stored"),
-            Self::Flash(fault) => write!(f, "flash: {fault}"),
-            Self::Empty => f.write_str("the slot is empty"),
-            Self::Length(length) => {
-                write!(f, "{length} bytes are no whole number of words up to {SLOT_SIZE}")
-            }
-            Self::Offset { expected } => write!(f, "the next block must begin at {expected}"),
-            Self::NotBegun => f.write_str("no upload is under way"),
-            Self::Incomplete { written } => write!(f, "only {written} bytes have come"),
-            Self::NotAccepted(file) => write!(f, "file {file:08x} is not the one that was accepted"),
-            Self::Blob(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for SlotError {}
 
 /// The file in a slot, checked. Slots begin on a word.
 ///

@@ -76,13 +76,15 @@ pub struct Tx1 {
 }
 
 /// Why eight bytes are no good TX1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Tx1Error {
     /// Not eight bytes.
+    #[error("TX1 has {0} bytes instead of 8")]
     Length(usize),
     /// The checksum does not fit.
+    #[error("TX1 checksum is {received:02x}, should be {computed:02x}")]
     Crc {
         /// Over bytes 0 to 6.
         computed: u8,
@@ -90,19 +92,6 @@ pub enum Tx1Error {
         received: u8,
     },
 }
-
-impl core::fmt::Display for Tx1Error {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Length(len) => write!(f, "TX1 has {len} bytes instead of 8"),
-            Self::Crc { computed, received } => {
-                write!(f, "TX1 checksum is {received:02x}, should be {computed:02x}")
-            }
-        }
-    }
-}
-
-impl core::error::Error for Tx1Error {}
 
 impl Tx1 {
     /// The eight bytes.

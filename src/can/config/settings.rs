@@ -1,10 +1,10 @@
 //! What a user sets.
 
 use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
-use serde::{Deserialize, Serialize};
 
 /// E2E profile of the three yaw messages with their identifiers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum E2e {
     /// Profile 1.
@@ -47,7 +47,8 @@ impl E2e {
 }
 
 /// The Bosch MM5.10 set; its layout fixes the period at 10 ms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoschSettings {
     /// TX1 alone, for receivers of the yaw rate only.
@@ -55,7 +56,8 @@ pub struct BoschSettings {
 }
 
 /// Our own yaw messages: rate, angle, detail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct YawSettings {
     /// 11-bit identifiers of rate, angle, detail.
@@ -67,7 +69,8 @@ pub struct YawSettings {
 }
 
 /// J1939 VDC2; the standard fixes the period at 10 ms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vdc2Settings {
     /// Our address on the bus.
@@ -75,7 +78,8 @@ pub struct Vdc2Settings {
 }
 
 /// What is sent on the bus, and how; [`super::Config::new`] checks it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// Bit rate of the bus.

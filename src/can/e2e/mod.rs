@@ -30,13 +30,15 @@ pub use p11::{P11, P11Mode};
 pub use sequence::{Sequence, Verdict};
 
 /// Why protected data are not to be believed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
     /// Shorter than the header, or longer than the profile covers.
+    #[error("E2E: {0} bytes do not fit the profile")]
     Length(usize),
     /// The CRC does not fit: damaged, or not the data that were meant (identifier).
+    #[error("E2E: CRC is {received:x}, should be {computed:x}")]
     Crc {
         /// Over what was received.
         computed: u16,
@@ -44,28 +46,15 @@ pub enum Fault {
         received: u16,
     },
     /// The part of the identifier that is sent is another one.
+    #[error("E2E: identifier nibble {received:x} is foreign")]
     DataId {
         /// As received.
         received: u8,
     },
     /// A counter value that does not occur.
+    #[error("E2E: counter {0} does not occur")]
     Counter(u8),
 }
-
-impl core::fmt::Display for Fault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Length(len) => write!(f, "E2E: {len} bytes do not fit the profile"),
-            Self::Crc { computed, received } => {
-                write!(f, "E2E: CRC is {received:x}, should be {computed:x}")
-            }
-            Self::DataId { received } => write!(f, "E2E: identifier nibble {received:x} is foreign"),
-            Self::Counter(counter) => write!(f, "E2E: counter {counter} does not occur"),
-        }
-    }
-}
-
-impl core::error::Error for Fault {}
 
 /// One of the profiles with its identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,6 @@
 
 use super::Fault;
 use super::header::ShortHeader;
-use serde::{Deserialize, Serialize};
 
 /// Start 0, final XOR 0; not the J1850 of other messages, although the polynomial is.
 pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
@@ -26,7 +25,8 @@ const MAX_LEN: usize = 30;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
 /// How the 16-bit identifier enters the CRC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DataIdMode {
     /// Low byte, high byte (variant 1A).

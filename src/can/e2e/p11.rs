@@ -2,10 +2,10 @@
 
 use super::Fault;
 use super::p01::{DataIdMode, P01};
-use serde::{Deserialize, Serialize};
 
 /// How the identifier enters the CRC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum P11Mode {
     /// Low byte, high byte (variant 11A).

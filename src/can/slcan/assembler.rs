@@ -6,17 +6,10 @@ use heapless::Vec;
 pub const MAX_HOST_LINE: usize = 32;
 
 /// A line longer than [`MAX_HOST_LINE`]; none of it was kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("line of over {MAX_HOST_LINE} characters")]
 pub struct TooLong;
-
-impl core::fmt::Display for TooLong {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "line of over {MAX_HOST_LINE} characters")
-    }
-}
-
-impl core::error::Error for TooLong {}
 
 /// Collects the characters of one line.
 #[derive(Debug, Clone, Default)]

@@ -68,35 +68,26 @@ fn hex(byte: u8) -> [u8; 2] {
 }
 
 /// Why a line is no data frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SlcanError {
     /// The first letter is not `t` or `T`.
+    #[error("not a data frame line")]
     Kind,
     /// A character is not a hexadecimal digit.
+    #[error("no hexadecimal digit at column {at}")]
     Digit {
         /// Where in the line.
         at: usize,
     },
     /// The line is shorter or longer than its length digit says.
+    #[error("line length does not fit the frame")]
     Length,
     /// The identifier is too large for its kind.
+    #[error("identifier out of range")]
     Identifier,
 }
-
-impl core::fmt::Display for SlcanError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Kind => f.write_str("not a data frame line"),
-            Self::Digit { at } => write!(f, "no hexadecimal digit at column {at}"),
-            Self::Length => f.write_str("line length does not fit the frame"),
-            Self::Identifier => f.write_str("identifier out of range"),
-        }
-    }
-}
-
-impl core::error::Error for SlcanError {}
 
 /// Reads one data frame line with a time stamp, without its CR; gives the frame and its
 /// milliseconds.

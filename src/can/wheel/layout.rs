@@ -103,38 +103,29 @@ const fn toyota(wheel: usize, start: u8) -> Option<WheelSignal> {
 }
 
 /// Why a frame gives no wheel speeds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelError {
     /// It has too few bytes.
+    #[error("wheel frame of {0} bytes is too short")]
     Short(usize),
     /// The checksum does not fit.
+    #[error("wheel frame's checksum does not fit")]
     Checksum,
     /// The E2E check failed.
+    #[error("wheel frame: {0}")]
     E2e(Fault),
     /// The same counter again: an old frame.
+    #[error("wheel frame is a repetition")]
     Repeated,
     /// A wheel's speed is marked, or cannot be.
+    #[error("wheel {wheel}: speed is not valid")]
     Invalid {
         /// Which wheel.
         wheel: usize,
     },
 }
-
-impl core::fmt::Display for WheelError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Short(len) => write!(f, "wheel frame of {len} bytes is too short"),
-            Self::Checksum => f.write_str("wheel frame's checksum does not fit"),
-            Self::E2e(fault) => write!(f, "wheel frame: {fault}"),
-            Self::Repeated => f.write_str("wheel frame is a repetition"),
-            Self::Invalid { wheel } => write!(f, "wheel {wheel}: speed is not valid"),
-        }
-    }
-}
-
-impl core::error::Error for WheelError {}
 
 impl WheelFrame {
     /// Values of the frame's counter.

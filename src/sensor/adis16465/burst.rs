@@ -87,11 +87,12 @@ impl DiagStat {
 }
 
 /// Why bytes are no burst, or a burst gives no sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BurstError {
     /// The sum does not fit.
+    #[error("ADIS164xx: the bytes add up to {computed:04x}, but the burst says {stored:04x}")]
     Checksum {
         /// Of the bytes.
         computed: u16,
@@ -99,33 +100,21 @@ pub enum BurstError {
         stored: u16,
     },
     /// Nothing but zeros or nothing but ones: no part answers.
+    #[error("ADIS164xx: no part answers")]
     Silent,
     /// The part says that its readings are worthless.
+    #[error("ADIS164xx: DIAG_STAT {:04x}", .0.0)]
     Diagnosis(DiagStat),
     /// The data counter stands still: the same readings again.
+    #[error("ADIS164xx: the data counter stands still at {counter}")]
     Repeated {
         /// The counter.
         counter: u16,
     },
     /// A reading that no part of this kind can measure.
+    #[error("ADIS164xx: a reading is {0}")]
     Reading(RangeError),
 }
-
-impl core::fmt::Display for BurstError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Checksum { computed, stored } => {
-                write!(f, "ADIS164xx: the bytes add up to {computed:04x}, but the burst says {stored:04x}")
-            }
-            Self::Silent => write!(f, "ADIS164xx: no part answers"),
-            Self::Diagnosis(DiagStat(bits)) => write!(f, "ADIS164xx: DIAG_STAT {bits:04x}"),
-            Self::Repeated { counter } => write!(f, "ADIS164xx: the data counter stands still at {counter}"),
-            Self::Reading(error) => write!(f, "ADIS164xx: a reading is {error}"),
-        }
-    }
-}
-
-impl core::error::Error for BurstError {}
 
 /// A burst in the part's own counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

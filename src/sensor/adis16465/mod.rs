@@ -15,26 +15,17 @@ use embedded_hal::spi::{Operation, SpiDevice};
 const BURST_COMMAND: [u8; 2] = [0x68, 0x00];
 
 /// What can go wrong with a read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum AdisError<E> {
     /// The bus failed.
+    #[error("ADIS164xx: the bus failed: {0:?}")]
     Bus(E),
     /// What came over it gives no sample.
+    #[error(transparent)]
     Burst(BurstError),
 }
-
-impl<E: core::fmt::Debug> core::fmt::Display for AdisError<E> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Bus(error) => write!(f, "ADIS164xx: the bus failed: {error:?}"),
-            Self::Burst(error) => error.fmt(f),
-        }
-    }
-}
-
-impl<E: core::fmt::Debug> core::error::Error for AdisError<E> {}
 
 /// The part on its bus.
 #[derive(Debug)]

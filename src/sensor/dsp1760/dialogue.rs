@@ -24,29 +24,20 @@ pub const TIMEOUT: Micros = Micros(500_000);
 pub const ATTEMPTS: u8 = 3;
 
 /// Why the dialogue has ended without a part that is set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DialogueError {
     /// No answer to any query.
+    #[error("DSP-1760: no answer after {ATTEMPTS} attempts")]
     Silent,
     /// The last answer was another rate than the one that was set.
+    #[error("DSP-1760: the rate stays at {} Hz", .got.hertz())]
     Rate {
         /// Messages per second.
         got: OutputRate,
     },
 }
-
-impl core::fmt::Display for DialogueError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Silent => write!(f, "DSP-1760: no answer after {ATTEMPTS} attempts"),
-            Self::Rate { got } => write!(f, "DSP-1760: the rate stays at {} Hz", got.hertz()),
-        }
-    }
-}
-
-impl core::error::Error for DialogueError {}
 
 /// The dialogue with one part.
 #[derive(Debug, Clone)]

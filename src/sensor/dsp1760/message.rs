@@ -26,13 +26,15 @@ pub const MAX_MESSAGE: usize = 40;
 pub const MAX_SEQUENCE: u8 = 127;
 
 /// Why bytes are no message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MessageError {
     /// No header of a data message.
+    #[error("DSP-1760: no header of a data message")]
     Header,
     /// Not as long as the header announces.
+    #[error("DSP-1760: {got} bytes where the header announces {expected}")]
     Length {
         /// Bytes given.
         got: usize,
@@ -40,6 +42,7 @@ pub enum MessageError {
         expected: usize,
     },
     /// The checksum does not fit.
+    #[error("DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")]
     Crc {
         /// Of the bytes before it.
         computed: u32,
@@ -47,28 +50,12 @@ pub enum MessageError {
         stored: u32,
     },
     /// A sequence number above [`MAX_SEQUENCE`].
+    #[error("DSP-1760: sequence number {got}, above {MAX_SEQUENCE}")]
     Sequence {
         /// The number.
         got: u8,
     },
 }
-
-impl core::fmt::Display for MessageError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Header => write!(f, "DSP-1760: no header of a data message"),
-            Self::Length { got, expected } => {
-                write!(f, "DSP-1760: {got} bytes where the header announces {expected}")
-            }
-            Self::Crc { computed, stored } => {
-                write!(f, "DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")
-            }
-            Self::Sequence { got } => write!(f, "DSP-1760: sequence number {got}, above {MAX_SEQUENCE}"),
-        }
-    }
-}
-
-impl core::error::Error for MessageError {}
 
 /// A data message as it stands on the wire.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -28,29 +28,20 @@ use framing::is_self_test;
 use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity};
 
 /// Why an intact frame gives no sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Dsp1760Error {
     /// Its content makes no sense.
+    #[error(transparent)]
     Message(MessageError),
     /// The sequence number of the message before: the same message twice.
+    #[error("DSP-1760: message {sequence} came twice")]
     Repeated {
         /// The number.
         sequence: u8,
     },
 }
-
-impl core::fmt::Display for Dsp1760Error {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Message(error) => error.fmt(f),
-            Self::Repeated { sequence } => write!(f, "DSP-1760: message {sequence} came twice"),
-        }
-    }
-}
-
-impl core::error::Error for Dsp1760Error {}
 
 /// How often each kind of event happened. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -27,26 +27,17 @@ pub struct Reading {
 }
 
 /// Why a line is no reading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LineError {
     /// Not of the form `[-]ddd.dddddd y`.
+    #[error("DSP-3000: a line that is no number with a validity")]
     Form,
     /// Longer than [`MAX_LINE`].
+    #[error("DSP-3000: a line without an end")]
     TooLong,
 }
-
-impl core::fmt::Display for LineError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Form => "DSP-3000: a line that is no number with a validity",
-            Self::TooLong => "DSP-3000: a line without an end",
-        })
-    }
-}
-
-impl core::error::Error for LineError {}
 
 impl Reading {
     /// Reads a line without its CR and LF.

@@ -50,32 +50,23 @@ pub struct Word {
 }
 
 /// Why four bytes are no word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WordError {
     /// An even number of ones.
+    #[error("DSP-3000: word {word:08x} has even parity")]
     Parity {
         /// The word.
         word: u32,
     },
     /// Type 3, which does not exist.
+    #[error("DSP-3000: word {word:08x} is of no known type")]
     Type {
         /// The word.
         word: u32,
     },
 }
-
-impl core::fmt::Display for WordError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Parity { word } => write!(f, "DSP-3000: word {word:08x} has even parity"),
-            Self::Type { word } => write!(f, "DSP-3000: word {word:08x} is of no known type"),
-        }
-    }
-}
-
-impl core::error::Error for WordError {}
 
 impl Word {
     /// Reads a word.

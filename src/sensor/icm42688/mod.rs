@@ -26,20 +26,24 @@ const RESET_POLLS: u8 = 10;
 const START_MS: u32 = 45;
 
 /// What can go wrong with the part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Icm42688Error<E> {
     /// The bus failed.
+    #[error("ICM-42688: the bus failed: {0:?}")]
     Bus(E),
     /// The part did not come back from its reset.
+    #[error("ICM-42688: no answer after the reset")]
     Reset,
     /// Another part answers, or none.
+    #[error("ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY)]
     Identity {
         /// What it says.
         got: u8,
     },
     /// A register does not hold what was written: configure the part anew.
+    #[error("ICM-42688: register {:02x} of bank {} holds {got:02x}, not {expected:02x}", .register.address, .register.bank)]
     Setting {
         /// Which register.
         register: Register,
@@ -49,30 +53,12 @@ pub enum Icm42688Error<E> {
         expected: u8,
     },
     /// A packet in which an axis has no reading.
+    #[error("ICM-42688: a packet in which an axis has no reading")]
     NoReading,
     /// What came out of the FIFO is no packet; the FIFO was emptied.
+    #[error(transparent)]
     Packet(PacketError),
 }
-
-impl<E: core::fmt::Debug> core::fmt::Display for Icm42688Error<E> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Bus(error) => write!(f, "ICM-42688: the bus failed: {error:?}"),
-            Self::Reset => write!(f, "ICM-42688: no answer after the reset"),
-            Self::Identity { got } => write!(f, "ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY),
-            Self::Setting { register: Register { bank, address }, got, expected } => {
-                write!(
-                    f,
-                    "ICM-42688: register {address:02x} of bank {bank} holds {got:02x}, not {expected:02x}"
-                )
-            }
-            Self::NoReading => write!(f, "ICM-42688: a packet in which an axis has no reading"),
-            Self::Packet(error) => error.fmt(f),
-        }
-    }
-}
-
-impl<E: core::fmt::Debug> core::error::Error for Icm42688Error<E> {}
 
 /// The part on its bus, configured.
 #[derive(Debug)]

@@ -47,11 +47,12 @@ impl Resolution {
 }
 
 /// Why bytes are no packet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PacketError {
     /// Another number of bytes than the packet has.
+    #[error("ICM-42688: {got} bytes for a packet of {expected}")]
     Length {
         /// Bytes given.
         got: usize,
@@ -59,25 +60,15 @@ pub enum PacketError {
         expected: usize,
     },
     /// The FIFO was empty.
+    #[error("ICM-42688: the FIFO was empty")]
     Empty,
     /// Another content than was set: the packets' beginnings are lost, or a setting is.
+    #[error("ICM-42688: header {got:02x} is not what was set")]
     Header {
         /// The header.
         got: u8,
     },
 }
-
-impl core::fmt::Display for PacketError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Length { got, expected } => write!(f, "ICM-42688: {got} bytes for a packet of {expected}"),
-            Self::Empty => write!(f, "ICM-42688: the FIFO was empty"),
-            Self::Header { got } => write!(f, "ICM-42688: header {got:02x} is not what was set"),
-        }
-    }
-}
-
-impl core::error::Error for PacketError {}
 
 /// A packet's readings in the part's own counts; `None` is "no reading".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -27,16 +27,18 @@ pub const TIMEOUT: Micros = Micros(500_000);
 /// How often a message is sent before the part is given up.
 pub const ATTEMPTS: u8 = 3;
 /// Why the dialogue has ended without a part that measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DialogueError {
     /// No answer to any attempt.
+    #[error("MTi: no answer to {step:?} after {ATTEMPTS} attempts")]
     Silent {
         /// What was asked.
         step: Step,
     },
     /// The last attempt was answered by an error frame.
+    #[error("MTi: {step:?} is refused with error {code}")]
     Refused {
         /// What was asked.
         step: Step,
@@ -44,8 +46,10 @@ pub enum DialogueError {
         code: u8,
     },
     /// The part has woken up more than [`ATTEMPTS`] times: its supply fails, or it resets itself.
+    #[error("MTi: started anew more than {ATTEMPTS} times")]
     Restarts,
     /// The part has set another rate than asked for, or left the output out (rate 0).
+    #[error("MTi: output {id:04x} is set to {rate} Hz")]
     Output {
         /// Data identifier.
         id: u16,
@@ -53,19 +57,6 @@ pub enum DialogueError {
         rate: u16,
     },
 }
-
-impl core::fmt::Display for DialogueError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Silent { step } => write!(f, "MTi: no answer to {step:?} after {ATTEMPTS} attempts"),
-            Self::Refused { step, code } => write!(f, "MTi: {step:?} is refused with error {code}"),
-            Self::Restarts => write!(f, "MTi: started anew more than {ATTEMPTS} times"),
-            Self::Output { id, rate } => write!(f, "MTi: output {id:04x} is set to {rate} Hz"),
-        }
-    }
-}
-
-impl core::error::Error for DialogueError {}
 
 /// Where the dialogue stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

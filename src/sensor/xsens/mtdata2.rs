@@ -31,26 +31,30 @@ pub mod id {
 }
 
 /// Why an intact MTData2 frame gives no sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum XsensError {
     /// A packet is longer than what is left of the message.
+    #[error("MTData2: packet {id:04x} is cut off")]
     Truncated {
         /// Its identifier.
         id: u16,
     },
     /// A packet that is used has not the length that its precision asks for.
+    #[error("MTData2: packet {id:04x} is not as long as its precision asks for")]
     Format {
         /// Its identifier.
         id: u16,
     },
     /// The message lacks a packet that is needed.
+    #[error("MTData2: packet {id:04x} is missing")]
     Missing {
         /// Its identifier.
         id: u16,
     },
     /// A reading that no part of this kind can measure.
+    #[error("MTData2: packet {id:04x}: {error}")]
     Reading {
         /// Identifier of the packet.
         id: u16,
@@ -58,21 +62,6 @@ pub enum XsensError {
         error: RangeError,
     },
 }
-
-impl core::fmt::Display for XsensError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Truncated { id } => write!(f, "MTData2: packet {id:04x} is cut off"),
-            Self::Format { id } => {
-                write!(f, "MTData2: packet {id:04x} is not as long as its precision asks for")
-            }
-            Self::Missing { id } => write!(f, "MTData2: packet {id:04x} is missing"),
-            Self::Reading { id, error } => write!(f, "MTData2: packet {id:04x}: {error}"),
-        }
-    }
-}
-
-impl core::error::Error for XsensError {}
 
 /// What an MTData2 message says, as far as it is used here.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
