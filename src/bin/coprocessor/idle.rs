@@ -1,7 +1,7 @@
 //! What is done when nothing else is to do: the service line, and the weights' own checksum.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::fog_network::FogNetwork;
+use crate::fog_network::{FogNetwork, FogParts};
 use crate::imu::BringUp;
 use crate::regions::{Records, Slots};
 use crate::ring::Ring;
@@ -9,7 +9,6 @@ use crate::stm32f405::{clocks, timer};
 use crate::{board, serial};
 use embedded_io::{Write, WriteReady};
 use gyronet::health::Status;
-use gyronet::model::FogNet;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::{ImuSample, Standstill};
 use gyronet::service::Device;
@@ -62,7 +61,7 @@ impl Idle {
     pub fn new(
         (device, check): Stored,
         service: serial::Port<{ board::SERVICE_RING }>,
-        fog_network: Option<&'static mut FogNet<'static, 'static>>,
+        fog_network: Option<&'static mut FogParts>,
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
     ) -> Self {

@@ -237,9 +237,10 @@ mod app {
                 cx.shared.coprocessor.lock(|coprocessor| coprocessor.weights_damaged());
             }
             let fog_network = cx.local.rest.fog_network();
-            let begun = fog_network.is_waiting()
-                && cx.shared.coprocessor.lock(|coprocessor| fog_network.begin(coprocessor));
-            if let (false, Some((number, estimate))) = (begun, fog_network.advance()) {
+            if fog_network.is_waiting() {
+                cx.shared.coprocessor.lock(|coprocessor| fog_network.take(coprocessor));
+            }
+            if let Some((number, estimate)) = fog_network.advance() {
                 // One that is late is counted.
                 let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver_fog(number, estimate));
             }
