@@ -35,7 +35,7 @@ pub struct Uncertainty {
 impl Uncertainty {
     /// No window yet.
     #[must_use]
-    pub fn new(config: UncertaintyConfig) -> Self {
+    pub const fn new(config: UncertaintyConfig) -> Self {
         Self { config, scale_square: None }
     }
 

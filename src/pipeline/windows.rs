@@ -6,7 +6,7 @@ use crate::model::Estimate;
 use crate::window::{Features, Window};
 
 /// The samples of the next window and the state of the last one.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Windows {
     window: Window,
     /// Samples since the last window.
@@ -18,6 +18,10 @@ pub(super) struct Windows {
 }
 
 impl Windows {
+    /// No sample, and no window out.
+    pub const START: Self =
+        Self { window: Window::EMPTY, since: 0, out: None, accepted: false, faults: Faults::NONE };
+
     /// Adds a good sample.
     pub fn push(&mut self, features: Features) {
         self.window.push(features);
@@ -26,7 +30,7 @@ impl Windows {
 
     /// Drops samples, the window that is out and its estimate.
     pub fn break_off(&mut self) {
-        *self = Self::default();
+        *self = Self::START;
     }
 
     /// Returns the window that ends with this tick, if it is full, `hop` samples after the last one, and no

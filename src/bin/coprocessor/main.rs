@@ -129,7 +129,7 @@ mod app {
 
     #[init(local = [
         network_state: GyroNetState = GyroNetState::ZERO,
-        coprocessor_place: MaybeUninit<Coprocessor> = MaybeUninit::uninit(),
+        coprocessor: Coprocessor = Coprocessor::START,
         sender_place: MaybeUninit<Output> = MaybeUninit::uninit(),
         rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),
     ])]
@@ -137,7 +137,8 @@ mod app {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST, start::received());
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
         let start::Parts { output, config, weights, fog_network, device } = parts;
-        let coprocessor = start::place(cx.local.coprocessor_place, || Coprocessor::new(config));
+        let coprocessor = cx.local.coprocessor;
+        coprocessor.configure(&config);
         let network = weights.map(|blob| GyroNet::with_state(blob, cx.local.network_state));
         let service = board.service;
         let bring_up = BringUp::new(output.part, board.spi);

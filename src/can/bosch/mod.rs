@@ -141,6 +141,9 @@ pub struct YawRateSignal {
 pub struct OutOfRange(pub u16);
 
 impl YawRateSignal {
+    /// Nothing owed.
+    pub const START: Self = Self { residual: 0 };
+
     /// Code of a rate, the residual of the earlier ones included.
     ///
     /// # Errors
