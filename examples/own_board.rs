@@ -43,7 +43,7 @@ impl<UART: Read + ReadReady, CAN: Can> Board<UART, CAN> {
 
     fn send(&mut self) {
         while let Some(sent) = self.coprocessor.next_frame() {
-            sent.frame.convert().into_iter().for_each(|frame| self.waiting.push(frame));
+            sent.frame.convert().into_iter().for_each(|frame| self.waiting.enqueue(frame));
         }
         self.waiting.service(&mut self.can);
     }

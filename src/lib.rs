@@ -118,10 +118,7 @@ pub mod sensor;
 pub mod service;
 #[cfg(feature = "store")]
 pub mod store;
-pub mod uncertainty;
 pub mod units;
-pub mod wheels;
-pub mod window;
 
 pub use coprocessor::{Config, Coprocessor};
 
