@@ -7,7 +7,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet_tools::checkpoint::Checkpoint;
+use gyronet_tools::network::checkpoint::Checkpoint;
 use std::hint::black_box;
 use std::path::Path;
 

@@ -14,7 +14,7 @@ use gyronet::sensor::xsens::MtData2;
 use gyronet::service::message::AllCounters;
 use gyronet::service::{Reply, Request};
 use gyronet::store::Configuration;
-use gyronet_tools::device::{Device, line::Line};
+use gyronet_tools::client::device::{Device, line::Line};
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);

@@ -3,7 +3,7 @@
 use crate::qemu;
 use crate::recordings::workspace;
 use crate::require::{self, Need};
-use gyronet_tools::target_bench;
+use gyronet_tools::target::bench;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -27,7 +27,7 @@ pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
 /// As [`firmware`].
 #[must_use]
 pub fn firmware_for(board: &str, test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
-    require::wants(test, Need::Qemu, target_bench::target_installed())?;
+    require::wants(test, Need::Qemu, bench::target_installed())?;
     static BUILT: Mutex<BTreeMap<String, PathBuf>> = Mutex::new(BTreeMap::new());
     // A test that panicked here has left the map as it was.
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
@@ -36,7 +36,7 @@ pub fn firmware_for(board: &str, test: &str, scratch: &str, image: &str) -> Opti
         return Some(elf.clone());
     }
     let folder = Path::new(scratch).join(format!("fw-{board}"));
-    let elf = target_bench::build_for(board, workspace(), image, &folder);
+    let elf = bench::build_for(board, workspace(), image, &folder);
     let elf = elf.unwrap_or_else(|error| panic!("{error}"));
     built.insert(name, elf.clone());
     Some(elf)

@@ -1,7 +1,7 @@
-//! The emulated board for tests: [`gyronet_tools::emulator`], whose errors end the test.
+//! The emulated board for tests: [`gyronet_tools::target::emulator`], whose errors end the test.
 
 use crate::require::{self, Need};
-use gyronet_tools::emulator::{self, Result};
+use gyronet_tools::target::emulator::{self, Result};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;

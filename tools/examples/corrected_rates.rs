@@ -8,9 +8,9 @@
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
-use gyronet_tools::drive::Drive;
-use gyronet_tools::recording::Recording;
-use gyronet_tools::wheel_frames::WheelFrames;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::wheel_frames::WheelFrames;
 use std::error::Error;
 use std::path::Path;
 

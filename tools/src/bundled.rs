@@ -1,10 +1,10 @@
 //! What comes inside the binary, so that it works from anywhere: the simulated drive and the
 //! f32 checkpoint of the default weights.
 
-use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::fog_checkpoint::FogCheckpoint;
-use crate::recording::{Recording, RecordingError};
-use crate::weight_file::WeightFileError;
+use crate::drive::recording::{Recording, RecordingError};
+use crate::network::checkpoint::{Checkpoint, CheckpointError};
+use crate::network::fog_checkpoint::FogCheckpoint;
+use crate::network::weight_file::WeightFileError;
 use gyronet::model::FogBlob;
 use gyronet::model::weights::FOGNET;
 
@@ -73,9 +73,9 @@ mod tests {
 
     #[test]
     fn weights_are_what_quantize_makes() {
-        let (bytes, _) = crate::quantize::quantize(&checkpoint().unwrap()).unwrap();
+        let (bytes, _) = crate::network::quantize::quantize(&checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::DEFAULT.0, "run: gyronet quantize");
-        let (bytes, _) = crate::quantize::fognet::quantize(&fog_checkpoint().unwrap()).unwrap();
+        let (bytes, _) = crate::network::quantize::fognet::quantize(&fog_checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::FOGNET.0, "run: gyronet quantize");
     }
 }

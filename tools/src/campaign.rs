@@ -34,6 +34,7 @@ pub mod plot;
 pub mod receiver;
 pub mod report;
 pub mod scene;
+pub mod soak;
 pub mod weight_upsets;
 pub mod wire;
 

@@ -4,12 +4,13 @@ pub mod board;
 mod can_excerpt;
 mod costs;
 mod page;
+pub mod picture;
 mod trajectory;
 
-use crate::evaluate::DriveErrors;
-use crate::methods::{PerMethod, Rates};
-use crate::metrics::YawError;
-use crate::recording::Recording;
+use crate::drive::recording::Recording;
+use crate::evaluate::methods::{PerMethod, Rates};
+use crate::evaluate::metrics::YawError;
+use crate::evaluate::report::DriveErrors;
 use board::Outcome;
 use gyronet::can::config::Config;
 use serde::Serialize;

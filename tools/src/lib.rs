@@ -1,41 +1,24 @@
-//! gyronet on a host: read recordings, simulate, quantise, replay, evaluate, draw.
+//! The host's side of gyronet: recorded and simulated drives through the library, and what comes of them.
+//!
+//! Each product is one module, and an arrow below means "uses". The commands of the `gyronet` binary are
+//! thin adapters over these modules.
+//!
+//! ```text
+//! drive <- parts <- campaign -> plot, client, simulate
+//! drive <- evaluate <- paper -> plot, simulate
+//! target -> simulate      network      client
+//! demo -> everything above
+//! ```
 
-pub mod ablation;
 pub mod bundled;
 pub mod campaign;
-pub mod candump;
-pub mod checkpoint;
-pub mod connection;
-mod curve;
+pub mod client;
 pub mod demo;
-pub mod device;
 pub mod drive;
-pub mod emulator;
 pub mod evaluate;
-pub mod figures;
-pub mod fir;
-pub mod fog_checkpoint;
-pub mod fog_drive;
-pub mod image_size;
-pub mod image_stack;
-pub mod methods;
-pub mod metrics;
-pub mod monitor;
-pub mod page;
-pub mod parser_load;
+pub mod network;
+pub mod paper;
+pub mod parts;
 pub mod plot;
-pub mod quantization_error;
-pub mod quantize;
-pub mod recording;
-pub mod schedule;
-pub mod sequence;
 pub mod simulate;
-pub mod soak;
-pub mod tables;
-pub mod target_bench;
-pub mod task_bench;
-pub mod tensors;
-pub mod trajectory_error;
-pub mod via;
-pub mod weight_file;
-pub mod wheel_frames;
+pub mod target;

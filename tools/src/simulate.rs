@@ -29,6 +29,7 @@ pub mod vehicles;
 pub mod vibration;
 pub mod world;
 
+use crate::drive::DT;
 use car::Car;
 use mems::Mems;
 use vibration::Vibration;
@@ -120,9 +121,6 @@ impl Iterator for Simulation {
         })
     }
 }
-
-/// Seconds of one sample.
-const DT: f64 = crate::metrics::DT;
 
 fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis] + b[axis])

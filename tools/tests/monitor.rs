@@ -8,7 +8,7 @@ use gyronet::can::slcan;
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
-use gyronet_tools::candump::Log;
+use gyronet_tools::drive::candump::Log;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::PathBuf;

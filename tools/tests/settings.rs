@@ -2,7 +2,7 @@
 
 use gyronet::store::{Configuration, Record};
 use gyronet::units::AngularRate;
-use gyronet_tools::device::settings::{assign, flat, from_value, to_value};
+use gyronet_tools::client::device::settings::{assign, flat, from_value, to_value};
 use std::collections::BTreeMap;
 
 /// Name and default of each row of the table in the README.

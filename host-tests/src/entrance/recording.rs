@@ -2,7 +2,7 @@
 
 use super::Seed;
 use gyronet::sample::PERIOD_US;
-use gyronet_tools::recording::{Reader, Recording};
+use gyronet_tools::drive::recording::{Reader, Recording};
 use std::fmt::Write as _;
 
 /// As a file. Whatever rows are read have rising times and finite values, and errors can be

@@ -1,7 +1,7 @@
 //! Folders of KAIST Urban and NCLT.
 
 use super::Seed;
-use gyronet_tools::sequence::{Sequence, write_csv};
+use gyronet_tools::paper::sequence::{Sequence, write_csv};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io, process, thread};

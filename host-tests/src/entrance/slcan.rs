@@ -9,9 +9,9 @@ use gyronet::can::encoder::CanEncoder;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::slcan::{emit, emit_stamped, parse, parse_stamped};
 use gyronet::units::{Micros, Yaw};
-use gyronet_tools::candump::Log;
-use gyronet_tools::monitor::Monitor;
-use gyronet_tools::monitor::line::{Splitter, parse_line};
+use gyronet_tools::client::monitor::Monitor;
+use gyronet_tools::client::monitor::line::{Splitter, parse_line};
+use gyronet_tools::drive::candump::Log;
 
 /// What the board answers besides frames.
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];

@@ -21,7 +21,7 @@ use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::connected::Step;
 use gyronet_host_tests::recordings::Row;
 use gyronet_host_tests::replay;
-use gyronet_tools::monitor::{Counts, Monitor};
+use gyronet_tools::client::monitor::{Counts, Monitor};
 use gyronet_tools::simulate::{self, Simulation};
 use std::time::{Duration, Instant};
 

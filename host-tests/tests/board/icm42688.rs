@@ -12,7 +12,7 @@ use gyronet::store::{Configuration, ImuPart};
 use gyronet::units::AngularRate;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::stored::Stored;
-use gyronet_tools::monitor::line::parse_line;
+use gyronet_tools::client::monitor::line::parse_line;
 use serde_json::json;
 use std::time::Duration;
 

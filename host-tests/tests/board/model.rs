@@ -6,7 +6,7 @@ use gyronet::service::{Reply, Request};
 use gyronet_host_tests::board::{At, Board, PACKAGES};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{image, replay, require};
-use gyronet_tools::device::Device;
+use gyronet_tools::client::device::Device;
 use std::process::Command;
 use std::time::Duration;
 

@@ -13,8 +13,8 @@ use gyronet::store::{Configuration, Field, FieldError, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::other_weights;
-use gyronet_tools::device::Device;
-use gyronet_tools::device::upload::{Uploaded, upload};
+use gyronet_tools::client::device::Device;
+use gyronet_tools::client::device::upload::{Uploaded, upload};
 use std::time::Duration;
 
 const MS: Duration = Duration::from_millis(1);

@@ -7,7 +7,7 @@ use gyronet::service::frame::emit;
 use gyronet::service::{Reply, Request};
 use gyronet::store::{Configuration, Mounting, Record};
 use gyronet_host_tests::board::Board;
-use gyronet_tools::device::Device;
+use gyronet_tools::client::device::Device;
 use std::time::Duration;
 
 const SUPPLY: &str = "PWR.supply_mv";

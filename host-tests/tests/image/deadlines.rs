@@ -3,18 +3,19 @@
 
 use gyronet_host_tests::require::{Need, wants};
 use gyronet_host_tests::{image, qemu};
-use gyronet_tools::schedule::Schedule;
-use gyronet_tools::{target_bench, task_bench};
+use gyronet_tools::target::bench;
+use gyronet_tools::target::schedule::Schedule;
+use gyronet_tools::target::tasks;
 
 #[test]
 fn every_deadline_is_met() {
     let test = "every_deadline_is_met";
     let Some(()) = qemu::available(test) else { return };
     let Some(elf) = image::coprocessor(test, env!("CARGO_TARGET_TMPDIR")) else { return };
-    let plugin = target_bench::plugin(&target_bench::workspace());
+    let plugin = bench::plugin(&bench::workspace());
     let plugin = plugin.ok_or_else(|| "no C compiler for the instruction counter".to_owned());
     let Some(plugin) = wants(test, Need::Qemu, plugin) else { return };
-    let tasks = task_bench::measure(&elf, &plugin).unwrap_or_else(|error| panic!("{error}"));
+    let tasks = tasks::measure(&elf, &plugin).unwrap_or_else(|error| panic!("{error}"));
     let schedule = Schedule::new(&tasks).expect("deadlines of all tasks are known");
     println!("{tasks}\n{schedule}");
     // The emulator has no CAN controller, and its supply does not fall.

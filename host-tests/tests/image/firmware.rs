@@ -12,9 +12,9 @@ use gyronet::service::{Reply, Request};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{image, qemu, replay};
-use gyronet_tools::device::{Device, line::Line};
-use gyronet_tools::drive::Drive;
-use gyronet_tools::recording::Recording;
+use gyronet_tools::client::device::{Device, line::Line};
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::Drive;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 

@@ -8,8 +8,8 @@ use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::{image, qemu, replay};
-use gyronet_tools::device::line::Line;
-use gyronet_tools::device::{Device, DeviceError};
+use gyronet_tools::client::device::line::Line;
+use gyronet_tools::client::device::{Device, DeviceError};
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);

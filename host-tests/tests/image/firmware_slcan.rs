@@ -7,7 +7,7 @@ use gyronet::can::yaw::{AngleMessage, Faults};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::service::{Reply, Request};
 use gyronet_host_tests::{image, qemu, replay};
-use gyronet_tools::device::{Device, line::Line};
+use gyronet_tools::client::device::{Device, line::Line};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

@@ -6,7 +6,7 @@ use gyronet::sample::RATE_HZ;
 use gyronet::sensor::xsens::MtData2;
 use gyronet::service::message::AllCounters;
 use gyronet_host_tests::{connected, image, qemu, replay};
-use gyronet_tools::device::{Device, line::Line};
+use gyronet_tools::client::device::{Device, line::Line};
 use gyronet_tools::simulate::{Config, Simulation};
 use std::time::{Duration, Instant};
 

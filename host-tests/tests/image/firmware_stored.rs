@@ -18,8 +18,8 @@ use gyronet_host_tests::connected::{self, Step};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::{Stored, other_weights};
 use gyronet_host_tests::{image, qemu, replay};
-use gyronet_tools::device::line::Line;
-use gyronet_tools::device::{Device, DeviceError};
+use gyronet_tools::client::device::line::Line;
+use gyronet_tools::client::device::{Device, DeviceError};
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(120);

@@ -1,8 +1,8 @@
 //! Flash, RAM, stack and panics of the firmware image, read from its machine code.
 
 use gyronet_host_tests::{image, qemu};
-use gyronet_tools::image_size::{BUDGETS, ImageSize};
-use gyronet_tools::image_stack::{ImageStack, functions, priorities};
+use gyronet_tools::target::size::{BUDGETS, ImageSize};
+use gyronet_tools::target::stack::{ImageStack, functions, priorities};
 use std::time::Duration;
 
 fn elf(test: &str, name: &str) -> Option<Vec<u8>> {

@@ -6,9 +6,9 @@ use gyronet::can::encoder::CanEncoder;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::units::{AngularRate, Micros, Yaw};
 use gyronet_host_tests::{image, qemu, replay, synthetic};
-use gyronet_tools::monitor::line::{NoFrame, Splitter, parse_line};
-use gyronet_tools::monitor::source::{Lines, Source, SourceError};
-use gyronet_tools::monitor::{Counts, Monitor};
+use gyronet_tools::client::monitor::line::{NoFrame, Splitter, parse_line};
+use gyronet_tools::client::monitor::source::{Lines, Source, SourceError};
+use gyronet_tools::client::monitor::{Counts, Monitor};
 use std::time::{Duration, Instant};
 
 /// Frames of a car that turns at 50 deg/s, and how far it has turned, deg.

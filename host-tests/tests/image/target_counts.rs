@@ -10,9 +10,9 @@ use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::units::Angle;
 use gyronet_host_tests::require::{Need, wants};
 use gyronet_host_tests::{image, qemu};
-use gyronet_tools::image_size::ImageSize;
-use gyronet_tools::parser_load::{FRAMES, ParserLoad};
-use gyronet_tools::target_bench::{self, Counts};
+use gyronet_tools::target::bench::{self, Counts};
+use gyronet_tools::target::parser_load::{FRAMES, ParserLoad};
+use gyronet_tools::target::size::ImageSize;
 
 /// Largest part of the processor's time that a part's frames may take, at 5 wait states.
 const SHARES: [(&str, f64); 3] = [
@@ -54,9 +54,9 @@ fn counts_and_sizes() {
     let test = "counts_and_sizes";
     let Some(()) = qemu::available(test) else { return };
     let mut counts = Counts::default();
-    for name in target_bench::IMAGES {
+    for name in bench::IMAGES {
         let Some(bench) = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), name) else { return };
-        let counted = target_bench::measure(&target_bench::workspace(), &bench);
+        let counted = bench::measure(&bench::workspace(), &bench);
         counts.extend(counted.unwrap_or_else(|error| panic!("{name}: {error}")));
     }
     let counted = if counts.exact() { Ok(()) } else { Err(NO_PLUGIN.to_owned()) };
@@ -115,7 +115,7 @@ fn coprocessor_size() {
 fn selftest() {
     let Some(()) = qemu::available("selftest") else { return };
     let Some(elf) = image::firmware("selftest", env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
-    let (printed, _) = target_bench::emulate(&elf, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let (printed, _) = bench::emulate(&elf, &[]).unwrap_or_else(|error| panic!("{error}"));
     println!("{printed}");
     assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
     assert!(printed.contains(&format!("fognet hash={:08x}\n", fognet_hash())), "{printed}");

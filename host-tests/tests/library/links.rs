@@ -3,14 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGES: [&str; 10] = [
+const PAGES: [&str; 12] = [
     "README.md",
     "CHANGELOG.md",
     "host-tests/README.md",
     "host-tests/board/README.md",
     "host-tests/board/PERIPHERALS.md",
+    "src/SAFETY.md",
     "src/bin/README.md",
     "src/bin/PORTING.md",
+    "src/can/README.md",
     "tools/README.md",
     "tools/MEASUREMENTS.md",
     "tools/train/README.md",

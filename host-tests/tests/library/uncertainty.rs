@@ -9,8 +9,8 @@ use gyronet::units::AngularRate;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::{idling, rate};
 use gyronet_host_tests::{parallel, recordings};
-use gyronet_tools::ablation::{self, Score};
-use gyronet_tools::recording::Recording;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::evaluate::ablation::{self, Score};
 use std::path::Path;
 
 /// One part in a million, and the code that rounding up adds: f32's own error.

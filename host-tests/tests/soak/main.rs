@@ -3,7 +3,7 @@
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::sample::RATE_HZ;
-use gyronet_tools::soak;
+use gyronet_tools::campaign::soak;
 
 #[test]
 fn nothing_drifts_across_any_wrap() {

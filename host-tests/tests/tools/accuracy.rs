@@ -3,10 +3,10 @@
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::{parallel, recordings};
-use gyronet_tools::methods::{Method, Rates};
-use gyronet_tools::metrics::YawError;
-use gyronet_tools::quantization_error::Both;
-use gyronet_tools::recording::Recording;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::evaluate::methods::{Method, Rates};
+use gyronet_tools::evaluate::metrics::YawError;
+use gyronet_tools::network::quantization_error::Both;
 use std::path::Path;
 
 /// The test trials.

@@ -5,7 +5,7 @@ use gyronet::model::fognet_blob::{HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogLayerOutputs;
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
-use gyronet_tools::fog_checkpoint::FogCheckpoint;
+use gyronet_tools::network::fog_checkpoint::FogCheckpoint;
 
 #[test]
 fn every_layer_equals_pytorch() {

@@ -7,12 +7,12 @@ use gyronet::model::fognet::{FogEstimate, FogNetState, MinuteNetwork};
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet::odometry::Track;
 use gyronet_host_tests::parallel;
-use gyronet_tools::fog_drive::{self, FogDrive};
-use gyronet_tools::quantization_error::Both;
-use gyronet_tools::sequence::Sequence;
+use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
+use gyronet_tools::network::quantization_error::Both;
+use gyronet_tools::paper::fog_drive::{self, FogDrive};
+use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set};
 use gyronet_tools::simulate::world::EARTH_RATE;
-use gyronet_tools::trajectory_error::TrajectoryError;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 

@@ -7,7 +7,7 @@ use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
-use gyronet_tools::checkpoint::Checkpoint;
+use gyronet_tools::network::checkpoint::Checkpoint;
 
 #[test]
 fn every_layer_equals_pytorch() {

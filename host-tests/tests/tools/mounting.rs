@@ -10,9 +10,9 @@ use gyronet_host_tests::recordings;
 use gyronet_host_tests::stream;
 use gyronet_host_tests::synthetic::{force, rate, turning};
 use gyronet_tools::bundled;
-use gyronet_tools::drive::Drive;
-use gyronet_tools::recording::Recording;
-use gyronet_tools::wheel_frames::WheelFrames;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::wheel_frames::WheelFrames;
 use proptest::prelude::*;
 
 /// By how much the sensor is turned, about x, then about y.

@@ -5,8 +5,8 @@ use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled::SIMULATED_DRIVE;
-use gyronet_tools::drive::{Drive, DriveError};
-use gyronet_tools::recording::{Recording, RecordingError, ValueError};
+use gyronet_tools::drive::recording::{Recording, RecordingError, ValueError};
+use gyronet_tools::drive::replay::{Drive, DriveError};
 
 fn parse(text: &str) -> Result<Recording, RecordingError> {
     Recording::parse("drive.csv", text.as_bytes())

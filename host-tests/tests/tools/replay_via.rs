@@ -7,11 +7,11 @@ use gyronet::sample::{PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros};
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled;
-use gyronet_tools::drive::Drive;
-use gyronet_tools::recording::{Recording, Row};
-use gyronet_tools::via::compare::{Bound, Difference};
-use gyronet_tools::via::{Part, Quantisation, Via};
-use gyronet_tools::wheel_frames::WheelFrames;
+use gyronet_tools::drive::recording::{Recording, Row};
+use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::parts::compare::{Bound, Difference};
+use gyronet_tools::parts::{Part, Quantisation, Via};
 
 const PARTS: [Part; 3] = [Part::Xsens, Part::Dsp1760, Part::Icm42688];
 

@@ -4,8 +4,8 @@
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::require::skipped;
-use gyronet_tools::drive::Drive;
-use gyronet_tools::sequence::Sequence;
+use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set};
 use std::path::Path;
 

@@ -9,7 +9,7 @@ use gyronet::units::{AngularRate, Micros, WheelSpeed};
 use gyronet_host_tests::recordings;
 use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::synthetic::{force, rate};
-use gyronet_tools::recording::{Recording, Row};
+use gyronet_tools::drive::recording::{Recording, Row};
 
 /// deg in half an hour.
 const LARGEST_YAW: f64 = 0.2;

@@ -4,7 +4,7 @@
 
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig, StaticInit};
 use gyronet_host_tests::recordings;
-use gyronet_tools::recording::{Recording, Row};
+use gyronet_tools::drive::recording::{Recording, Row};
 
 const TRIALS: [u32; 8] = [2, 3, 4, 6, 7, 8, 9, 11];
 /// Samples from one stretch to the next.

@@ -4,7 +4,7 @@
 use gyronet::odometry::Track;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::require;
-use gyronet_tools::trajectory_error::{Point, TrajectoryError};
+use gyronet_tools::evaluate::trajectory_error::{Point, TrajectoryError};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};

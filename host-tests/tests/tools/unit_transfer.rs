@@ -18,9 +18,9 @@ use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::{parallel, recordings};
-use gyronet_tools::drive::{Drive, Step};
-use gyronet_tools::metrics::YawError;
-use gyronet_tools::recording::Recording;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::{Drive, Step};
+use gyronet_tools::evaluate::metrics::YawError;
 use std::path::Path;
 
 /// Largest ratio of 1 s errors.

@@ -8,7 +8,7 @@ use super::input::{Delivered, Input};
 use super::networks::Networks;
 use super::part::Part;
 use super::wire::Message;
-use crate::wheel_frames;
+use crate::drive::wheel_frames;
 use embedded_can::{Frame, Id};
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::slcan::port::Port;

@@ -1,7 +1,7 @@
 //! Drives to do faults to: what undamaged sensors say, row by row.
 
-use crate::recording::Recording;
-use crate::wheel_frames::WheelFrames;
+use crate::drive::recording::Recording;
+use crate::drive::wheel_frames::WheelFrames;
 use gyronet::sample::{ImuSample, PERIOD_US, WHEELS};
 use gyronet::units::{AngularRate, Micros};
 

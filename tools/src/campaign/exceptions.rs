@@ -2,7 +2,7 @@
 
 use super::fault::{Axes, Fault, Kind, Line};
 use super::part::Part;
-use crate::via::icm42688::WRAP_US;
+use crate::parts::icm42688::WRAP_US;
 
 /// A fault that may go undetected.
 #[derive(Debug, Clone, Copy)]

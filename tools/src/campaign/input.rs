@@ -3,7 +3,7 @@
 use super::fault::Line;
 use super::part::{ADIS, Part};
 use super::wire::Message;
-use crate::via::icm42688::{Bus, NoDelay};
+use crate::parts::icm42688::{Bus, NoDelay};
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::{FogSample, ImuSample};
 use gyronet::sensor::adis16465::{Adis16465, BURST};

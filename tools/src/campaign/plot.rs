@@ -1,73 +1,53 @@
-//! Two panels: how soon a receiver is told of each kind of fault, and how far yaw has moved by then.
+//! The runs of single faults in two panels: how soon a receiver learns of each kind of fault, and how far yaw has moved
+//! by then.
 
 use super::Run;
 use super::fault::Kind;
-use crate::plot::PlotError;
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use crate::plot::svg::{Axis, COLORS, Color, Figure, Marks, Panel, PlotError, Stroke};
 
 const SIZE: (u32, u32) = (1200, 660);
-const TITLE_HEIGHT: u32 = 50;
-const FONT: &str = "sans-serif";
-const GREY: RGBColor = RGBColor(90, 90, 90);
-const DETECTED: RGBColor = RGBColor(0, 114, 178);
-const NAMED: RGBColor = RGBColor(230, 159, 0);
-const UNDETECTED: RGBColor = RGBColor(213, 0, 0);
-/// Dots of a kind in a panel: more do not tell more.
+const DETECTED: Color = COLORS[0];
+const NAMED: Color = COLORS[4];
+const UNDETECTED: Color = COLORS[1];
+/// Dots of a kind in a panel; more would not show more.
 const DOTS: usize = 250;
-
-type Failure = DrawingAreaErrorKind<std::io::Error>;
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-/// A run in a panel.
-#[derive(Clone, Copy)]
-struct Dot {
-    kind: usize,
-    value: f64,
-    color: RGBColor,
-}
+/// The golden ratio's fraction, which spreads dots of one value evenly.
+const GOLDEN: f64 = 0.618_034;
 
 /// Draws the runs of single faults.
 ///
 /// # Errors
 /// [`PlotError`], when the library refuses.
 pub fn svg(runs: &[Run]) -> Result<String, PlotError> {
-    let mut svg = String::new();
-    draw(&mut svg, runs)?;
-    Ok(svg)
-}
-
-fn draw(svg: &mut String, runs: &[Run]) -> Result<(), Failure> {
-    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (head, body) = root.split_vertically(TITLE_HEIGHT);
-    let single = || runs.iter().filter(|run| run.faults.len() == 1);
+    let single: Vec<&Run> = runs.iter().filter(|run| run.faults.len() == 1).collect();
     let title = format!(
-        "{} runs with one fault: told (blue), on the named list (orange), undetected (red)",
-        single().count()
+        "{} runs with one fault: reported (blue), on the named list (orange), undetected (red)",
+        single.len()
     );
-    head.draw(&Text::new(title, (20, 16), (FONT, 20).into_font()))?;
-    let (left, right) = body.split_horizontally(SIZE.0 / 2);
-    let dots = |value: fn(&Run) -> Option<f64>| -> Vec<Dot> {
-        let dots = Kind::ALL.iter().enumerate().flat_map(|(kind, wanted)| {
-            let own = single().filter(|run| run.faults[0].kind == *wanted);
-            let all: Vec<(f64, RGBColor)> = own.filter_map(|run| Some((value(run)?, color(run)))).collect();
-            let step = all.len().div_ceil(DOTS).max(1);
-            // The largest must be there, whatever is left out.
-            let most = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
-            let drawn: Vec<_> = all.into_iter().step_by(step).chain(most).collect();
-            drawn.into_iter().map(move |(value, color)| Dot { kind, value, color })
-        });
-        dots.collect()
-    };
-    let told = dots(|run| run.outcome()?.told_after.map(|s| (1e3 * s).max(1.0)));
-    let moved = dots(|run| run.outcome().map(|outcome| outcome.moved_limits.max(1e-3)));
-    panel(&left, "told after, ms", (0.8, 1.2e4), &told, None)?;
-    panel(&right, "moved in a second before that, over the limit", (8e-4, 1e4), &moved, Some(1.0))?;
-    root.present()
+    let told = |run: &Run| run.outcome()?.told_after.map(|s| (1e3 * s).max(1.0));
+    let moved = |run: &Run| run.outcome().map(|outcome| outcome.moved_limits.max(1e-3));
+    let moved_label = "moved in a second before that, over the limit";
+    let panels = vec![
+        panel("reported after, ms", (0.8, 1.2e4), dots(&single, told), None),
+        panel(moved_label, (8e-4, 1e4), dots(&single, moved), Some(1.0)),
+    ];
+    Figure { title: &title, size: SIZE, side_by_side: true, legend: Vec::new(), panels }.svg()
 }
 
-fn color(run: &Run) -> RGBColor {
+/// Returns the runs of each kind that have a value, as value and height; the largest is never left out.
+fn dots(runs: &[&Run], value: impl Fn(&Run) -> Option<f64>) -> Vec<(f64, f64, Color)> {
+    let of_kind = Kind::ALL.iter().enumerate().flat_map(|(height, wanted)| {
+        let own = runs.iter().filter(|run| run.faults[0].kind == *wanted);
+        let all: Vec<(f64, Color)> = own.filter_map(|run| Some((value(run)?, color(run)))).collect();
+        let step = all.len().div_ceil(DOTS).max(1);
+        let most = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
+        let drawn: Vec<_> = all.into_iter().step_by(step).chain(most).collect();
+        drawn.into_iter().map(move |(value, color)| (value, height as f64, color))
+    });
+    of_kind.collect()
+}
+
+fn color(run: &Run) -> Color {
     if run.is_failure() {
         UNDETECTED
     } else if run.exception().is_some() {
@@ -77,44 +57,35 @@ fn color(run: &Run) -> RGBColor {
     }
 }
 
+/// Returns a panel with the kinds of faults one below the other and the values on a logarithmic axis.
 fn panel(
-    area: &Area<'_>,
-    label: &str,
+    label: &'static str,
     (low, high): (f64, f64),
-    dots: &[Dot],
+    dots: Vec<(f64, f64, Color)>,
     limit: Option<f64>,
-) -> Result<(), Failure> {
-    let kinds = Kind::ALL.len() as f64;
-    let mut chart = ChartBuilder::on(area)
-        .margin_left(10)
-        .margin_right(20)
-        .margin_bottom(8)
-        .x_label_area_size(44)
-        .y_label_area_size(118)
-        .build_cartesian_2d((low..high).log_scale(), (kinds - 0.5)..-0.5)?;
-    chart
-        .configure_mesh()
-        .x_desc(label)
-        .y_labels(Kind::ALL.len())
-        .max_light_lines(0)
-        .bold_line_style(RGBColor(228, 228, 228))
-        .axis_style(GREY)
-        .label_style((FONT, 14))
-        .axis_desc_style((FONT, 16))
-        .y_label_formatter(&|at| {
-            let kind = Kind::ALL.get(at.round().max(0.0) as usize);
-            kind.filter(|_| (at - at.round()).abs() < 0.01).map_or("", |kind| kind.name()).to_owned()
-        })
-        .x_label_formatter(&|value| if *value < 1.0 { format!("{value:.3}") } else { format!("{value:.0}") })
-        .draw()?;
-    if let Some(limit) = limit {
-        let line = [(limit, -0.5), (limit, kinds - 0.5)];
-        chart.draw_series(LineSeries::new(line, UNDETECTED.stroke_width(1)))?;
-    }
+) -> Panel<'static> {
+    let bottom = Kind::ALL.len() as f64 - 0.5;
     // Dots of one value lie beside each other.
-    chart.draw_series(dots.iter().enumerate().map(|(n, dot)| {
-        let beside = 0.6 * ((n as f64 * 0.618_034) % 1.0) - 0.3;
-        Circle::new((dot.value.min(high), dot.kind as f64 + beside), 2, dot.color.mix(0.6).filled())
-    }))?;
-    Ok(())
+    let beside = |n: usize| 0.6 * ((n as f64 * GOLDEN) % 1.0) - 0.3;
+    let dots = dots.into_iter().enumerate();
+    let dots = dots.map(|(n, (value, kind, color))| (value.min(high).log10(), kind + beside(n), color));
+    let line = |limit: f64| {
+        Marks::Line(Stroke::solid(UNDETECTED, 1), vec![(limit.log10(), -0.5), (limit.log10(), bottom)])
+    };
+    let ends = (low.log10(), high.log10());
+    Panel {
+        x: Axis { ticks: (ends.1 - ends.0) as usize + 1, format: &power_of_ten, ..Axis::new(label, ends) },
+        y: Axis { ticks: Kind::ALL.len(), format: &kind_name, room: 118, ..Axis::new("", (bottom, -0.5)) },
+        series: limit.map(line).into_iter().chain([Marks::Dots(dots.collect())]).collect(),
+    }
+}
+
+fn power_of_ten(exponent: &f64) -> String {
+    let value = 10f64.powf(*exponent);
+    if value < 1.0 { format!("{value:.3}") } else { format!("{value:.0}") }
+}
+
+fn kind_name(height: &f64) -> String {
+    let kind = Kind::ALL.get(height.round().max(0.0) as usize);
+    kind.filter(|_| (height - height.round()).abs() < 0.01).map_or("", |kind| kind.name()).to_owned()
 }

@@ -9,7 +9,7 @@ use super::networks::{Collecting, Known, Networks, Remembering};
 use super::part::Part;
 use super::receiver::Receiver;
 use super::wire::{Message, damage};
-use crate::wheel_frames;
+use crate::drive::wheel_frames;
 use gyronet::can::slcan;
 use gyronet::compensate::{CompensateConfig, Hop, Mode};
 use gyronet::pipeline::PipelineConfig;

@@ -1,11 +1,11 @@
 //! `gyronet bench-target`: instructions and modelled cycles of every kernel, network and parser.
 
 use super::Common;
-use gyronet_tools::image_size::ImageSize;
-use gyronet_tools::parser_load::ParserLoad;
-use gyronet_tools::schedule::Schedule;
-use gyronet_tools::target_bench::{self, Count, Counts};
-use gyronet_tools::task_bench::{self, Cycles, Tasks};
+use gyronet_tools::target::bench::{self, Count, Counts};
+use gyronet_tools::target::parser_load::ParserLoad;
+use gyronet_tools::target::schedule::Schedule;
+use gyronet_tools::target::size::ImageSize;
+use gyronet_tools::target::tasks::{self, Cycles, Tasks};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -34,17 +34,17 @@ const CMSIS_NN_S8: [(&str, u64, u64); 3] = [
 
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let workspace = target_bench::workspace();
-    let folder = target_bench::target_folder();
+    let workspace = bench::workspace();
+    let folder = bench::target_folder();
     if args.policies {
         return policies(&workspace, &folder);
     }
     let mut counts = Counts::default();
-    for image in target_bench::IMAGES {
-        let image = target_bench::build(&workspace, image, &folder)?;
-        counts.extend(target_bench::measure(&workspace, &image)?);
+    for image in bench::IMAGES {
+        let image = bench::build(&workspace, image, &folder)?;
+        counts.extend(bench::measure(&workspace, &image)?);
     }
-    let image = target_bench::build(&workspace, "coprocessor", &folder)?;
+    let image = bench::build(&workspace, "coprocessor", &folder)?;
     let coprocessor = ImageSize::read(&image)?;
     let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
     let out = &mut io::stdout().lock();
@@ -66,11 +66,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 /// Cycles of the networks, the pipeline and the parsers under each policy, a line each.
 fn policies(workspace: &Path, folder: &Path) -> super::Result {
     let out = &mut io::stdout().lock();
-    let names = target_bench::POLICIES.map(|(name, _)| name);
+    let names = bench::POLICIES.map(|(name, _)| name);
     writeln!(out, "cycles at 5 wait states: {}", names.join("; "))?;
-    for image in target_bench::IMAGES {
-        let image = target_bench::build(workspace, image, folder)?;
-        let counts = target_bench::measure_policies(workspace, &image)?;
+    for image in bench::IMAGES {
+        let image = bench::build(workspace, image, folder)?;
+        let counts = bench::measure_policies(workspace, &image)?;
         let Some((first, others)) = counts.split_first() else { continue };
         let mut before = "";
         for (k, count) in first.regions.iter().enumerate() {
@@ -92,8 +92,8 @@ type Timing = (Tasks, Schedule);
 
 /// The tasks of the image that is flashed, counted while it runs.
 fn schedule(workspace: &Path, image: &Path) -> Result<Timing, Box<dyn std::error::Error>> {
-    let plugin = target_bench::plugin(workspace).ok_or("the instruction counter cannot be built")?;
-    let tasks = task_bench::measure(image, &plugin)?;
+    let plugin = bench::plugin(workspace).ok_or("the instruction counter cannot be built")?;
+    let tasks = tasks::measure(image, &plugin)?;
     let schedule = Schedule::new(&tasks);
     let schedule = schedule.ok_or("the image has other tasks than the table of deadlines")?;
     Ok((tasks, schedule))

@@ -11,7 +11,7 @@ use gyronet_tools::campaign::report::Report;
 use gyronet_tools::campaign::scene::Scene;
 use gyronet_tools::campaign::weight_upsets::WeightUpsets;
 use gyronet_tools::campaign::{self, Plan, plot};
-use gyronet_tools::recording::Recording;
+use gyronet_tools::drive::recording::Recording;
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;

@@ -3,12 +3,15 @@
 use super::{Common, WriteError, paint, print_json, progress, replay, weights};
 use gyronet::can::config::Config;
 use gyronet::model::GyroNet;
+use gyronet_tools::bundled;
 use gyronet_tools::demo::Demo;
 use gyronet_tools::demo::board::{Agreement, BoardError, Difference, Figures, Outcome};
-use gyronet_tools::evaluate::{DriveErrors, EvaluateError, Report};
-use gyronet_tools::methods::{self, Rates};
-use gyronet_tools::recording::Recording;
-use gyronet_tools::{bundled, plot, target_bench};
+use gyronet_tools::demo::picture;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::evaluate::methods::{self, Rates};
+use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError, Report};
+
+use gyronet_tools::target::bench;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -68,7 +71,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
     let frames = replay::write_file(&rates.drive, &log)?;
-    std::fs::write(&picture, plot::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
+    std::fs::write(&picture, picture::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
     let board = board(args, common, &recording, &mut integer)?;
     let simulated = args.file.is_none();
     let demo = Demo::new(&recording, simulated, &rates, errors.as_ref(), (Config::DEFAULT, frames), board);
@@ -138,8 +141,7 @@ fn board(
     }
     let waiting =
         progress::waiting(common, "the firmware image: building (minutes, the first time), running in QEMU");
-    let build =
-        |image| target_bench::build(&target_bench::workspace(), image, &target_bench::target_folder());
+    let build = |image| bench::build(&bench::workspace(), image, &bench::target_folder());
     let (image, bench) = (build("coprocessor")?, build("bench")?);
     let agreement = Agreement::new(&image, recording, network)?;
     let figures = Figures::new(&image, &bench)?;

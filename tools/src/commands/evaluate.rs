@@ -2,10 +2,10 @@
 
 use super::{Common, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
-use gyronet_tools::ablation::{self, Floor, Score, Variant};
-use gyronet_tools::evaluate::{DriveErrors, Report};
-use gyronet_tools::methods::{self, Rates};
-use gyronet_tools::recording::Recording;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
+use gyronet_tools::evaluate::methods::{self, Rates};
+use gyronet_tools::evaluate::report::{DriveErrors, Report};
 use std::io::Write;
 use std::path::PathBuf;
 

@@ -1,8 +1,8 @@
 //! `gyronet import`: a sequence of a data set as one drive.
 
 use super::{Common, WriteError, print_json, progress, remark};
-use gyronet_tools::figures;
-use gyronet_tools::sequence::{self, Sequence};
+use gyronet_tools::paper::sequence::{self, Sequence};
+use gyronet_tools::paper::tables::pictures;
 use gyronet_tools::simulate::layout::Layout;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -83,7 +83,7 @@ fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
         remark(common, format_args!("{}: {rows} rows", path.display()))?;
     }
     if let Some(path) = &args.stamps {
-        std::fs::write(path, figures::stamps(sequence)?).map_err(WriteError::to(path))?;
+        std::fs::write(path, pictures::stamps(sequence)?).map_err(WriteError::to(path))?;
     }
     Ok(())
 }

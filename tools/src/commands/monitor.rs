@@ -3,8 +3,8 @@
 use super::{Common, WriteError};
 use console::Term;
 use gyronet::can::config::Config;
-use gyronet_tools::monitor::Monitor;
-use gyronet_tools::monitor::source::{Lines, Source};
+use gyronet_tools::client::monitor::Monitor;
+use gyronet_tools::client::monitor::source::{Lines, Source};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
 //! Weight and colour for tables on a terminal; plain text elsewhere and with NO_COLOR.
 
 use console::style;
-use gyronet_tools::evaluate::Report;
-use gyronet_tools::methods::Method;
+use gyronet_tools::evaluate::methods::Method;
+use gyronet_tools::evaluate::report::Report;
 
 /// A report with its headings and what the board sends standing out.
 pub fn report(report: &Report) -> String {

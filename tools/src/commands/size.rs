@@ -1,9 +1,9 @@
 //! `gyronet size`: what the firmware image takes, against its budgets.
 
 use super::Common;
-use gyronet_tools::image_size::{BUDGETS, ImageSize};
-use gyronet_tools::image_stack::{Handler, ImageStack, Way};
-use gyronet_tools::target_bench;
+use gyronet_tools::target::bench;
+use gyronet_tools::target::size::{BUDGETS, ImageSize};
+use gyronet_tools::target::stack::{Handler, ImageStack, Way};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -21,10 +21,10 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let workspace = target_bench::workspace();
+    let workspace = bench::workspace();
     let elf = match &args.elf {
         Some(elf) => elf.clone(),
-        None => target_bench::build(&workspace, "coprocessor", &target_bench::target_folder())?,
+        None => bench::build(&workspace, "coprocessor", &bench::target_folder())?,
     };
     let size = ImageSize::read(&elf)?;
     let stack = ImageStack::read(&std::fs::read(&elf)?)?;

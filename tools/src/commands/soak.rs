@@ -4,7 +4,7 @@ use super::weights::Weights;
 use super::{Common, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet::sample::RATE_HZ;
-use gyronet_tools::soak;
+use gyronet_tools::campaign::soak;
 use std::io::Write;
 
 /// Run hours of a simulated drive from bytes to bytes, every counter wrapping.

@@ -2,8 +2,8 @@
 
 use gyronet::model::{Blob, weights};
 use gyronet_tools::bundled;
-use gyronet_tools::checkpoint::{Checkpoint, CheckpointError};
-use gyronet_tools::weight_file::{WeightFile, WeightFileError};
+use gyronet_tools::network::checkpoint::{Checkpoint, CheckpointError};
+use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
 use std::path::{Path, PathBuf};
 
 /// Weights of the integer network.

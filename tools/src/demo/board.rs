@@ -4,13 +4,13 @@
 //! held against the library's for the samples in those bytes. Wheels stay away on both sides: the
 //! emulated board has no CAN.
 
-use crate::drive::{Drive, DriveError};
-use crate::emulator::{self, EmulatorError};
-use crate::image_size::{ImageSize, SizeError};
-use crate::image_stack::{ImageStack, StackError};
-use crate::recording::Recording;
-use crate::target_bench::{self, BenchError};
-use crate::via::{self, Part, ViaError};
+use crate::drive::recording::Recording;
+use crate::drive::replay::{Drive, DriveError};
+use crate::parts::{self, Part, ViaError};
+use crate::target::bench::{self, BenchError};
+use crate::target::emulator::{self, EmulatorError};
+use crate::target::size::{ImageSize, SizeError};
+use crate::target::stack::{ImageStack, StackError};
 use embedded_can::Frame;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::WindowNetwork;
@@ -123,7 +123,7 @@ impl Outcome {
     /// library or the repository is missing.
     #[must_use]
     pub fn missing() -> Option<Self> {
-        let why = match (emulator::available(), target_bench::target_installed()) {
+        let why = match (emulator::available(), bench::target_installed()) {
             (Err(error), _) => format!("wants QEMU: {error}"),
             (_, Err(why)) => why,
             (Ok(()), Ok(())) => return None,
@@ -150,7 +150,7 @@ impl Agreement {
     ) -> Result<Self, BoardError> {
         let rows = recording.rows.iter().take(SAMPLES).copied().collect();
         let recording = Recording { rows, ..recording.clone() };
-        let bytes = via::mti_bytes(&recording).concat();
+        let bytes = parts::mti_bytes(&recording).concat();
         let sent = Part::Xsens.send(&recording)?.recording;
         let drive = Drive::run(&sent, &PipelineConfig::DEFAULT, None, network, || {})?;
         let frames: Vec<DataFrame> = drive.frames().map(|sent| sent.frame).collect();
@@ -189,7 +189,7 @@ impl Figures {
         let path = || image.display().to_string();
         let elf = std::fs::read(image).map_err(|source| SizeError::Io { path: path(), source })?;
         let stack = ImageStack::read(&elf).map_err(|source| BoardError::Stack { path: path(), source })?;
-        let counts = target_bench::measure(&target_bench::workspace(), bench)?;
+        let counts = bench::measure(&bench::workspace(), bench)?;
         let window = counts.get("gyronet/window");
         Ok(Self {
             flash,

@@ -1,6 +1,6 @@
 //! The messages of one sample, read as a receiver reads them.
 
-use crate::drive::Drive;
+use crate::drive::replay::Drive;
 use embedded_can::{Frame, Id};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
@@ -65,7 +65,7 @@ fn read(frame: &DataFrame, config: &Config) -> Option<(String, String)> {
         }
         1 => {
             let message = AngleMessage::parse(data).ok()?;
-            let faults = crate::monitor::fault_names(message.faults);
+            let faults = crate::client::monitor::fault_names(message.faults);
             ("GyroNet_Angle", format!("yaw {:+.6} deg, faults: {faults}", message.deg()))
         }
         _ => {

@@ -1,9 +1,9 @@
 //! Time and memory: what this command has measured, and what the emulator has counted for it.
 
 use super::board::{Figures, Outcome};
-use crate::methods::Rates;
-use crate::page::grouped;
-use crate::recording::Recording;
+use crate::drive::recording::Recording;
+use crate::evaluate::methods::Rates;
+use crate::plot::page::grouped;
 use gyronet::can::config::Config;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::gyronet::GyroNetState;
@@ -24,7 +24,7 @@ pub struct Cost {
 }
 
 /// Clock of the STM32F405, MHz.
-const CLOCK_MHZ: f64 = crate::parser_load::CLOCK_HZ * 1e-6;
+const CLOCK_MHZ: f64 = crate::target::parser_load::CLOCK_HZ * 1e-6;
 
 /// Of a drive, and of the image.
 #[must_use]

@@ -3,10 +3,11 @@
 use super::board::Outcome;
 use super::trajectory::Trajectories;
 use super::{Cost, Demo, Message};
-use crate::methods::Method;
-use crate::metrics::DT;
-use crate::page::chart::{Chart, Curve};
-use crate::page::{document, escaped, grouped, table};
+use crate::drive::DT;
+use crate::evaluate::methods::Method;
+use crate::evaluate::metrics::integral;
+use crate::plot::page::chart::{Chart, Curve};
+use crate::plot::page::{document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
 
 /// Whose curves are drawn, from back to front.
@@ -219,13 +220,4 @@ fn board(outcome: &Outcome) -> String {
 fn costs(costs: &[Cost]) -> String {
     let rows = costs.iter().map(|cost| vec![cost.what.to_owned(), cost.figure.clone(), cost.how.clone()]);
     table("costs", &["what", "figure", "from where"], rows)
-}
-
-/// Angle after each sample, rad.
-fn integral(rates: &[f64]) -> Vec<f64> {
-    let step = |angle: &mut f64, rate: &f64| {
-        *angle += rate * DT;
-        Some(*angle)
-    };
-    rates.iter().scan(0.0, step).collect()
 }

@@ -1,10 +1,10 @@
 //! Where each method sees the vehicle go: its yaw rate and the speeds of the wheels.
 
-use crate::methods::{Method, Rates};
-use crate::metrics::DT;
-use crate::recording::Recording;
-use crate::trajectory_error::{Point, TrajectoryError};
-use crate::wheel_frames::Speeds;
+use crate::drive::DT;
+use crate::drive::recording::Recording;
+use crate::drive::wheel_frames::Speeds;
+use crate::evaluate::methods::{Method, Rates};
+use crate::evaluate::trajectory_error::{Point, TrajectoryError};
 use gyronet::odometry::Track;
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! A simulated drive in the layout of [`crate::recording`].
+//! A simulated drive in the layout of [`crate::drive::recording`].
 
 use super::{Config, Sample, Simulation};
 use gyronet::sample::RATE_HZ;
@@ -35,7 +35,7 @@ fn row(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Recording;
+    use crate::drive::recording::Recording;
 
     #[test]
     fn what_is_written_can_be_read() {

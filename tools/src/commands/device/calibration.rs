@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use gyronet::service::calibrate::{State, Task};
 use gyronet::service::message::Calibrate;
 use gyronet::service::{Reply, Request};
-use gyronet_tools::device::calibration::to_value;
+use gyronet_tools::client::device::calibration::to_value;
 use std::time::{Duration, Instant};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -3,7 +3,7 @@
 use super::{Board, done, mismatch};
 use gyronet::service::{Reply, Request};
 use gyronet::store::{Configuration, Record};
-use gyronet_tools::device::settings::{assign, from_value, to_value};
+use gyronet_tools::client::device::settings::{assign, from_value, to_value};
 use std::path::Path;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;

@@ -1,0 +1,283 @@
+//! Hours of a simulated drive through the whole way of the data, as fast as the host can: bytes
+//! of an MTi in, frames as SLCAN text out, read back as a receiver reads them.
+//!
+//! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
+//! 32-bit microseconds begin half the drive before their end, packet counters and the counters
+//! of the messages go round, SLCAN's stamps begin anew each minute, the accumulated yaw passes a
+//! turn again and again. What goes in is known to the sample, so what comes out is.
+
+use crate::client::monitor::{Counts, Monitor};
+use crate::drive::wheel_frames;
+use crate::simulate::{Config as Simulated, Sample, Simulation};
+use gyronet::can::slcan::emit_stamped;
+use gyronet::coprocessor::{Config, Coprocessor};
+use gyronet::health::{Counters, MonitorCounters, Status};
+use gyronet::model::WindowNetwork;
+use gyronet::sample::{PERIOD_US, RATE_HZ, WHEELS};
+use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config, OutputRate};
+use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::units::{Micros, Yaw};
+use serde::Serialize;
+use std::fmt;
+
+/// Ticks of SampleTimeFine in a sample.
+const TICKS: u32 = (PERIOD_US / 100) as u32;
+/// Self-test passed, filter valid.
+const GOOD: u32 = 3;
+/// Frames of a sample with the messages of [`Config::DEFAULT`].
+const FRAMES: u64 = 6;
+/// Samples until the first one that is corrected, with something to spare.
+const INITIALISED: u32 = 100 * RATE_HZ;
+/// Half a least bit of the angle message, and one of each value that is summed: deg.
+const YAW_TOLERANCE: f64 = 1e-6;
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Soak {
+    /// Samples sent.
+    pub samples: u32,
+    /// What the pipeline counted.
+    pub pipeline: Counters,
+    /// What the sensor monitor counted.
+    pub watch: MonitorCounters,
+    /// What the receiver counted.
+    pub receiver: Counts,
+    /// Samples with each status: initialising, degraded, ready.
+    pub statuses: [u32; 3],
+    /// Time of the last sample at the pipeline less what it was sent with, us.
+    pub clock_error_us: i64,
+    /// Time of the gyro's last message less what it was sent with, us.
+    pub gyro_clock_error_us: i64,
+    /// Messages of the gyro that its parser says are missing, or that were refused.
+    pub gyro_lost: u32,
+    /// Yaw at the receiver less that of the pipeline, deg.
+    pub yaw_error_deg: f64,
+    /// Whole turns of the car, in all.
+    pub turns: f64,
+    /// Times that the part's ticks, the board's and the gyro's 32-bit microseconds wrapped.
+    pub wraps: [u32; 3],
+    /// Resident memory after a tenth of the drive and at its end, KiB; `None` where it cannot be
+    /// told.
+    pub memory_kib: Option<[u64; 2]>,
+}
+
+/// Runs a drive of so many samples. `tick` is called once a minute of it.
+///
+/// # Panics
+/// When bytes of our own are not understood.
+pub fn run(samples: u32, network: &mut impl WindowNetwork, mut tick: impl FnMut()) -> Soak {
+    let mut drive = Drive::new(samples);
+    let mut early = None;
+    let simulation = Simulation::new(&Simulated::DEFAULT);
+    for (k, sample) in (0..samples).zip(simulation) {
+        drive.sample(k, &sample, network);
+        if k == samples / 10 {
+            early = resident_kib();
+        }
+        if k % (60 * RATE_HZ) == 0 {
+            tick();
+        }
+    }
+    drive.finish(samples, early)
+}
+
+struct Drive {
+    mti: Mti,
+    gyro: Dsp1760,
+    coprocessor: Coprocessor,
+    monitor: Monitor,
+    /// First values of the part's ticks, the board's clock, the gyro's clock.
+    starts: [u32; 3],
+    statuses: [u32; 3],
+    /// Yaw of the pipeline, and of the receiver, when the receiver first had one.
+    yaw: Option<(Yaw, Yaw)>,
+    turned: f64,
+    clock_error_us: i64,
+    gyro_clock_error_us: i64,
+    gyro_lost: u32,
+}
+
+impl Drive {
+    fn new(samples: u32) -> Self {
+        let half = samples / 2;
+        let rate = OutputRate::new(RATE_HZ as u16).expect("a rate that the part offers");
+        let micros = half.wrapping_mul(PERIOD_US as u32);
+        Self {
+            mti: Mti::new(),
+            gyro: Dsp1760::new(Dsp1760Config { rate, ..Dsp1760Config::DEFAULT }),
+            coprocessor: Coprocessor::new(Config {
+                wheels: Some(wheel_frames::receiver()),
+                ..Config::DEFAULT
+            }),
+            monitor: Monitor::new(&Config::DEFAULT.can),
+            starts: [
+                0u32.wrapping_sub(half.wrapping_mul(TICKS)),
+                0u32.wrapping_sub(micros),
+                0u32.wrapping_sub(micros),
+            ],
+            statuses: [0; 3],
+            yaw: None,
+            turned: 0.0,
+            clock_error_us: 0,
+            gyro_clock_error_us: 0,
+            gyro_lost: 0,
+        }
+    }
+
+    fn sample(&mut self, k: u32, sample: &Sample, network: &mut impl WindowNetwork) {
+        let message = MtData2 {
+            packet_counter: Some(k as u16),
+            sample_time_fine: Some(self.starts[0].wrapping_add(k.wrapping_mul(TICKS))),
+            acceleration: Some(sample.specific_force.map(|force| force as f32)),
+            rate_of_turn: Some(sample.angular_rate.map(|rate| rate as f32)),
+            temperature: None,
+            status: Some(GOOD),
+        };
+        message.emit().iter().for_each(|byte| self.mti.receive(*byte));
+        let received = self.mti.next_sample().and_then(Result::ok).expect("a message of our own");
+        let sent = u64::from(self.starts[0]) * 100 + u64::from(k) * PERIOD_US;
+        self.clock_error_us = received.time.0 as i64 - sent as i64;
+        self.gyro(k, sample);
+
+        let now = Micros(u64::from(self.starts[1]) + u64::from(k) * PERIOD_US + 1_000);
+        let wheels = wheel_frames::frame([Some(3.6 * sample.speed); WHEELS]).expect("four speeds");
+        self.coprocessor.can(&wheels, now).expect("a good wheel frame");
+        let vehicle = self.coprocessor.imu(received, now).expect("a place on the grid").vehicle;
+        if let Some(due) = self.coprocessor.window() {
+            let estimate = network.estimate(&due.features);
+            self.coprocessor.deliver(due.end, estimate).expect("the window that is due");
+        }
+        match vehicle.prompt.status {
+            Status::Init => self.statuses[0] += 1,
+            Status::Degraded => self.statuses[1] += 1,
+            Status::Ready => self.statuses[2] += 1,
+            // Counted by the sensor monitor.
+            _ => {}
+        }
+        while let Some(sent) = self.coprocessor.next_frame() {
+            let line = emit_stamped(&sent.frame, sent.time).expect("a data frame");
+            let line = std::str::from_utf8(&line).expect("ASCII").trim_end();
+            self.monitor.take_line(line, 0.0);
+        }
+        let yaw = vehicle.navigation.yaw;
+        self.yaw = Some((self.yaw.map_or(yaw, |(first, _)| first), yaw));
+        self.turned += sample.reference[2].abs() / f64::from(RATE_HZ);
+    }
+
+    /// The fibre-optic gyro beside it: 100 messages a second with its own 32-bit microseconds.
+    fn gyro(&mut self, k: u32, sample: &Sample) {
+        let time = self.starts[2].wrapping_add(k.wrapping_mul(PERIOD_US as u32));
+        let message = Message {
+            rotation: sample.reference.map(|rate| (rate / f64::from(RATE_HZ)) as f32),
+            acceleration: [0.0; 3],
+            extra: Extra::Timed { time, temperature: 25 },
+            validity: Validity::GYRO,
+            sequence: (k % 128) as u8,
+        };
+        message.emit().iter().for_each(|byte| self.gyro.receive(*byte));
+        while let Some(received) = self.gyro.next_sample() {
+            match received {
+                Ok(received) => {
+                    self.gyro_lost += received.lost;
+                    let sent = u64::from(self.starts[2]) + u64::from(k) * PERIOD_US;
+                    self.gyro_clock_error_us = received.time.0 as i64 - sent as i64;
+                }
+                Err(_) => self.gyro_lost += 1,
+            }
+        }
+    }
+
+    fn finish(self, samples: u32, early: Option<u64>) -> Soak {
+        let wraps = |start: u32, span: u64| ((u64::from(start) + u64::from(samples - 1) * span) >> 32) as u32;
+        let [ticks, board, gyro] = self.starts;
+        let (first, last) = self.yaw.unwrap_or_default();
+        Soak {
+            samples,
+            pipeline: *self.coprocessor.pipeline().counters(),
+            watch: *self.coprocessor.monitor_counters(),
+            receiver: self.monitor.counts,
+            statuses: self.statuses,
+            clock_error_us: self.clock_error_us,
+            gyro_clock_error_us: self.gyro_clock_error_us,
+            gyro_lost: self.gyro_lost,
+            yaw_error_deg: self.monitor.state.yaw.unwrap_or(f64::NAN)
+                - (last.rad() - first.rad()).to_degrees(),
+            turns: self.turned / std::f64::consts::TAU,
+            wraps: [wraps(ticks, TICKS.into()), wraps(board, PERIOD_US), wraps(gyro, PERIOD_US)],
+            memory_kib: early.zip(resident_kib()).map(|(early, late)| [early, late]),
+        }
+    }
+}
+
+impl Soak {
+    /// What is not as it must be; empty when all is.
+    #[must_use]
+    pub fn faults(&self) -> Vec<String> {
+        let samples = u64::from(self.samples);
+        let Counters { missing, misplaced, clock_jumps, late, .. } = self.pipeline;
+        let Counts { foreign, lost, repeated, out_of_sequence, damaged, unreadable, frames } = self.receiver;
+        let MonitorCounters { silences, stuck, .. } = self.watch;
+        let yaw = self.yaw_error_deg.abs() <= YAW_TOLERANCE;
+        let memory = self.memory_kib.is_none_or(|[early, late]| late <= early + 64);
+        let [init, ..] = self.statuses;
+        [
+            ("samples of the pipeline", u64::from(self.pipeline.samples) == samples),
+            ("missing, misplaced or late", [missing, misplaced, clock_jumps, late] == [0; 4]),
+            ("silent or stuck", [silences, stuck] == [0; 2]),
+            ("frames at the receiver", frames == FRAMES * samples),
+            (
+                "loss at the receiver",
+                [foreign, lost, repeated, out_of_sequence, damaged, unreadable] == [0; 6],
+            ),
+            ("initialisation", init < INITIALISED),
+            ("the part's clock", self.clock_error_us == 0),
+            ("the gyro's clock or sequence", (self.gyro_clock_error_us, self.gyro_lost) == (0, 0)),
+            ("yaw at the receiver", yaw),
+            ("memory grows", memory),
+        ]
+        .into_iter()
+        .filter(|(_, holds)| !holds)
+        .map(|(what, _)| what.to_owned())
+        .collect()
+    }
+}
+
+impl fmt::Display for Soak {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let hours = f64::from(self.samples) / f64::from(RATE_HZ) / 3600.0;
+        let Counters { samples, windows, missing, misplaced, clock_jumps, late, .. } = self.pipeline;
+        let Counts { frames, lost, repeated, out_of_sequence, damaged, .. } = self.receiver;
+        let ([init, degraded, ready], [ticks, board, gyro]) = (self.statuses, self.wraps);
+        writeln!(f, "{hours:.2} simulated hours, {:.0} turns of the car", self.turns)?;
+        writeln!(
+            f,
+            "pipeline: {samples} samples, {windows} windows, {missing} missing, {misplaced} misplaced, \
+             {clock_jumps} clock jumps, {late} late"
+        )?;
+        writeln!(f, "status: {init} initialising, {degraded} degraded, {ready} ready")?;
+        writeln!(
+            f,
+            "receiver: {frames} frames, {lost} lost, {repeated} repeated, {out_of_sequence} out of sequence, \
+             {damaged} damaged"
+        )?;
+        writeln!(
+            f,
+            "wraps: 10 kHz ticks {ticks}, board's microseconds {board}, gyro's microseconds {gyro}; clock \
+             errors {} us, {} us",
+            self.clock_error_us, self.gyro_clock_error_us
+        )?;
+        writeln!(f, "yaw at the receiver less the pipeline's: {:.1e} deg", self.yaw_error_deg)?;
+        match self.memory_kib {
+            Some([early, late]) => write!(f, "memory: {early} KiB after a tenth, {late} KiB at the end"),
+            None => write!(f, "memory: not to be told on this system"),
+        }
+    }
+}
+
+/// Resident memory of this process, where the system tells it as Linux does.
+fn resident_kib() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.split_whitespace().next()?.parse().ok()
+}

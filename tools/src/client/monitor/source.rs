@@ -1,0 +1,144 @@
+//! Where frames come from: a serial port, a TCP socket, or a log.
+//!
+//! No read lasts longer than [`WAIT`], so that whoever waits can look at the clock, redraw, or
+//! end.
+
+use super::line::Splitter;
+use crate::client::connection::{ConnectError, Connection, is_silence};
+use gyronet::can::slcan::host::bit_rate_digit;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::time::Duration;
+
+/// Longest wait for bytes.
+pub const WAIT: Duration = Duration::from_millis(100);
+
+/// Why there is no source, or no longer one.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SourceError {
+    /// No line, nor a file.
+    #[error(transparent)]
+    Connect(#[from] ConnectError),
+    /// A file that cannot be opened.
+    #[error("{name}: {source}")]
+    Open {
+        /// As asked for.
+        name: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// It broke while it was read.
+    #[error("{name}: {source}")]
+    Read {
+        /// As asked for.
+        name: String,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// What a read led to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Lines {
+    /// These came; none, when nothing did for [`WAIT`].
+    Some(Vec<String>),
+    /// The log is over, or the other end has closed.
+    End,
+}
+
+enum Kind {
+    Line(Connection),
+    Log(File),
+}
+
+/// An open source.
+pub struct Source {
+    name: String,
+    kind: Kind,
+    splitter: Splitter,
+}
+
+impl fmt::Debug for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Source").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+impl Source {
+    /// A file is a log, `host:port` a socket, all else a serial port, with `baud` bit/s. A line
+    /// is asked to open, as SLCAN adapters want it; ours does not need it.
+    ///
+    /// # Errors
+    /// [`SourceError`].
+    pub fn open(name: &str, baud: u32, bus_bits_per_second: u32) -> Result<Self, SourceError> {
+        let kind = if Path::new(name).is_file() {
+            let open = |source| SourceError::Open { name: name.into(), source };
+            Kind::Log(File::open(name).map_err(open)?)
+        } else {
+            Kind::Line(Connection::open(name, baud, WAIT)?)
+        };
+        let mut source = Self { name: name.into(), kind, splitter: Splitter::default() };
+        let rate = bit_rate_digit(bus_bits_per_second).map(char::from);
+        let rate = rate.map(|digit| format!("S{digit}\r")).unwrap_or_default();
+        // The first CR ends what may be left in the adapter's buffer.
+        source.say(&format!("\rC\r{rate}O\r")).map_err(|error| source.broken(error))?;
+        Ok(source)
+    }
+
+    /// Whether it is a log, whose time stamps are the only clock.
+    #[must_use]
+    pub fn is_log(&self) -> bool {
+        matches!(self.kind, Kind::Log(_))
+    }
+
+    /// What came, after [`WAIT`] at the latest.
+    ///
+    /// # Errors
+    /// [`SourceError::Read`].
+    pub fn read(&mut self) -> Result<Lines, SourceError> {
+        let mut bytes = [0; 4096];
+        let count = match self.kind.read(&mut bytes) {
+            Ok(0) => return Ok(self.last()),
+            Ok(count) => count,
+            Err(error) if is_silence(&error) => 0,
+            Err(error) => return Err(self.broken(error)),
+        };
+        let lines = bytes.iter().take(count).filter_map(|byte| self.splitter.push(*byte));
+        Ok(Lines::Some(lines.collect()))
+    }
+
+    /// A log may end without an end of line.
+    fn last(&mut self) -> Lines {
+        self.splitter.push(b'\n').map_or(Lines::End, |line| Lines::Some(vec![line]))
+    }
+
+    fn say(&mut self, text: &str) -> io::Result<()> {
+        match &mut self.kind {
+            Kind::Line(line) => line.write_all(text.as_bytes()),
+            Kind::Log(_) => Ok(()),
+        }
+    }
+
+    fn broken(&self, source: io::Error) -> SourceError {
+        SourceError::Read { name: self.name.clone(), source }
+    }
+}
+
+impl Drop for Source {
+    fn drop(&mut self) {
+        // An adapter is closed as it was found; one that is gone needs nothing.
+        let _ = self.say("C\r");
+    }
+}
+
+impl Read for Kind {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Line(line) => line.read(bytes),
+            Self::Log(file) => file.read(bytes),
+        }
+    }
+}

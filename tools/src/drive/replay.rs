@@ -1,0 +1,259 @@
+//! A recorded drive through the coprocessor, as the board would run it.
+
+use crate::drive::candump::Log;
+use crate::drive::recording::Recording;
+use crate::drive::wheel_frames::{self, WheelFrames};
+use gyronet::bias::StaticError;
+use gyronet::coprocessor::{Clock, Config, Coprocessor, TimedFrame};
+use gyronet::estimate::{VehicleSample, YawEstimate};
+use gyronet::health::{Counters, Status};
+use gyronet::model::WindowNetwork;
+use gyronet::pipeline::PipelineConfig;
+use gyronet::units::{AngularRate, Micros, Yaw};
+use std::io::{self, Write};
+use std::ops::Range;
+
+/// Why a recording gives no corrected rate.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DriveError {
+    /// The vehicle does not stand still when static initialisation needs it to.
+    #[error("{path}: starts moving: line {line}: {source}")]
+    StartsMoving {
+        /// The recording.
+        path: String,
+        /// The line with which the three seconds were over.
+        line: u64,
+        /// What gave it away.
+        source: StaticError,
+    },
+    /// The recording ends before three seconds without a gap were seen.
+    #[error("{path}: never holds 3 s without a gap, so static initialisation cannot finish")]
+    NeverInitialised {
+        /// The recording.
+        path: String,
+    },
+}
+
+/// The results of one row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Index of the row in the recording.
+    pub row: usize,
+    /// The sample's time stamp.
+    pub time: Micros,
+    /// Everything that was sent with this row.
+    pub vehicle: VehicleSample,
+    /// The navigation rate of this row's sample, which was sent some samples later; `None` before static
+    /// initialisation is over, and for the last samples, whose turn never came.
+    pub navigation: Option<YawEstimate>,
+    /// Gyro less static bias less the best estimate of the network, known some samples later;
+    /// the prompt rate where no such came.
+    pub settled: AngularRate,
+    /// The frames that were sent.
+    pub frames: Vec<TimedFrame>,
+}
+
+/// A drive with its corrected yaw rate.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    /// One for each row that found its place in time.
+    pub steps: Vec<Step>,
+    /// The first step after static initialisation.
+    pub start: usize,
+    /// The gyro's static bias.
+    pub gyro_bias: [AngularRate; 3],
+    /// What the navigation rates still owe at the end.
+    pub owed: Yaw,
+    /// The numbers of events.
+    pub counters: Counters,
+    /// Messages that reported "failed" because a value did not fit its signal.
+    pub out_of_range: u32,
+}
+
+impl Drive {
+    /// Runs a recording; every window's estimate is delivered at once. `tick` is called once
+    /// for each row. `wheels` stand in for the vehicle's bus.
+    ///
+    /// # Errors
+    /// [`DriveError`], when static initialisation does not succeed at its first attempt.
+    pub fn run(
+        recording: &Recording,
+        config: &PipelineConfig,
+        mut wheels: Option<WheelFrames>,
+        network: &mut impl WindowNetwork,
+        mut tick: impl FnMut(),
+    ) -> Result<Self, DriveError> {
+        let mut coprocessor = Coprocessor::new(Config {
+            pipeline: *config,
+            wheels: wheels.as_ref().map(|_| wheel_frames::receiver()),
+            clock: Clock::Sensor,
+            ..Config::DEFAULT
+        });
+        let mut steps: Vec<Step> = Vec::with_capacity(recording.rows.len());
+        let (mut start, mut now) = (None, Micros(0));
+        for (index, row) in recording.rows.iter().enumerate() {
+            tick();
+            let time = row.sample.time;
+            now = now.max(time);
+            if let Some(frame) = wheels.as_mut().and_then(|wheels| wheels.next(row)) {
+                // A speed that no frame can hold is not valid, and counted.
+                let _ = coprocessor.can(&frame, now);
+            }
+            // A row whose time stamp has no place on the grid gives no frame, and is counted.
+            let Ok(observation) = coprocessor.imu(row.sample, now) else { continue };
+            if let Some(source) = observation.refused {
+                let path = recording.path.clone();
+                return Err(DriveError::StartsMoving { path, line: row.line, source });
+            }
+            let frames = std::iter::from_fn(|| coprocessor.next_frame()).collect();
+            if let Some(window) = coprocessor.window() {
+                let estimate = network.estimate(&window.features);
+                coprocessor.deliver(window.end, estimate).expect("the window that is due");
+            }
+            let vehicle = observation.vehicle;
+            if start.is_none() && vehicle.prompt.status != Status::Init {
+                start = Some(steps.len());
+            }
+            let settled = vehicle.prompt.rate;
+            steps.push(Step { row: index, time, vehicle, navigation: None, settled, frames });
+            if vehicle.navigation.status != Status::Init
+                && let Some(step) = earlier(&mut steps, vehicle.navigation.tick)
+            {
+                step.navigation = Some(vehicle.navigation);
+            }
+            if let Some(settled) = observation.settled
+                && let Some(step) = earlier(&mut steps, settled.tick)
+            {
+                step.settled = AngularRate(settled.rate.0.saturating_sub(settled.correction.0));
+            }
+        }
+        let pipeline = coprocessor.pipeline();
+        let gyro_bias = pipeline
+            .gyro_bias()
+            .ok_or_else(|| DriveError::NeverInitialised { path: recording.path.clone() })?;
+        let start = start.unwrap_or(steps.len());
+        let (owed, counters) = (pipeline.owed().navigation, *pipeline.counters());
+        let out_of_range = coprocessor.input_counters().out_of_range;
+        Ok(Self { steps, start, gyro_bias, owed, counters, out_of_range })
+    }
+
+    /// The steps that have a navigation rate: from the end of static initialisation on.
+    #[must_use]
+    pub fn compared(&self) -> Range<usize> {
+        let sent = self.steps[self.start..].iter().take_while(|step| step.navigation.is_some()).count();
+        self.start..self.start + sent
+    }
+
+    /// The navigation rates of those.
+    pub fn navigation(&self) -> impl Iterator<Item = YawEstimate> {
+        self.steps[self.compared()].iter().filter_map(|step| step.navigation)
+    }
+
+    /// Gyro less static bias less the network's best estimate, of those.
+    pub fn settled(&self) -> impl Iterator<Item = AngularRate> {
+        self.steps[self.compared()].iter().map(|step| step.settled)
+    }
+
+    /// The frames of the whole drive.
+    pub fn frames(&self) -> impl Iterator<Item = &TimedFrame> {
+        self.steps.iter().flat_map(|step| &step.frames)
+    }
+
+    /// Writes the frames of the whole drive as a candump log, and returns their number.
+    ///
+    /// # Errors
+    /// The writer's error.
+    pub fn log(&self, out: impl Write) -> io::Result<u64> {
+        let mut log = Log::new(out);
+        for TimedFrame { frame, time } in self.frames() {
+            log.frame(*time, frame)?;
+        }
+        log.finish()
+    }
+
+    /// How many steps had each status.
+    #[must_use]
+    pub fn status_counts(&self) -> [(Status, usize); 4] {
+        [Status::Init, Status::Degraded, Status::Ready, Status::Clipped].map(|status| {
+            (status, self.steps.iter().filter(|step| step.vehicle.prompt.status == status).count())
+        })
+    }
+}
+
+/// The step of a sample, at most a few back.
+fn earlier(steps: &mut [Step], tick: u32) -> Option<&mut Step> {
+    steps.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyronet::model::window::{Features, WINDOW};
+    use gyronet::model::{Estimate, SCALE_MIN};
+    use std::fmt::Write;
+
+    /// Says that the gyro is always off by 100 codes.
+    struct Constant;
+
+    impl WindowNetwork for Constant {
+        fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
+            Estimate { corrections: [AngularRate(100); WINDOW], scale: SCALE_MIN, clamped_inputs: 0 }
+        }
+    }
+
+    fn recording(rows: usize, yaw_rate: impl Fn(usize) -> f64, gap_at: usize) -> Recording {
+        let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
+        for k in 0..rows {
+            let time = 0.01 * (k + usize::from(k >= gap_at)) as f64;
+            // Every axis flickers as a sensor does, with mean zero over three rows: equal readings are stuck ones.
+            let noise = ((k % 3) as f64 - 1.0) / 8_192.0;
+            let yaw_rate = yaw_rate(k) + noise;
+            writeln!(text, "{time:.2},{noise},{noise},{},{noise},{noise},{yaw_rate}", 9.8 + 10.0 * noise)
+                .unwrap();
+        }
+        Recording::parse("a.csv", text.as_bytes()).unwrap()
+    }
+
+    #[test]
+    fn the_first_three_seconds_initialise() {
+        let recording = recording(1_000, |_| 0.01, usize::MAX);
+        let mut ticks = 0;
+        // Nothing ever moves here: zero-rate updates would take the correction back off.
+        let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
+        let drive = Drive::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
+        assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
+        assert_eq!(drive.gyro_bias[2], recording.rows[1].sample.angular_rate[2]);
+        // Two estimates of 100 codes: all samples but the last, which no window has covered.
+        let sent: i64 = drive.navigation().map(|rate| i64::from(rate.rate.0)).sum();
+        assert_eq!((drive.compared(), sent), (300..993, -100 * 693));
+        // Those seven, and the flicker of the last of them.
+        assert_eq!(drive.owed, Yaw(-100 * 7 - (1 << 14)));
+        let [(_, init), (_, degraded), (_, ready), (_, clipped)] = drive.status_counts();
+        assert_eq!((init, clipped), (300, 0));
+        assert_eq!(degraded + ready, 700);
+        assert!(degraded < 20, "{degraded}");
+    }
+
+    #[test]
+    fn a_gap_is_no_error() {
+        let recording = recording(1_000, |_| 0.01, 700);
+        let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
+        assert_eq!((drive.counters.missing, recording.missing), (1, 1));
+    }
+
+    #[test]
+    fn starting_in_a_turn_is_refused() {
+        let recording = recording(1_000, |k| 0.001 * k as f64, usize::MAX);
+        let error = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
+        assert!(matches!(error, DriveError::StartsMoving { line: 301, .. }), "{error:?}");
+        assert!(error.to_string().starts_with("a.csv: starts moving: line 301: "), "{error}");
+    }
+
+    #[test]
+    fn never_three_seconds_whole() {
+        let recording = recording(400, |_| 0.01, 200);
+        let error = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
+        assert_eq!(error, DriveError::NeverInitialised { path: "a.csv".into() });
+    }
+}

@@ -1,0 +1,167 @@
+//! Wheel speeds as the frames of a vehicle's bus: those of a recorded drive, and of any other vehicle.
+
+use crate::drive::recording::{Recording, Row, WHEEL_STANDS};
+use embedded_can::{Frame, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::sample::WHEELS;
+
+/// Radius of a wheel of the recorded car, m.
+pub const RADIUS: f64 = 0.289;
+/// Recorded wheels (front right, rear right, front left, rear left) as places of
+/// [`gyronet::sample::WheelSample::speeds`].
+const PLACES: [usize; WHEELS] = [1, 3, 0, 2];
+const FRONT: [usize; 2] = [0, 2];
+const REAR: [usize; 2] = [1, 3];
+/// Rows from one frame to the next: 20 ms.
+pub const FRAME_ROWS: usize = 2;
+/// Rows after which a wheel without a new rate is silent: 100 ms.
+const SILENT_ROWS: usize = 10;
+
+/// The receiver of these frames, as the image has it.
+///
+/// # Panics
+/// Never: the settings come with the library.
+#[must_use]
+pub fn receiver() -> WheelReceiver {
+    WheelReceiver::new(WheelSettings::TOYOTA).expect("settings that come with the library")
+}
+
+/// The frame of four wheel speeds in km/h (front left, front right, rear left, rear right), in the layout of
+/// [`WheelSettings::TOYOTA`]; `None` where one is not known.
+#[must_use]
+pub fn frame([front_left, front_right, rear_left, rear_right]: [Option<f64>; WHEELS]) -> Option<DataFrame> {
+    let mut data = [0; 8];
+    for (bytes, speed) in data.chunks_exact_mut(2).zip([front_right, front_left, rear_right, rear_left]) {
+        // 0.01 km/h from -67.67.
+        bytes.copy_from_slice(&((libm::round((speed? + 67.67) * 100.0)) as u16).to_be_bytes());
+    }
+    DataFrame::new(StandardId::new(0xAA)?, &data)
+}
+
+/// The wheel frames of one recorded drive.
+#[derive(Debug, Clone)]
+pub struct WheelFrames {
+    /// The recorded wheel that stands for each place: its own, or another where it has none.
+    source: [usize; WHEELS],
+    /// The newest speed of each recorded wheel in km/h, and the row that it came with.
+    newest: [Option<(f64, usize)>; WHEELS],
+    row: usize,
+}
+
+impl WheelFrames {
+    /// Begins before the first row; `None` where the recording has no wheels.
+    #[must_use]
+    pub fn new(recording: &Recording) -> Option<Self> {
+        let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
+        let any = (0..WHEELS).find(recorded)?;
+        let mut source = [any; WHEELS];
+        for (wheel, place) in PLACES.iter().enumerate() {
+            let axle = if FRONT.contains(&wheel) { FRONT } else { REAR };
+            let own = [wheel, axle[0], axle[1]].into_iter().find(recorded);
+            source[*place] = own.unwrap_or(any);
+        }
+        Some(Self { source, newest: [None; WHEELS], row: 0 })
+    }
+
+    /// Takes a row, and returns the speed of each wheel in km/h as it is known then. A wheel that is too slow to tell from a
+    /// standing one shows zero, as passive sensors do.
+    pub fn speeds(&mut self, row: &Row) -> [Option<f64>; WHEELS] {
+        for (newest, rate) in self.newest.iter_mut().zip(row.wheels) {
+            let shown = |rate: f64| if rate.abs() > WHEEL_STANDS { rate.abs() } else { 0.0 };
+            *newest = rate.map(|rate| (shown(rate) * RADIUS * 3.6, self.row)).or(*newest);
+        }
+        let now = self.row;
+        self.row += 1;
+        self.source
+            .map(|wheel| self.newest[wheel].filter(|(_, at)| now - at < SILENT_ROWS).map(|(speed, _)| speed))
+    }
+
+    /// Takes a row, and returns the frame that comes with it: with every [`FRAME_ROWS`]th, where all wheels are known.
+    pub fn next(&mut self, row: &Row) -> Option<DataFrame> {
+        let is_due = self.row.is_multiple_of(FRAME_ROWS);
+        let speeds = self.speeds(row);
+        frame(speeds).filter(|_| is_due)
+    }
+}
+
+/// Speed of the vehicle at each row of a recording, for dead reckoning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Speeds {
+    /// Wheels that it is the mean of.
+    pub wheels: usize,
+    /// At each row, m/s, forward positive; a wheel's last known rate holds on.
+    pub metre_per_sec: Vec<f64>,
+}
+
+impl Speeds {
+    /// The mean of the rear wheels, which do not steer; of the front ones where no other is recorded. `None`
+    /// where the recording has no wheels.
+    #[must_use]
+    pub fn new(recording: &Recording) -> Option<Self> {
+        let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
+        let axle = |axle: [usize; 2]| axle.into_iter().filter(recorded).collect::<Vec<usize>>();
+        let wheels = [REAR, FRONT].map(axle).into_iter().find(|wheels| !wheels.is_empty())?;
+        let mut last = [0.0; WHEELS];
+        let speed = |row: &Row| {
+            for wheel in &wheels {
+                last[*wheel] = row.wheels[*wheel].unwrap_or(last[*wheel]);
+            }
+            RADIUS * wheels.iter().map(|wheel| last[*wheel]).sum::<f64>() / wheels.len() as f64
+        };
+        let metre_per_sec = recording.rows.iter().map(speed).collect();
+        Some(Self { wheels: wheels.len(), metre_per_sec })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyronet::sample::Standstill;
+
+    fn standstills(wheel2: impl Fn(usize) -> String) -> Vec<Standstill> {
+        let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel1_rate,wheel2_rate\n");
+        for k in 0..500 {
+            text += &format!("{:.2},0,0,9.8,0,0,0,0.04,{}\n", 0.01 * k as f64, wheel2(k));
+        }
+        let recording = Recording::parse("a.csv", text.as_bytes()).unwrap();
+        let (mut frames, mut receiver) = (WheelFrames::new(&recording).unwrap(), receiver());
+        let known = recording.rows.iter().map(|row| {
+            let now = row.sample.time;
+            if let Some(frame) = frames.next(row) {
+                receiver.decode(&frame, now).unwrap().unwrap();
+            }
+            receiver.poll(now).map_or(Standstill::Unknown, |wheels| wheels.standstill)
+        });
+        known.collect()
+    }
+
+    #[test]
+    fn still_after_half_a_second_until_one_wheel_turns() {
+        let seen = standstills(|k| if k < 400 { "-0.2" } else { "0.4" }.into());
+        assert!(seen[..50].iter().all(|s| *s == Standstill::Unknown));
+        assert!(seen[50..400].iter().all(|s| *s == Standstill::Still));
+        assert!(seen[400..].iter().all(|s| *s == Standstill::Moving));
+    }
+
+    #[test]
+    fn the_rear_wheels_give_the_speed() {
+        let text = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel1_rate,wheel2_rate,wheel4_rate\n".to_owned();
+        let row = |k: usize| {
+            let (one, two, four) =
+                if k < 400 { ("0", "0", "0") } else { ("9", "2", if k == 400 { "4" } else { "" }) };
+            format!("{:.2},0,0,9.8,0,0,0,{one},{two},{four}\n", 0.01 * k as f64)
+        };
+        let text = (0..402).map(row).fold(text, |text, row| text + &row);
+        let speeds = Speeds::new(&Recording::parse("a.csv", text.as_bytes()).unwrap()).unwrap();
+        assert_eq!((speeds.wheels, speeds.metre_per_sec[399]), (2, 0.0));
+        assert_eq!(speeds.metre_per_sec[400..], [3.0 * RADIUS; 2]);
+    }
+
+    #[test]
+    fn a_silent_wheel_is_not_still() {
+        let seen = standstills(|k| if k < 400 { "0" } else { "" }.into());
+        // The last frame comes 0.1 s after the wheel's last rate, and is good for 0.1 s itself.
+        assert_eq!((seen[399], seen[425]), (Standstill::Still, Standstill::Unknown));
+    }
+}

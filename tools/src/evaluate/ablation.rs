@@ -1,0 +1,209 @@
+//! What each part of the compensation is worth: the navigation rate of one configuration after
+//! another, all of which the board can run.
+
+use crate::drive::recording::Recording;
+use crate::drive::replay::{Drive, DriveError};
+use crate::drive::wheel_frames::{self, WheelFrames};
+use crate::evaluate::methods::with_mode;
+use crate::evaluate::metrics::{WINDOW, YawError};
+use gyronet::compensate::{CompensateConfig, Lag, Mode};
+use gyronet::estimate::YawEstimate;
+use gyronet::model::window::Features;
+use gyronet::model::{Estimate, WindowNetwork};
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::Standstill;
+use gyronet::units::AngularRate;
+use serde::Serialize;
+
+/// One configuration and what it is called.
+#[derive(Debug, Clone)]
+pub struct Variant {
+    /// For people.
+    pub name: String,
+    /// What runs.
+    pub config: PipelineConfig,
+    /// Whether windows go through the network; else its corrections are zero.
+    pub network: bool,
+    /// Whether the vehicle's bus has wheel speeds.
+    pub wheels: bool,
+}
+
+impl Variant {
+    fn new(name: impl Into<String>, config: PipelineConfig) -> Self {
+        Self { name: name.into(), config, network: true, wheels: true }
+    }
+}
+
+/// No network: nothing is corrected.
+struct Nothing;
+
+impl WindowNetwork for Nothing {
+    fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
+        let corrections = [AngularRate::ZERO; gyronet::model::window::WINDOW];
+        // 1e-3 rad/s: with it a second's sigma is that of an uncorrected rate.
+        Estimate { corrections, scale: AngularRate(134_218), clamped_inputs: 0 }
+    }
+}
+
+/// Part by part.
+#[must_use]
+pub fn parts() -> Vec<Variant> {
+    let alone = |config| PipelineConfig { zero_rate: None, ..config };
+    let overlap = CompensateConfig::DEFAULT.mode;
+    let lag = |config: PipelineConfig, lag| {
+        let compensate = CompensateConfig { lag, ..config.compensate };
+        PipelineConfig { compensate, ..config }
+    };
+    vec![
+        Variant { network: false, ..Variant::new("static initialisation", alone(PipelineConfig::DEFAULT)) },
+        Variant { network: false, ..Variant::new("+ zero-rate updates", PipelineConfig::DEFAULT) },
+        Variant::new("newest, settled", alone(lag(with_mode(Mode::Newest), Lag::MAX))),
+        Variant::new("middle, settled", alone(lag(with_mode(Mode::Middle), Lag::MAX))),
+        Variant::new("overlap, at once", alone(lag(with_mode(overlap), Lag::NONE))),
+        Variant::new("overlap, settled", alone(lag(with_mode(overlap), Lag::MAX))),
+        Variant::new("overlap, default lag", alone(PipelineConfig::DEFAULT)),
+        Variant { wheels: false, ..Variant::new("+ updates, no wheels", PipelineConfig::DEFAULT) },
+        Variant::new("+ zero-rate updates", PipelineConfig::DEFAULT),
+    ]
+}
+
+/// The default at every lag.
+#[must_use]
+pub fn lags() -> Vec<Variant> {
+    (0..)
+        .map_while(Lag::new)
+        .map(|lag| {
+            let compensate = CompensateConfig { lag, ..CompensateConfig::DEFAULT };
+            let config = PipelineConfig { compensate, ..PipelineConfig::DEFAULT };
+            Variant::new(format!("lag {} ms", 10 * lag.samples()), config)
+        })
+        .collect()
+}
+
+/// How one variant did, on one drive or as a mean.
+#[derive(Debug, Clone, Serialize)]
+pub struct Score {
+    /// The variant's name.
+    pub name: String,
+    /// Its yaw error.
+    #[serde(flatten)]
+    pub error: YawError,
+    /// RMS error of a sample, rad/s.
+    pub rms_rad_per_s: f64,
+    /// Shares of the 1 s errors inside one, two and three sigma.
+    pub inside_sigma: [f64; 3],
+    /// Mean sigma of a second, rad.
+    pub sigma_rad: f64,
+}
+
+/// What the reference shows in whole seconds in which the wheels stand: nothing can be told
+/// from it that is smaller.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Floor {
+    /// Whole seconds.
+    pub seconds: usize,
+    /// Mean absolute yaw change of one, rad.
+    pub mean_1s_rad: f64,
+    /// Mean rate over all, rad/s.
+    pub bias_rad_per_s: f64,
+}
+
+/// Runs variants over one drive.
+///
+/// # Errors
+/// [`DriveError`].
+pub fn run(
+    recording: &Recording,
+    network: &mut impl WindowNetwork,
+    variants: &[Variant],
+    mut tick: impl FnMut(),
+) -> Result<Vec<Score>, DriveError> {
+    variants
+        .iter()
+        .filter_map(|Variant { name, config, network: with_network, wheels }| {
+            let wheels = wheels.then(|| WheelFrames::new(recording)).flatten();
+            let drive = if *with_network {
+                Drive::run(recording, config, wheels, network, &mut tick)
+            } else {
+                Drive::run(recording, config, wheels, &mut Nothing, &mut tick)
+            };
+            let drive = match drive {
+                Ok(drive) => drive,
+                Err(error) => return Some(Err(error)),
+            };
+            let compared = drive.steps[drive.compared()].iter();
+            let reference: Vec<f64> =
+                compared.map(|step| recording.rows[step.row].reference).collect::<Option<_>>()?;
+            Some(Ok(score(name, &drive.navigation().collect::<Vec<_>>(), &reference)?))
+        })
+        .collect()
+}
+
+/// Means over drives, each counting the same; `None` of no drive.
+#[must_use]
+pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
+    let first = drives.first()?;
+    let count = drives.len() as f64;
+    let of = |k: usize| {
+        let scores: Vec<&Score> = drives.iter().filter_map(|drive| drive.get(k)).collect();
+        let mean =
+            |value: &dyn Fn(&Score) -> f64| scores.iter().map(|score| value(score)).sum::<f64>() / count;
+        Some(Score {
+            name: first[k].name.clone(),
+            error: YawError::mean(&scores.iter().map(|score| score.error).collect::<Vec<_>>())?,
+            rms_rad_per_s: mean(&|score| score.rms_rad_per_s),
+            inside_sigma: std::array::from_fn(|n| mean(&|score| score.inside_sigma[n])),
+            sigma_rad: mean(&|score| score.sigma_rad),
+        })
+    };
+    (0..first.len()).map(of).collect()
+}
+
+/// The reference while the wheels stand; `None` without wheels, or where they never do.
+#[must_use]
+pub fn floor(recording: &Recording) -> Option<Floor> {
+    let (mut frames, mut receiver) = (WheelFrames::new(recording)?, wheel_frames::receiver());
+    let still = recording.rows.iter().map(|row| {
+        let now = row.sample.time;
+        if let Some(frame) = frames.next(row) {
+            let _ = receiver.decode(&frame, now);
+        }
+        let stands = receiver.poll(now).is_some_and(|wheels| wheels.standstill == Standstill::Still);
+        row.reference.filter(|_| stands)
+    });
+    let still: Vec<Option<f64>> = still.collect();
+    let whole =
+        still.chunks_exact(WINDOW).filter_map(|second| second.iter().copied().collect::<Option<Vec<_>>>());
+    let means: Vec<f64> = whole.map(|second| second.iter().sum::<f64>() / WINDOW as f64).collect();
+    let count = (!means.is_empty()).then_some(means.len() as f64)?;
+    Some(Floor {
+        seconds: means.len(),
+        mean_1s_rad: means.iter().map(|mean| mean.abs()).sum::<f64>() / count,
+        bias_rad_per_s: means.iter().sum::<f64>() / count,
+    })
+}
+
+fn score(name: &str, rates: &[YawEstimate], reference: &[f64]) -> Option<Score> {
+    let rate: Vec<f64> = rates.iter().map(|rate| rate.rate.rad_per_sec()).collect();
+    let error = YawError::new(&rate, reference)?;
+    let errors: Vec<f64> = rate.iter().zip(reference).map(|(rate, truth)| rate - truth).collect();
+    let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+    let (mut inside, mut sigmas, mut seconds) = ([0.0; 3], 0.0, 0.0);
+    for (errors, rates) in errors.chunks_exact(WINDOW).zip(rates.chunks_exact(WINDOW)) {
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / WINDOW as f64;
+        let error = mean(&mut errors.iter().copied()).abs();
+        let sigma = mean(&mut rates.iter().filter_map(|rate| rate.sigma).map(|sigma| sigma.rad_per_sec()));
+        for (n, inside) in (1..).zip(&mut inside) {
+            *inside += f64::from(u8::from(error <= f64::from(n) * sigma));
+        }
+        sigmas += sigma;
+        seconds += 1.0;
+    }
+    Some(Score {
+        name: name.to_owned(),
+        error,
+        rms_rad_per_s: rms,
+        inside_sigma: inside.map(|count| count / seconds),
+        sigma_rad: sigmas / seconds,
+    })
+}

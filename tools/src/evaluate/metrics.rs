@@ -1,0 +1,116 @@
+//! How far a yaw rate leads a heading astray: the two numbers of the paper's Table I.
+
+use crate::drive::DT;
+use gyronet::sample::RATE_HZ;
+use serde::Serialize;
+use std::f64::consts::{PI, TAU};
+
+/// Samples of one window of [`YawError::mean_1s_rad`].
+pub const WINDOW: usize = RATE_HZ as usize;
+
+/// Yaw error of one method on one drive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct YawError {
+    /// Mean over consecutive 1 s windows, none overlapping another, of the absolute error of
+    /// the yaw change. An incomplete last window does not count.
+    pub mean_1s_rad: f64,
+    /// Absolute error of the yaw at the end, wrapped to at most pi.
+    pub final_rad: f64,
+    /// The same, not wrapped.
+    pub final_unwrapped_rad: f64,
+}
+
+impl YawError {
+    /// Compares a yaw rate with the true one, sample by sample, both in rad/s.
+    ///
+    /// `None` where there is not one whole window, or the two differ in length.
+    #[must_use]
+    pub fn new(estimate: &[f64], reference: &[f64]) -> Option<Self> {
+        if estimate.len() != reference.len() || estimate.len() < WINDOW {
+            return None;
+        }
+        let error: Vec<f64> = estimate.iter().zip(reference).map(|(e, r)| (e - r) * DT).collect();
+        let windows = error.chunks_exact(WINDOW);
+        let count = windows.len() as f64;
+        let mean_1s_rad = windows.map(|window| window.iter().sum::<f64>().abs()).sum::<f64>() / count;
+        let unwrapped: f64 = error.iter().sum();
+        Some(Self { mean_1s_rad, final_rad: wrap(unwrapped).abs(), final_unwrapped_rad: unwrapped.abs() })
+    }
+
+    /// Mean of each number over several drives; `None` of no drive.
+    #[must_use]
+    pub fn mean(errors: &[Self]) -> Option<Self> {
+        let count = (!errors.is_empty()).then_some(errors.len() as f64)?;
+        let mean = |of: fn(&Self) -> f64| errors.iter().map(of).sum::<f64>() / count;
+        Some(Self {
+            mean_1s_rad: mean(|error| error.mean_1s_rad),
+            final_rad: mean(|error| error.final_rad),
+            final_unwrapped_rad: mean(|error| error.final_unwrapped_rad),
+        })
+    }
+}
+
+/// Returns the angle after each sample of a rate, rad.
+#[must_use]
+pub fn integral(rates: &[f64]) -> Vec<f64> {
+    let step = |angle: &mut f64, rate: &f64| {
+        *angle += rate * DT;
+        Some(*angle)
+    };
+    rates.iter().scan(0.0, step).collect()
+}
+
+/// The same angle within -pi to pi.
+pub(crate) fn wrap(angle: f64) -> f64 {
+    (angle + PI).rem_euclid(TAU) - PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+    }
+
+    #[test]
+    fn opposite_errors_cancel_in_the_end_but_not_in_the_mean() {
+        // +0.02 rad/s for one second, -0.01 for another, then half a second of 0.04.
+        let estimate: Vec<f64> = (0..250)
+            .map(|k| {
+                0.3 + if k < 100 {
+                    0.02
+                } else if k < 200 {
+                    -0.01
+                } else {
+                    0.04
+                }
+            })
+            .collect();
+        let error = YawError::new(&estimate, &vec![0.3; 250]).unwrap();
+        close(error.mean_1s_rad, 0.015);
+        close(error.final_rad, 0.02 - 0.01 + 0.02);
+        close(error.final_unwrapped_rad, error.final_rad);
+    }
+
+    #[test]
+    fn the_final_error_wraps() {
+        let error = YawError::new(&[-2.0; 300], &[0.0; 300]).unwrap();
+        close(error.final_unwrapped_rad, 6.0);
+        close(error.final_rad, TAU - 6.0);
+        close(error.mean_1s_rad, 2.0);
+    }
+
+    #[test]
+    fn less_than_a_window_is_nothing() {
+        assert_eq!(YawError::new(&[0.0; 99], &[0.0; 99]), None);
+        assert_eq!(YawError::new(&[0.0; 100], &[0.0; 101]), None);
+    }
+
+    #[test]
+    fn mean_of_drives() {
+        let drive = |x| YawError { mean_1s_rad: x, final_rad: 2.0 * x, final_unwrapped_rad: 3.0 * x };
+        assert_eq!(YawError::mean(&[drive(1.0), drive(3.0)]), Some(drive(2.0)));
+        assert_eq!(YawError::mean(&[]), None);
+    }
+}

@@ -1,0 +1,166 @@
+//! f32 checkpoint to weight file: int8 rows, packed in the order in which the kernels read.
+//!
+//! A gate row gets one scale, chosen so that its largest weight becomes at most 127 and its
+//! multiplier is a whole number: the scale itself is then exact. Rows that share a halfword as
+//! the high part must not sum to more than 2^23 for any input ([`gyronet::nn`]); where the
+//! largest-weight scale would allow that, the scale is raised until it does not.
+
+pub mod fognet;
+mod rows;
+
+use crate::network::checkpoint::Checkpoint;
+use crate::network::tensors::Tensors;
+use gyronet::model::blob::{self, Blob, HIDDEN, Topology};
+use gyronet::model::window::WINDOW;
+use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2};
+use gyronet::units::{AngularRate, SpecificForce};
+use serde_json::json;
+
+/// Network inputs are clamped to this many standard deviations; `gyronet quantize --drives` says
+/// how many that hits.
+pub const INPUT_CLAMP_STD: f64 = 24.0;
+
+/// Why a checkpoint cannot be quantised.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum QuantizeError {
+    /// A row's weights are beyond +-3.96, the largest that int8 and a 16-bit multiplier hold.
+    #[error("layer {layer} row {row}: weight {weight} is too large for the int8 format (limit 3.96)")]
+    WeightTooLarge {
+        /// 1 or 2; FoGNet's LSTM2 has 3 and 4.
+        layer: usize,
+        /// PyTorch's row: gate x units + unit.
+        row: usize,
+        /// The largest weight.
+        weight: f64,
+    },
+    /// A normalisation constant does not fit its fixed-point field.
+    #[error("{what} {value} does not fit its fixed-point field")]
+    Constant {
+        /// Which one.
+        what: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The result does not pass the library's own checks.
+    #[error(transparent)]
+    Blob(#[from] blob::BlobError),
+}
+
+/// What quantisation did.
+#[derive(Debug, Clone, Default)]
+pub struct Report {
+    /// Rows in all.
+    pub rows: usize,
+    /// Rows whose scale was raised to keep their sum inside 24 bits.
+    pub raised: usize,
+    /// Largest factor by which one was raised.
+    pub largest_raise: f64,
+    /// Bytes of the file.
+    pub bytes: usize,
+}
+
+impl Report {
+    fn new() -> Self {
+        Self { largest_raise: 1.0, ..Self::default() }
+    }
+}
+
+/// Makes GyroNet's weight file.
+///
+/// # Errors
+/// [`QuantizeError`].
+pub fn quantize(checkpoint: &Checkpoint) -> Result<(Vec<u8>, Report), QuantizeError> {
+    let mut report = Report::new();
+    let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;
+    let mut body = Vec::new();
+    for (layer, input_max) in [(1, clamp), (2, HIDDEN_MAX)] {
+        for backward in [false, true] {
+            rows::direction(
+                &mut body,
+                &checkpoint.direction(layer, backward),
+                layer,
+                input_max,
+                &mut report,
+            )?;
+        }
+    }
+    let tensors = checkpoint.tensors();
+    output(&mut body, tensors)?;
+    let provenance = provenance(tensors);
+    let force = f64::from(SpecificForce::PER_METRE_PER_SEC2);
+    let rate = f64::from(AngularRate::PER_RAD_PER_SEC);
+    let codes = [force, force, force, rate, rate, rate];
+    let lengths = (blob::file_len(provenance.len()), provenance.len());
+    let mut file = header(tensors, blob::TOPOLOGY, lengths, clamp, &codes)?;
+    file.extend(provenance);
+    file.extend(body);
+    let words = seal(&mut file);
+    report.bytes = file.len();
+    // The file must pass the very checks that the firmware makes.
+    Blob::new_checked(bytemuck::cast_slice(&words))?;
+    Ok((file, report))
+}
+
+/// Both rows of the output layer.
+fn output(out: &mut Vec<u8>, tensors: &Tensors) -> Result<(), QuantizeError> {
+    let (error, log_scale) = tensors.tensor("fc.weight").split_at(2 * HIDDEN);
+    let bias = tensors.tensor("fc.bias");
+    let unit = f64::from(tensors.tensor("output_scale")[0]) * f64::from(AngularRate::PER_RAD_PER_SEC);
+    rows::dense(out, "gyro error", (error, bias[0]), (unit, Dense::SHIFT))?;
+    // The sum over the window is the mean of the logs.
+    let log2 = f64::from(1 << exp2::FRACTION_BITS) * std::f64::consts::LOG2_E / WINDOW as f64;
+    rows::dense(out, "log of the scale", (log_scale, bias[1]), (log2, Dense::SHIFT))?;
+    out.extend(fixed("output scale", unit)?.to_le_bytes());
+    Ok(())
+}
+
+/// The header that all networks have; `codes` of a feature make its unit.
+fn header(
+    tensors: &Tensors,
+    [network, shape @ ..]: Topology,
+    (file_len, provenance_len): (usize, usize),
+    clamp: i32,
+    codes: &[f64],
+) -> Result<Vec<u8>, QuantizeError> {
+    let mut out = blob::MAGIC.to_vec();
+    out.extend(blob::VERSION.to_le_bytes());
+    out.extend(network.to_le_bytes());
+    out.extend((file_len as u32).to_le_bytes());
+    shape.iter().for_each(|number| out.extend(number.to_le_bytes()));
+    out.extend((provenance_len as u32).to_le_bytes());
+    out.extend(clamp.to_le_bytes());
+    let constants = tensors.tensor("input_mean").iter().zip(tensors.tensor("input_std"));
+    for ((mean, std), codes) in constants.zip(codes) {
+        out.extend(fixed("input mean", f64::from(*mean) * codes)?.to_le_bytes());
+        let multiplier = f64::from(HIDDEN_MAX) / (f64::from(*std) * codes) * f64::from(1u32 << 31);
+        out.extend(fixed("input standard deviation", multiplier)?.to_le_bytes());
+    }
+    Ok(out)
+}
+
+/// Puts the checksum behind a file; returns it in whole words, as the library reads it.
+fn seal(file: &mut Vec<u8>) -> Vec<u32> {
+    let crc = blob::CRC.checksum(file);
+    file.extend(crc.to_le_bytes());
+    file.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
+}
+
+/// Rounds to int32; refuses what does not fit.
+fn fixed(what: &str, value: f64) -> Result<i32, QuantizeError> {
+    let code = value.round();
+    if code.is_finite() && code.abs() < f64::from(i32::MAX) {
+        Ok(code as i32)
+    } else {
+        Err(QuantizeError::Constant { what: what.to_owned(), value })
+    }
+}
+
+/// Training's provenance and the checkpoint's hash, padded to whole words.
+fn provenance(tensors: &Tensors) -> Vec<u8> {
+    let training = serde_json::from_str(&tensors.provenance).unwrap_or(serde_json::Value::Null);
+    let mut text = json!({ "checkpoint_sha256": tensors.sha256, "training": training }).to_string();
+    while !text.len().is_multiple_of(4) {
+        text.push(' ');
+    }
+    text.into_bytes()
+}

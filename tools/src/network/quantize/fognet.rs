@@ -1,0 +1,72 @@
+//! FoGNet's weight file. What is linear in the gyro's increments is multiplied out in f64 and
+//! stays exact ([`gyronet::model::fognet`]); the LSTMs and their rows are quantised as GyroNet's.
+
+use super::{QuantizeError, Report, fixed, header, provenance, rows, seal};
+use crate::network::fog_checkpoint::FogCheckpoint;
+use gyronet::model::fognet::GAIN_FRACTION_BITS;
+use gyronet::model::fognet_blob::{self, CORRECTION_SHIFT, FogBlob, INPUTS};
+use gyronet::nn::{HIDDEN_MAX, dense::Dense};
+use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
+
+/// Network inputs are clamped to this many standard deviations: means over a second leave fewer
+/// outliers than single samples do, and smaller limits leave more room in the accumulators.
+pub const INPUT_CLAMP_STD: f64 = 16.0;
+
+/// Makes FoGNet's weight file.
+///
+/// # Errors
+/// [`QuantizeError`].
+pub fn quantize(checkpoint: &FogCheckpoint) -> Result<(Vec<u8>, Report), QuantizeError> {
+    let mut report = Report::new();
+    let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;
+    let tensors = checkpoint.tensors();
+    let scalar = |name| f64::from(tensors.tensor(name)[0]);
+    let scale = scalar("correction_scale");
+    let [of_f2, of_f3] = [0, 1].map(|k| scale * f64::from(tensors.tensor("fc4.weight")[k]));
+
+    let mut body = Vec::new();
+    let mut lstm = |body: &mut Vec<u8>, name: &str, first: usize| {
+        for (layer, input_max) in [(0, clamp), (1, HIDDEN_MAX)] {
+            for backward in [false, true] {
+                let weights = tensors.direction(name, layer, backward);
+                rows::direction(body, &weights, first + layer, input_max, &mut report)?;
+            }
+        }
+        Ok::<(), QuantizeError>(())
+    };
+    lstm(&mut body, "lstm1", 1)?;
+    let f1 = (tensors.tensor("fc1.weight"), tensors.tensor("fc1.bias")[0]);
+    rows::dense(&mut body, "FC1", f1, (f64::from(HIDDEN_MAX), Dense::SHIFT))?;
+    lstm(&mut body, "lstm2", 3)?;
+    // Its bias is in the offset.
+    let f2 = (tensors.tensor("fc2.weight"), 0.0);
+    rows::dense(&mut body, "FC2", f2, (of_f2 * f64::from(Angle::PER_RAD), CORRECTION_SHIFT))?;
+
+    let provenance = provenance(tensors);
+    let lengths = (fognet_blob::file_len(provenance.len()), provenance.len());
+    let force = f64::from(SpecificForce::PER_METRE_PER_SEC2);
+    let rate = f64::from(AngularRate::PER_RAD_PER_SEC);
+    let way = f64::from(1u32 << WheelSpeed::FRACTION_BITS);
+    // The gyro's increment is a turn in one second.
+    let codes: [f64; INPUTS] = [force, force, force, rate, rate, rate, way, way, rate];
+    let mut file = header(tensors, fognet_blob::TOPOLOGY, lengths, clamp, &codes)?;
+
+    let gyro = |name: &str| f64::from(tensors.tensor(name)[INPUTS - 1]);
+    let mut of_mean = 0.0;
+    for weight in tensors.tensor("fc3.weight") {
+        let gain = of_f3 * f64::from(*weight) / gyro("input_std");
+        of_mean += gain * gyro("input_mean");
+        file.extend(fixed("gain", gain * f64::from(1u32 << GAIN_FRACTION_BITS))?.to_le_bytes());
+    }
+    let offset =
+        of_f2 * scalar("fc2.bias") + of_f3 * scalar("fc3.bias") + scale * scalar("fc4.bias") - of_mean;
+    let offset = Angle::from_rad(offset as f32)
+        .map_err(|_| QuantizeError::Constant { what: "offset".to_owned(), value: offset })?;
+    file.extend(offset.0.to_le_bytes());
+    file.extend(provenance);
+    file.extend(body);
+    let words = seal(&mut file);
+    report.bytes = file.len();
+    FogBlob::new_checked(bytemuck::cast_slice(&words))?;
+    Ok((file, report))
+}

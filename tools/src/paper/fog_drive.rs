@@ -1,0 +1,162 @@
+//! A sequence through FoGNet: what the board would send, from the gyro's increments on.
+
+use crate::paper::sequence::{Sequence, Step};
+use gyronet::fog::seconds::FogFrame;
+use gyronet::fog::{FogConfig, FogCorrector, PseudoFog};
+use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::window::Features;
+use gyronet::sample::RATE_HZ;
+use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
+
+/// Steps of static initialisation: 3 s.
+const STATIC_STEPS: usize = 300;
+
+/// What became of a sequence.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FogDrive {
+    /// Corrected turn of each step, rad; where the gyro has a gap, none.
+    pub turns: Vec<f64>,
+    /// Steps with a correction.
+    pub corrected: u64,
+    /// Windows run.
+    pub windows: u64,
+    /// Input values that were clamped.
+    pub clamped_inputs: u64,
+    /// Estimates that were not believed.
+    pub implausible: u64,
+    /// Windows that a gap ended.
+    pub broken: u64,
+}
+
+/// Runs a sequence; `tick` is called for each step.
+pub fn run(
+    sequence: &Sequence,
+    network: &mut impl MinuteNetwork,
+    config: FogConfig,
+    tick: impl FnMut(),
+) -> FogDrive {
+    let turns = sequence.steps.iter().map(|step| Some(angle(step.fog))).collect::<Vec<_>>();
+    run_with(sequence, &turns, network, config, tick)
+}
+
+/// The same with a rate in the place of the gyro, rad/s: what GyroNet has made of a MEMS gyro,
+/// say (the paper's future work). A rate that no part can measure is a gap.
+pub fn run_pseudo(
+    sequence: &Sequence,
+    rates: &[f64],
+    network: &mut impl MinuteNetwork,
+    config: FogConfig,
+    tick: impl FnMut(),
+) -> FogDrive {
+    let mut pseudo = PseudoFog::default();
+    let turn = |rate: &f64| AngularRate::from_rad_per_sec(*rate as f32).ok().map(|rate| pseudo.turn(rate));
+    let turns = rates.iter().map(turn).collect::<Vec<_>>();
+    run_with(sequence, &turns, network, config, tick)
+}
+
+fn run_with(
+    sequence: &Sequence,
+    turns: &[Option<Angle>],
+    network: &mut impl MinuteNetwork,
+    config: FogConfig,
+    mut tick: impl FnMut(),
+) -> FogDrive {
+    let inertial = features(sequence);
+    let mut corrector = FogCorrector::new(config);
+    let mut drive = FogDrive::default();
+    for ((step, turn), inertial) in sequence.steps.iter().zip(turns).zip(inertial) {
+        let wheels = step.wheels.map(|way| {
+            let speed = way * f64::from(RATE_HZ) * f64::from(1u32 << WheelSpeed::FRACTION_BITS);
+            // Saturates: faster than sound.
+            WheelSpeed(speed.round() as i32)
+        });
+        let frame =
+            FogFrame { turn: *turn, inertial: inertial.filter(|_| !step.imu_gap), wheels: Some(wheels) };
+        let output = corrector.correct(&frame);
+        if let (Some(number), Some(window)) = (output.due, corrector.window()) {
+            let estimate = network.estimate(&window);
+            drive.windows += 1;
+            drive.clamped_inputs += u64::from(estimate.clamped_inputs);
+            corrector.deliver(number, estimate);
+        }
+        drive.turns.push(output.turn.map_or(0.0, Angle::rad));
+        drive.corrected += u64::from(output.corrected);
+        drive.implausible += u64::from(output.implausible.is_some());
+        drive.broken += u64::from(output.broken.is_some());
+        tick();
+    }
+    drive
+}
+
+/// The inertial sensor's features of each step, its gyro less its mean over the first 3 s; none
+/// where a reading is one that no part can give.
+fn features(sequence: &Sequence) -> Vec<Option<Features>> {
+    let codes = |step: &Step| {
+        let [fx, fy, fz] = step.specific_force.map(|f| SpecificForce::from_metre_per_sec2(f).ok());
+        let [rx, ry, rz] = step.angular_rate.map(|rate| AngularRate::from_rad_per_sec(rate).ok());
+        Some([fx?.0, fy?.0, fz?.0, rx?.0, ry?.0, rz?.0])
+    };
+    let mut features: Vec<Option<Features>> = sequence.steps.iter().map(codes).collect();
+    let first = || features.iter().take(STATIC_STEPS).flatten();
+    let count = first().count().max(1) as i64;
+    let bias: [i64; 3] = std::array::from_fn(|axis| {
+        first().map(|features| i64::from(features[3 + axis])).sum::<i64>() / count
+    });
+    for features in features.iter_mut().flatten() {
+        for (rate, bias) in features[3..].iter_mut().zip(bias) {
+            *rate = (i64::from(*rate) - bias).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+        }
+    }
+    features
+}
+
+/// Nearest code of an angle in rad; a double's 53 bits are more than the gyro's.
+fn angle(rad: f64) -> Angle {
+    Angle((rad * f64::from(Angle::PER_RAD)).round() as i64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::layout::{self, Layout, Spec};
+    use gyronet::fog::seconds::SecondsWindow;
+    use gyronet::model::fognet::FogEstimate;
+
+    /// Says that a constant bias and nothing else is wrong.
+    struct Bias;
+
+    impl MinuteNetwork for Bias {
+        fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+            assert_eq!(window.iter().count(), 60);
+            FogEstimate { correction: angle(6e-4), linear: Angle::ZERO, gain: 0, clamped_inputs: 0 }
+        }
+    }
+
+    #[test]
+    fn a_rate_in_the_place_of_the_gyro_is_as_good_as_its_increments() {
+        let folder = std::env::temp_dir().join(format!("gyronet-fog-drive-{}", std::process::id()));
+        let spec =
+            Spec { layout: Layout::Kaist, name: String::from("short"), seconds: 40, device: 1, run: 1 };
+        layout::write(&spec, &folder, || {}).unwrap();
+        let sequence = Sequence::read(&folder, |_| {}).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let rates: Vec<f64> = sequence.steps.iter().map(|step| step.fog * 100.0).collect();
+        let fog = run(&sequence, &mut Bias, FogConfig::DEFAULT, || {});
+        let pseudo = run_pseudo(&sequence, &rates, &mut Bias, FogConfig::DEFAULT, || {});
+        assert_eq!(fog.windows, 39);
+        assert_eq!((fog.corrected, fog.windows), (pseudo.corrected, pseudo.windows));
+        let sum = |turns: &[f64]| turns.iter().sum::<f64>();
+        // A rate code for 10 ms is 7e-11 rad, and rounds either way.
+        assert!((sum(&fog.turns) - sum(&pseudo.turns)).abs() < 1e-7);
+        let raw: f64 = sequence.steps.iter().map(|step| step.fog).sum();
+        // 1e-7 rad in each corrected step, whatever the gyro says.
+        let taken = 1e-7 * fog.corrected as f64;
+        assert!((raw - sum(&fog.turns) - taken).abs() < 1e-9, "{} {taken}", raw - sum(&fog.turns));
+        // A rate that no part has is a gap, and ends the window.
+        let mut broken = rates;
+        broken[1_050] = f64::NAN;
+        let broken = run_pseudo(&sequence, &broken, &mut Bias, FogConfig::DEFAULT, || {});
+        assert_eq!(broken.broken, 1);
+        assert!(broken.corrected + 200 <= fog.corrected, "{} {}", broken.corrected, fog.corrected);
+    }
+}

@@ -1,0 +1,313 @@
+//! Sequences of KAIST Complex Urban and NCLT, real or simulated: several files of different
+//! rates made into one drive on a 100 Hz grid.
+//!
+//! Files are read side by side, a row of each at a time: an hour of a 1 kHz gyro needs no more
+//! memory than its 100 Hz steps. The grid begins with the first row of the inertial sensor that
+//! all other files have reached and ends with the file that ends first. In between, values are
+//! on the straight line between neighbouring rows; angles of the gyro and ways of the wheels are
+//! interpolated as sums, so that nothing is lost or counted twice.
+
+mod error;
+mod export;
+mod kaist;
+mod nclt;
+mod rows;
+mod summary;
+mod track;
+
+pub use error::SequenceError;
+pub use export::{HEADER, write_csv};
+pub use summary::{Seen, Spread, StreamSummary};
+
+use crate::drive::DT;
+use crate::drive::recording::{Recording, Row as RecordingRow};
+use crate::simulate::layout::{Layout, MARKER, Spec};
+use gyronet::sample::{ImuSample, PERIOD_US, Validity};
+use gyronet::units::{AngularRate, Micros, SpecificForce};
+use std::cell::Cell;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use track::Stream;
+
+/// A value across a longer time than this is marked, s.
+pub const MAX_GAP: f64 = 0.1;
+/// Least length of a sequence: static initialisation and a second, s.
+const NEEDED: f64 = 4.0;
+
+/// One step of the grid. Axes: x forward, y left, z up; heading counter-clockwise from east.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// m/s^2.
+    pub specific_force: [f32; 3],
+    /// rad/s.
+    pub angular_rate: [f32; 3],
+    /// The inertial sensor was silent around here for longer than [`MAX_GAP`].
+    pub imu_gap: bool,
+    /// What the fibre-optic gyro has turned since the step before, rad.
+    pub fog: f64,
+    /// Way of the left and the right wheel since the step before, m.
+    pub wheels: [f64; 2],
+    /// True position, m from the first step's, east and north.
+    pub position: [f64; 2],
+    /// True heading, not wrapped, rad.
+    pub yaw: f64,
+    /// Heading as the inertial sensor's vendor has it, not wrapped, rad.
+    pub vendor_yaw: f64,
+}
+
+/// A drive on the 100 Hz grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sequence {
+    /// Name of its folder.
+    pub name: String,
+    /// Its folder.
+    pub path: PathBuf,
+    /// Whose layout it has.
+    pub layout: Layout,
+    /// What it was simulated of, if it was.
+    pub simulated: Option<Spec>,
+    /// Whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; they are zero
+    /// otherwise.
+    pub has_gyro: bool,
+    /// Whether [`Step::vendor_yaw`] is a vendor's.
+    pub has_vendor: bool,
+    /// Distance of the wheels, m, where the data say it.
+    pub wheel_base: Option<f64>,
+    /// 10 ms apart.
+    pub steps: Vec<Step>,
+    /// Steps with a gap of the inertial sensor, the gyro, the wheels and the truth.
+    pub in_gap: [u64; 4],
+    /// One for each file: inertial sensor, gyro, wheels, truth.
+    pub files: [StreamSummary; 4],
+}
+
+/// Files of either layout.
+struct Files {
+    imu: Box<dyn Stream<7>>,
+    fog: Box<dyn Stream<1>>,
+    wheels: Box<dyn Stream<2>>,
+    truth: Box<dyn Stream<3>>,
+    has_gyro: bool,
+    has_vendor: bool,
+    wheel_base: Option<f64>,
+}
+
+/// Whose layout a folder has.
+///
+/// # Errors
+/// [`SequenceError::Unknown`], or [`SequenceError::Io`] where there is no folder.
+pub fn layout(folder: &Path) -> Result<Layout, SequenceError> {
+    if folder.join("sensor_data").is_dir() {
+        Ok(Layout::Kaist)
+    } else if folder.join("kvh.csv").is_file() || folder.join("ms25.csv").is_file() {
+        Ok(Layout::Nclt)
+    } else {
+        let path = folder.display().to_string();
+        Err(match fs::metadata(folder) {
+            Ok(_) => SequenceError::Unknown { path },
+            Err(source) => SequenceError::Io { path, source },
+        })
+    }
+}
+
+/// The sequences of a folder: itself, or those right below it, by name.
+///
+/// # Errors
+/// [`SequenceError`]: neither is one.
+pub fn find(folder: &Path) -> Result<Vec<PathBuf>, SequenceError> {
+    if layout(folder).is_ok() {
+        return Ok(vec![folder.to_owned()]);
+    }
+    let path = || folder.display().to_string();
+    let entries = fs::read_dir(folder).map_err(|source| SequenceError::Io { path: path(), source })?;
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|path| layout(path).is_ok())
+        .collect();
+    found.sort();
+    if found.is_empty() { Err(SequenceError::Unknown { path: path() }) } else { Ok(found) }
+}
+
+/// Bytes that reading a sequence will read; 0 of what is not there.
+#[must_use]
+pub fn size(folder: &Path) -> u64 {
+    let mut paths: Vec<PathBuf> = kaist::PATHS.iter().chain(&nclt::PATHS).map(|p| folder.join(p)).collect();
+    paths.extend(nclt::truth(folder));
+    paths.iter().filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum()
+}
+
+impl Sequence {
+    /// Reads a folder. `watch` is told how many bytes have been read, now and then.
+    ///
+    /// # Errors
+    /// [`SequenceError`], which names the file and, where there is one, the line.
+    pub fn read(folder: &Path, mut watch: impl FnMut(u64)) -> Result<Self, SequenceError> {
+        let layout = layout(folder)?;
+        let simulated = marker(folder)?;
+        let progress = Rc::new(Cell::new(0));
+        let mut files = match layout {
+            Layout::Kaist => kaist::open(folder, &progress)?,
+            Layout::Nclt => nclt::open(folder, &progress)?,
+        };
+        // Simulated, the heading beside the sensor's data is nobody's filter.
+        let has_vendor = files.has_vendor && simulated.is_none();
+        let origin = files.origin()?;
+        let mut steps = Vec::new();
+        let mut in_gap = [0; 4];
+        let mut last = None;
+        while let Some((now, gaps)) = files.at(origin + steps.len() as f64 * DT)? {
+            for (count, gap) in in_gap.iter_mut().zip(gaps) {
+                *count += u64::from(gap);
+            }
+            steps.push(now.step(last.as_ref().unwrap_or(&now), gaps[0]));
+            last = Some(now);
+            if steps.len() % 1024 == 0 {
+                watch(progress.get());
+            }
+        }
+        let seconds = steps.len() as f64 * DT;
+        if seconds < NEEDED {
+            let path = folder.display().to_string();
+            return Err(SequenceError::TooShort { path, seconds, needed: NEEDED });
+        }
+        if let Some(Step { position: [x, y], .. }) = steps.first().copied() {
+            for step in &mut steps {
+                step.position = [step.position[0] - x, step.position[1] - y];
+            }
+        }
+        let (wheel_base, has_gyro) = (files.wheel_base, files.has_gyro);
+        let Files { imu, fog, wheels, truth, .. } = files;
+        let files = [imu.finish()?, fog.finish()?, wheels.finish()?, truth.finish()?];
+        let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
+        let name = name.unwrap_or_else(|| folder.display().to_string());
+        let path = folder.to_owned();
+        Ok(Self { name, path, layout, simulated, has_gyro, has_vendor, wheel_base, steps, in_gap, files })
+    }
+
+    /// Length, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.steps.len() as f64 * DT
+    }
+
+    /// Latitude, for the Earth's rate: of the simulation, or of where the data set was made.
+    #[must_use]
+    pub fn latitude_deg(&self) -> f64 {
+        self.layout.vehicle().world.latitude_deg
+    }
+
+    /// The true change of heading in each step, rad; the first has none.
+    #[must_use]
+    pub fn turns(&self) -> Vec<f64> {
+        let first = self.steps.first().map_or(0.0, |step| step.yaw);
+        let mut last = first;
+        self.steps.iter().map(|step| step.yaw - std::mem::replace(&mut last, step.yaw)).collect()
+    }
+
+    /// Rates of the left and the right wheel in a step, rad/s, of the radius that the data set's
+    /// vehicle has.
+    #[must_use]
+    pub fn wheel_rates(&self, step: &Step) -> [f64; 2] {
+        let radius = self.layout.vehicle().world.car.wheel_radius;
+        step.wheels.map(|way| way / DT / radius)
+    }
+
+    /// The drive as the pipeline's other commands have it. Steps in a gap of the inertial sensor
+    /// are left out, as a board would not get them. Wheels are rear right and rear left.
+    ///
+    /// # Errors
+    /// [`SequenceError::NoGyro`].
+    pub fn recording(&self) -> Result<Recording, SequenceError> {
+        self.needs_gyro()?;
+        let turns = self.turns();
+        let steps = self.steps.iter().zip(&turns).enumerate().filter(|(_, (step, _))| !step.imu_gap);
+        let rows = steps.filter_map(|(k, (step, turn))| {
+            let [fx, fy, fz] = step.specific_force.map(SpecificForce::from_metre_per_sec2);
+            let [wx, wy, wz] = step.angular_rate.map(AngularRate::from_rad_per_sec);
+            let sample = ImuSample {
+                time: Micros(k as u64 * PERIOD_US),
+                // What no part can measure is as good as no sample: the pipeline counts the gap.
+                specific_force: [fx.ok()?, fy.ok()?, fz.ok()?],
+                angular_rate: [wx.ok()?, wy.ok()?, wz.ok()?],
+                temperature: None,
+                validity: Validity::Good,
+            };
+            let [left, right] = self.wheel_rates(step).map(Some);
+            let wheels = [None, right, None, left];
+            Some(RecordingRow { line: k as u64 + 1, sample, reference: Some(turn / DT), wheels })
+        });
+        Ok(Recording { path: self.path.display().to_string(), rows: rows.collect(), missing: 0 })
+    }
+
+    /// Whether there is a gyro.
+    ///
+    /// # Errors
+    /// [`SequenceError::NoGyro`].
+    pub fn needs_gyro(&self) -> Result<(), SequenceError> {
+        let path = || self.path.display().to_string();
+        self.has_gyro.then_some(()).ok_or_else(|| SequenceError::NoGyro { path: path() })
+    }
+}
+
+/// All values at one time.
+#[derive(Debug, Clone, Copy)]
+struct Values {
+    imu: [f64; 7],
+    fog: f64,
+    wheels: [f64; 2],
+    truth: [f64; 3],
+}
+
+impl Values {
+    fn step(&self, last: &Self, imu_gap: bool) -> Step {
+        let [fx, fy, fz, wx, wy, wz, vendor_yaw] = self.imu;
+        let [x, y, yaw] = self.truth;
+        Step {
+            specific_force: [fx, fy, fz].map(|value| value as f32),
+            angular_rate: [wx, wy, wz].map(|value| value as f32),
+            imu_gap,
+            fog: self.fog - last.fog,
+            wheels: [self.wheels[0] - last.wheels[0], self.wheels[1] - last.wheels[1]],
+            position: [x, y],
+            yaw,
+            vendor_yaw,
+        }
+    }
+}
+
+impl Files {
+    /// Time of the first row of the inertial sensor that all files have reached.
+    fn origin(&mut self) -> Result<f64, SequenceError> {
+        let others = [self.fog.first(), self.wheels.first(), self.truth.first()];
+        let begin = others.into_iter().fold(self.imu.first(), f64::max);
+        self.imu.at(begin)?;
+        Ok(self.imu.reached().max(begin))
+    }
+
+    /// Values at a time and which of them lie in a gap; `None` where a file has ended.
+    fn at(&mut self, time: f64) -> Result<Option<(Values, [bool; 4])>, SequenceError> {
+        let Some(imu) = self.imu.at(time)? else { return Ok(None) };
+        let Some(fog) = self.fog.at(time)? else { return Ok(None) };
+        let Some(wheels) = self.wheels.at(time)? else { return Ok(None) };
+        let Some(truth) = self.truth.at(time)? else { return Ok(None) };
+        let gaps = [imu.gap, fog.gap, wheels.gap, truth.gap].map(|gap| gap > MAX_GAP);
+        let [fog] = fog.values;
+        Ok(Some((Values { imu: imu.values, fog, wheels: wheels.values, truth: truth.values }, gaps)))
+    }
+}
+
+fn marker(folder: &Path) -> Result<Option<Spec>, SequenceError> {
+    let path = folder.join(MARKER);
+    let name = path.display().to_string();
+    match fs::read(&path) {
+        Ok(bytes) => serde_json::from_slice(&bytes)
+            .map(Some)
+            .map_err(|source| SequenceError::Marker { path: name, source }),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(SequenceError::Io { path: name, source }),
+    }
+}
+
+#[cfg(test)]
+mod tests;

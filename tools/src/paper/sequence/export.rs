@@ -1,0 +1,47 @@
+//! A sequence as one CSV: the columns of [`crate::drive::recording`], and beside them what only a
+//! sequence has.
+
+use super::Sequence;
+use crate::drive::DT;
+use std::io::{self, Write};
+
+/// The header. Wheels are rear right and rear left; `fog_rad`, `left_m` and
+/// `right_m` are since the row before.
+pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel2_rate,wheel4_rate,\
+                          fog_rad,left_m,right_m,ref_x_m,ref_y_m,ref_yaw_rad,vendor_yaw_rad";
+
+/// Writes all steps; those in a gap of the inertial sensor are left out.
+///
+/// # Errors
+/// What the writer says.
+pub fn write_csv(sequence: &Sequence, mut out: impl Write) -> io::Result<u64> {
+    writeln!(out, "{HEADER}")?;
+    let mut rows = 0;
+    let mut buffer = ryu::Buffer::new();
+    for (k, (step, turn)) in sequence.steps.iter().zip(sequence.turns()).enumerate() {
+        if step.imu_gap {
+            continue;
+        }
+        // In whole hundredths: 0.01 times a count has digits to spare.
+        write!(out, "{}.{:02}", k / 100, k % 100)?;
+        for value in step.specific_force.iter().chain(&step.angular_rate) {
+            write!(out, ",{}", buffer.format(*value))?;
+        }
+        let [left, right] = step.wheels;
+        let [left_rate, right_rate] = sequence.wheel_rates(step);
+        let [x, y] = step.position;
+        let rest = [turn / DT, right_rate, left_rate, step.fog, left, right, x, y, step.yaw];
+        for value in rest {
+            write!(out, ",{}", buffer.format(value))?;
+        }
+        if sequence.has_vendor {
+            write!(out, ",{}", buffer.format(step.vendor_yaw))?
+        } else {
+            write!(out, ",")?
+        }
+        writeln!(out)?;
+        rows += 1;
+    }
+    out.flush()?;
+    Ok(rows)
+}

@@ -1,0 +1,145 @@
+//! Rows of numbers without a header: a stamp and fields, one row in memory at a time.
+
+use super::SequenceError;
+use super::summary::StreamSummary;
+use crate::drive::recording::ValueError;
+use csv::ByteRecord;
+use std::cell::Cell;
+use std::fs::File;
+use std::path::Path;
+use std::rc::Rc;
+
+/// A value beyond this is none of any part or map: metres of UTM are some 4e6.
+const MAX_VALUE: f64 = 1e12;
+/// A file that is silent for longer is not one drive, s.
+const MAX_SILENCE: f64 = 600.0;
+
+/// Bytes read so far of all files of a sequence, for whoever watches.
+pub(super) type Progress = Rc<Cell<u64>>;
+
+/// What a file looks like.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Format<const N: usize> {
+    /// Columns, the stamp's included.
+    pub columns: usize,
+    /// The columns that are used; the stamp's is 0.
+    pub used: [usize; N],
+    /// Stamps per second.
+    pub stamps_per_second: f64,
+    /// Samples per second that the part is said to give.
+    pub nominal_hz: f64,
+}
+
+/// One row: when, and the fields that are used.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<const N: usize> {
+    pub line: u64,
+    pub stamp: i64,
+    pub fields: [f64; N],
+}
+
+/// A file being read.
+pub(super) struct Rows<const N: usize> {
+    path: String,
+    format: Format<N>,
+    csv: csv::Reader<File>,
+    record: ByteRecord,
+    last: Option<i64>,
+    progress: Progress,
+    seen: u64,
+    pub summary: StreamSummary,
+}
+
+impl<const N: usize> Rows<N> {
+    pub fn open(path: &Path, format: Format<N>, progress: Progress) -> Result<Self, SequenceError> {
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|source| SequenceError::open(&name, source))?;
+        let csv = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .buffer_capacity(1 << 16)
+            .from_reader(file);
+        let summary = StreamSummary::new(path, format.stamps_per_second, format.nominal_hz);
+        let record = ByteRecord::new();
+        Ok(Self { path: name, format, csv, record, last: None, progress, seen: 0, summary })
+    }
+
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Stamps as seconds.
+    pub fn seconds(&self, stamps: i64) -> f64 {
+        stamps as f64 / self.format.stamps_per_second
+    }
+
+    /// The next good row. Rows that are passed over are counted in the summary.
+    pub fn next_row(&mut self) -> Result<Option<Row<N>>, SequenceError> {
+        loop {
+            let io = |error: csv::Error| SequenceError::Io {
+                path: self.path.clone(),
+                source: std::io::Error::other(error),
+            };
+            if !self.csv.read_byte_record(&mut self.record).map_err(io)? {
+                return Ok(None);
+            }
+            let position = self.record.position();
+            let (line, byte) = position.map_or((0, 0), |p| (p.line(), p.byte()));
+            self.progress.set(self.progress.get() + (byte - self.seen));
+            self.seen = byte;
+            let found = self.record.len();
+            if found != self.format.columns {
+                let (path, expected) = (self.path.clone(), self.format.columns);
+                return Err(SequenceError::Columns { path, line, found, expected });
+            }
+            let stamp: i64 = self.field(line, 0)?;
+            if stamp < 0 {
+                return Err(self.value(line, 0, ValueError::OutOfRange));
+            }
+            let mut fields = [0.0_f64; N];
+            for (field, column) in fields.iter_mut().zip(self.format.used) {
+                *field = self.field(line, column)?;
+            }
+            if fields.iter().any(|field| !field.is_finite()) {
+                self.summary.not_finite.count(line);
+                continue;
+            }
+            if let Some(k) = fields.iter().position(|field| field.abs() > MAX_VALUE) {
+                return Err(self.value(line, self.format.used[k], ValueError::OutOfRange));
+            }
+            if let Some(last) = self.last {
+                if stamp == last {
+                    self.summary.duplicates.count(line);
+                    continue;
+                }
+                if stamp < last {
+                    return Err(SequenceError::Backwards { path: self.path.clone(), line, last, at: stamp });
+                }
+                let seconds = self.seconds(stamp - last);
+                if seconds > MAX_SILENCE {
+                    let (path, most) = (self.path.clone(), MAX_SILENCE);
+                    return Err(SequenceError::Silent { path, line, seconds, most });
+                }
+            }
+            self.last = Some(stamp);
+            self.summary.row(stamp);
+            return Ok(Some(Row { line, stamp, fields }));
+        }
+    }
+
+    fn field<T: std::str::FromStr>(&self, line: u64, column: usize) -> Result<T, SequenceError> {
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let error = if self.bytes(column).is_empty() { ValueError::Empty } else { ValueError::NotANumber };
+        text.parse().map_err(|_| self.value(line, column, error))
+    }
+
+    fn bytes(&self, column: usize) -> &[u8] {
+        self.record.get(column).unwrap_or_default()
+    }
+
+    fn value(&self, line: u64, column: usize, error: ValueError) -> SequenceError {
+        let text = String::from_utf8_lossy(self.bytes(column)).into_owned();
+        SequenceError::Value { path: self.path.clone(), line, column: column + 1, text, error }
+    }
+}

@@ -1,0 +1,116 @@
+//! A stream that can be asked for its value at any time, in ascending order: on the straight
+//! line between the rows before and after.
+//!
+//! What adds up (angle of a gyro, way of a wheel) is a stream of its sums, so that no part of it
+//! is lost or counted twice whatever the stamps do.
+
+use super::SequenceError;
+use super::rows::{Row, Rows};
+use super::summary::StreamSummary;
+
+/// Makes a row's fields, at a time in s, into the values that are interpolated; keeps what it
+/// needs of the past.
+pub(super) type Convert<const N: usize, const M: usize> =
+    Box<dyn FnMut(&Row<N>, f64, &mut StreamSummary) -> [f64; M]>;
+
+/// A stream of M values, of whatever file.
+pub(super) trait Stream<const M: usize> {
+    /// Time of the first row, s since the epoch.
+    fn first(&self) -> f64;
+    /// The value at a time, s since the epoch; `None` at the end of the file.
+    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, SequenceError>;
+    /// Time of the newest row that was read.
+    fn reached(&self) -> f64;
+    /// Reads the rest, so that the summary is of the whole file.
+    fn finish(self: Box<Self>) -> Result<StreamSummary, SequenceError>;
+}
+
+/// A value in between.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Value<const M: usize> {
+    pub values: [f64; M],
+    /// Time between the rows around it, s.
+    pub gap: f64,
+}
+
+/// A stream of M values from N fields of a file.
+pub(super) struct Track<const N: usize, const M: usize> {
+    rows: Rows<N>,
+    convert: Convert<N, M>,
+    epoch: i64,
+    first: f64,
+    before: (f64, [f64; M]),
+    after: (f64, [f64; M]),
+}
+
+impl<const N: usize, const M: usize> Track<N, M> {
+    /// Reads the first row; without an epoch, that is it.
+    pub fn new(
+        mut rows: Rows<N>,
+        epoch: Option<i64>,
+        mut convert: Convert<N, M>,
+    ) -> Result<Self, SequenceError> {
+        let first = rows.next_row()?;
+        let Some(row) = first else { return Err(SequenceError::Empty { path: rows.path().to_owned() }) };
+        let epoch = epoch.unwrap_or(row.stamp);
+        let time = rows.seconds(row.stamp - epoch);
+        let now = (time, convert(&row, time, &mut rows.summary));
+        Ok(Self { rows, convert, epoch, first: time, before: now, after: now })
+    }
+
+    /// Stamp of time zero.
+    pub fn epoch(&self) -> i64 {
+        self.epoch
+    }
+
+    fn advance(&mut self) -> Result<bool, SequenceError> {
+        let Some(row) = self.rows.next_row()? else { return Ok(false) };
+        self.before = self.after;
+        let time = self.rows.seconds(row.stamp - self.epoch);
+        self.after = (time, (self.convert)(&row, time, &mut self.rows.summary));
+        Ok(true)
+    }
+}
+
+impl<const N: usize, const M: usize> Stream<M> for Track<N, M> {
+    fn first(&self) -> f64 {
+        self.first
+    }
+
+    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, SequenceError> {
+        while self.after.0 < time {
+            if !self.advance()? {
+                return Ok(None);
+            }
+        }
+        let ((from, first), (to, second)) = (self.before, self.after);
+        let span = to - from;
+        let part = if span > 0.0 { (time - from) / span } else { 1.0 };
+        let values = std::array::from_fn(|k| first[k] + (second[k] - first[k]) * part);
+        Ok(Some(Value { values, gap: span }))
+    }
+
+    fn reached(&self) -> f64 {
+        self.after.0
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<StreamSummary, SequenceError> {
+        while self.advance()? {}
+        Ok(self.rows.summary)
+    }
+}
+
+/// An angle that goes on beyond pi: each step is taken the short way.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Unwrap {
+    last: Option<f64>,
+}
+
+impl Unwrap {
+    pub fn angle(&mut self, angle: f64) -> f64 {
+        let last = self.last.unwrap_or(angle);
+        let unwrapped = last + crate::evaluate::metrics::wrap(angle - last);
+        self.last = Some(unwrapped);
+        unwrapped
+    }
+}

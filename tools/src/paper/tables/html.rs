@@ -1,0 +1,54 @@
+//! One page with everything in it: tables, and pictures as SVG; nothing is loaded from elsewhere.
+
+use super::pictures::Picture;
+use super::table::{Row, Table};
+use crate::plot::page::{document, escaped};
+use std::fmt::Write;
+
+/// The page. Pictures come with the name of their sequence.
+#[must_use]
+pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
+    let mut html = String::from("<h1>The paper's tables</h1>\n");
+    html += "<p class=\"lead\">X. Zhao et al., <i>Learning to Compensate for the Drift and Error of Gyroscope in \
+             Vehicle Localization</i>; written by <code>gyronet tables</code>.</p>\n";
+    for table in tables {
+        let simulated = if table.simulated { " <span class=\"simulated\">simulated</span>" } else { "" };
+        // Writing to a string does not fail.
+        let _ = writeln!(html, "<h2>{}{simulated}</h2>", escaped(&table.title));
+        let ours = if table.simulated { "here, simulated" } else { "here" };
+        block(&mut html, ours, &table.columns, &table.rows, table.decimals);
+        block(&mut html, "in the paper", &table.paper_columns, &table.paper_rows, table.decimals);
+        for note in &table.notes {
+            let _ = writeln!(html, "<p class=\"note\">{}</p>", escaped(note));
+        }
+    }
+    for (k, (name, pictures)) in pictures.iter().enumerate() {
+        let open = if k == 0 { " open" } else { "" };
+        let _ = writeln!(html, "<details{open}><summary>{}</summary>", escaped(name));
+        for picture in pictures {
+            let caption = escaped(&picture.caption);
+            let _ = writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", picture.svg);
+        }
+        html += "</details>\n";
+    }
+    document("gyronet: the paper's tables", &html)
+}
+
+fn block(html: &mut String, caption: &str, columns: &[String], rows: &[Row], decimals: usize) {
+    let _ = write!(html, "<div class=\"scroll\"><table><caption>{caption}</caption><tr><th></th>");
+    for column in columns {
+        let _ = write!(html, "<th>{}</th>", escaped(column));
+    }
+    *html += "</tr>\n";
+    for Row { name, figures } in rows {
+        let _ = write!(html, "<tr><td>{}</td>", escaped(name));
+        for figure in figures {
+            let _ = match figure {
+                Some(figure) => write!(html, "<td>{figure:.decimals$}</td>"),
+                None => write!(html, "<td>-</td>"),
+            };
+        }
+        *html += "</tr>\n";
+    }
+    *html += "</table></div>\n";
+}

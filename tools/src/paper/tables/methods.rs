@@ -1,0 +1,242 @@
+//! The ways of getting a heading that the paper's tables compare: each makes of a sequence what
+//! was turned in every 10 ms.
+//!
+//! The paper's vendor filter runs inside the sensor and cannot be had. [`VQF`] stands in for it
+//! where the data have no heading of the vendor's own: an orientation filter of the same kind
+//! (gyro integrated, levelled by the accelerometer, bias learnt at rest; Laidig and Seel, VQF,
+//! Information Fusion 91, 2023), without a magnetometer, once with its published defaults and once
+//! with limits of rest that a vehicle with its engine running keeps.
+
+use crate::drive::DT;
+use crate::drive::recording::Recording;
+use crate::drive::replay::{Drive, Step};
+use crate::drive::wheel_frames::WheelFrames;
+use crate::evaluate::fir;
+use crate::paper::fog_drive;
+use crate::paper::sequence::Sequence;
+use crate::simulate::world::EARTH_RATE;
+use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
+use gyronet::fog::FogConfig;
+use gyronet::fog::seconds::Padding;
+use gyronet::model::WindowNetwork;
+use gyronet::model::fognet::MinuteNetwork;
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::PERIOD_US;
+use gyronet::units::AngularRate;
+use std::time::Instant;
+
+/// Which gyro a method starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Gyro {
+    /// The inertial sensor's.
+    Mems,
+    /// The fibre-optic one.
+    Fog,
+}
+
+/// A way of getting a heading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Method {
+    /// For programs.
+    pub key: &'static str,
+    /// For people.
+    pub label: &'static str,
+    /// What it starts from.
+    pub gyro: Gyro,
+}
+
+const fn mems(key: &'static str, label: &'static str) -> Method {
+    Method { key, label, gyro: Gyro::Mems }
+}
+
+const fn fog(key: &'static str, label: &'static str) -> Method {
+    Method { key, label, gyro: Gyro::Fog }
+}
+
+/// The inertial sensor's gyro as it is.
+pub const RAW: Method = mems("raw", "raw gyro");
+/// Less its mean over the first 3 s.
+pub const STATIC: Method = mems("static", "static initialisation");
+/// Through the paper's low-pass.
+pub const FIR: Method = mems("fir", "FIR 10/15 Hz");
+/// A well-known filter instead of the vendor's.
+pub const VQF: Method = mems("vqf", "VQF filter");
+/// The same, taking a shaking vehicle for one at rest.
+pub const VQF_VEHICLE: Method = mems("vqf_vehicle", "VQF filter, vehicle's limits of rest");
+/// The vendor's own heading.
+pub const VENDOR: Method = mems("vendor", "vendor's filter");
+/// GyroNet, integer, settled estimates.
+pub const GYRONET: Method = mems("gyronet", "GyroNet");
+/// GyroNet, what goes out at once.
+pub const GYRONET_ONLINE: Method = mems("gyronet_online", "GyroNet, sent at once");
+/// GyroNet with zero-rate updates behind it: what goes out for navigation.
+pub const GYRONET_LOOP: Method = mems("gyronet_loop", "GyroNet with the bias loop");
+/// The fibre-optic gyro as it is.
+pub const FOG: Method = fog("fog", "FoG");
+/// Less the Earth's rate at the place's latitude.
+pub const FOG_EARTH: Method = fog("fog_earth", "FoG less Earth rate");
+/// FoGNet, its first minute padded.
+pub const FOGNET: Method = fog("fognet", "FoGNet");
+/// FoGNet, its first minute uncorrected.
+pub const FOGNET_NOPAD: Method = fog("fognet_nopad", "FoGNet, no padding");
+
+/// What a method makes of a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// The method.
+    pub method: Method,
+    /// Turned in each step from the first that is compared, rad.
+    pub turns: Vec<f64>,
+    /// What it took, s.
+    pub run_time: f64,
+}
+
+/// What all methods make of a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimates {
+    /// The first step that is compared: static initialisation is over.
+    pub start: usize,
+    /// One for each method that could be run.
+    pub methods: Vec<Estimate>,
+    /// Why some methods could not be run.
+    pub refused: Option<String>,
+}
+
+/// Runs every method; `tick` is called twice for each sample: for the network alone, and with the
+/// bias loop.
+pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl FnMut()) -> Estimates {
+    let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
+    let mut estimates = Estimates { start, methods: Vec::new(), refused: None };
+    match sequence.recording() {
+        Ok(recording) => estimates.inertial(sequence, &recording, network, &mut tick),
+        Err(error) => estimates.refused = Some(error.to_string()),
+    }
+    if sequence.has_vendor {
+        estimates.add(VENDOR, || rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
+    }
+    let fog: Vec<f64> = sequence.steps.iter().map(|step| step.fog / DT).collect();
+    estimates.add(FOG, || fog.clone());
+    let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
+    estimates.add(FOG_EARTH, || fog.iter().map(|rate| rate - earth).collect());
+    estimates
+}
+
+impl Estimates {
+    /// Adds FoGNet, padded and not, where there is an inertial sensor; `tick` is called for each
+    /// step of both.
+    pub fn add_fognet(
+        &mut self,
+        sequence: &Sequence,
+        network: &mut impl MinuteNetwork,
+        mut tick: impl FnMut(),
+    ) {
+        if !sequence.has_gyro {
+            return;
+        }
+        for (method, padding) in [(FOGNET, FogConfig::DEFAULT.padding), (FOGNET_NOPAD, Padding::None)] {
+            let started = Instant::now();
+            let config = FogConfig { padding, ..FogConfig::DEFAULT };
+            let drive = fog_drive::run(sequence, network, config, &mut tick);
+            let run_time = started.elapsed().as_secs_f64();
+            let turns = drive.turns[self.start..].to_vec();
+            self.methods.push(Estimate { method, turns, run_time });
+        }
+    }
+
+    /// The methods that start from the inertial sensor.
+    fn inertial(
+        &mut self,
+        sequence: &Sequence,
+        recording: &Recording,
+        network: &mut impl WindowNetwork,
+        mut tick: impl FnMut(),
+    ) {
+        let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
+        let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
+        let started = Instant::now();
+        // The paper's network alone: no zero-rate updates behind it.
+        let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
+        let drive = Drive::run(recording, &config, None, network, &mut tick);
+        let run_time = started.elapsed().as_secs_f64();
+        let wheels = WheelFrames::new(recording);
+        let looped = Drive::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
+        self.add(RAW, || constant(0.0));
+        match drive.and_then(|drive| Ok((drive, looped?))) {
+            Ok((drive, looped)) => {
+                let still = &gyro[..self.start];
+                self.add(STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
+                for (method, rates) in [
+                    (GYRONET, corrected(&drive, &gyro, |step| step.settled)),
+                    (GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.vehicle.prompt.rate)),
+                    // The last steps of the drive have not gone out yet.
+                    (
+                        GYRONET_LOOP,
+                        corrected(&looped, &gyro, |step| {
+                            step.navigation.map_or(step.settled, |sent| sent.rate)
+                        }),
+                    ),
+                ] {
+                    self.add(method, || rates);
+                    if let Some(estimate) = self.methods.last_mut() {
+                        estimate.run_time = run_time;
+                    }
+                }
+            }
+            Err(error) => self.refused = Some(error.to_string()),
+        }
+        self.add(FIR, || fir::filter(&fir::Design::PAPER.taps(), &gyro));
+        let filter = || vqf_rs::VQF::new(DT, None, None, None);
+        self.add(VQF, || vqf(sequence, filter()));
+        self.add(VQF_VEHICLE, || {
+            let mut filter = filter();
+            // Three times the spread that static initialisation allows: VQF looks at each sample.
+            let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
+            let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
+            filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
+            vqf(sequence, filter)
+        });
+    }
+
+    /// Rates of all steps, rad/s.
+    fn add(&mut self, method: Method, rates: impl FnOnce() -> Vec<f64>) {
+        let started = Instant::now();
+        let rates = rates();
+        let run_time = started.elapsed().as_secs_f64();
+        let turns = rates[self.start..].iter().map(|rate| rate * DT).collect();
+        self.methods.push(Estimate { method, turns, run_time });
+    }
+}
+
+/// One of the rates of each step; where the board got no sample, the gyro's value in between, less
+/// what was last taken off.
+fn corrected(drive: &Drive, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
+    let mut steps = drive.steps.iter().peekable();
+    let mut taken_off = 0.0;
+    let rate = |(k, gyro): (usize, &f64)| {
+        // A sample's time is its step's.
+        while let Some(step) = steps.next_if(|step| step.time.0 <= k as u64 * PERIOD_US) {
+            taken_off = gyro - which(step).rad_per_sec();
+        }
+        gyro - taken_off
+    };
+    gyro.iter().enumerate().map(rate).collect()
+}
+
+/// Rates of VQF's heading.
+fn vqf(sequence: &Sequence, mut filter: vqf_rs::VQF) -> Vec<f64> {
+    let mut unwrapped = 0.0;
+    let mut last = None;
+    rates(sequence.steps.iter().map(|step| {
+        filter.update(step.angular_rate.map(f64::from), step.specific_force.map(f64::from), None);
+        let vqf_rs::Quaternion(w, x, y, z) = filter.quat_6d();
+        let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+        unwrapped += crate::evaluate::metrics::wrap(yaw - last.replace(yaw).unwrap_or(yaw));
+        unwrapped
+    }))
+}
+
+/// Rates of an unwrapped heading; the first step has none.
+fn rates(headings: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut last = None;
+    headings.map(|yaw| (yaw - last.replace(yaw).unwrap_or(yaw)) / DT).collect()
+}

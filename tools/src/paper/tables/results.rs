@@ -1,0 +1,221 @@
+//! Errors of every method on every sequence, and their means: what the tables and the JSON are
+//! made of.
+
+use super::methods::{Estimates, Method};
+use crate::evaluate::metrics::YawError;
+use crate::evaluate::trajectory_error::{Point, TrajectoryError};
+use crate::paper::sequence::Sequence;
+use crate::simulate::layout::Layout;
+use gyronet::odometry::Track;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Errors of a method: of a sequence, or the mean of several.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Errors {
+    /// Mean error of the yaw change in 1 s, rad.
+    pub mean_1s_rad: f64,
+    /// Error of the yaw at the end, wrapped, rad.
+    pub final_rad: f64,
+    /// The same, not wrapped.
+    pub final_unwrapped_rad: f64,
+    /// Absolute trajectory error with odometry, rmse, m.
+    pub ate_m: f64,
+    /// The same, mean of the distances.
+    pub ate_mean_m: f64,
+    /// After alignment, rmse, m.
+    pub aligned_ate_m: f64,
+    /// The same, mean of the distances.
+    pub aligned_ate_mean_m: f64,
+    /// What it took on this machine, s.
+    pub run_time_s: f64,
+}
+
+/// Errors by the key of the method.
+pub type ByMethod = BTreeMap<&'static str, Errors>;
+
+/// A path of a method, with the label of the method; the truth's method is `None`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// Whose.
+    pub method: Option<Method>,
+    /// Heading at each step, not wrapped, rad.
+    pub yaw: Vec<f64>,
+    /// m.
+    pub points: Vec<Point>,
+}
+
+/// Errors on one sequence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequenceErrors {
+    /// The sequence's name.
+    pub name: String,
+    /// Whose layout.
+    pub layout: Layout,
+    /// Nobody drove it.
+    pub simulated: bool,
+    /// Its parts are not those of the paper's first sequences: urban18 and later, or a simulated
+    /// device other than the first.
+    pub other_devices: bool,
+    /// What was compared, s.
+    pub seconds: f64,
+    /// How far it went, by its wheels, m.
+    pub metres: f64,
+    /// Why some methods could not be run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
+    /// The errors.
+    pub methods: ByMethod,
+    /// In the order of the tables.
+    #[serde(skip)]
+    pub order: Vec<Method>,
+}
+
+impl SequenceErrors {
+    /// Compares, and hands out the paths for pictures: the truth's first.
+    #[must_use]
+    pub fn new(sequence: &Sequence, estimates: &Estimates) -> (Self, Vec<Path>) {
+        let steps = &sequence.steps[estimates.start..];
+        let turns = &sequence.turns()[estimates.start..];
+        let truth: Vec<Point> = steps.iter().map(|step| step.position).collect();
+        // Before the first turn that is compared.
+        let heading = steps.first().map_or(0.0, |step| step.yaw) - turns.first().copied().unwrap_or(0.0);
+        let begin = estimates.start.checked_sub(1).map_or([0.0; 2], |k| sequence.steps[k].position);
+        let (mut methods, mut order) = (ByMethod::new(), Vec::new());
+        let mut paths =
+            vec![Path { method: None, yaw: steps.iter().map(|step| step.yaw).collect(), points: truth }];
+        for estimate in &estimates.methods {
+            let mut track = Track { position: begin, yaw: heading };
+            let (yaw, points): (Vec<f64>, Vec<Point>) = steps
+                .iter()
+                .zip(&estimate.turns)
+                .map(|(step, turned)| {
+                    track.step(step.wheels, *turned);
+                    (track.yaw, track.position)
+                })
+                .unzip();
+            if let Some(errors) = Errors::new(turns, estimate, &points, &paths[0].points) {
+                methods.insert(estimate.method.key, errors);
+                order.push(estimate.method);
+            }
+            paths.push(Path { method: Some(estimate.method), yaw, points });
+        }
+        let errors = Self {
+            name: sequence.name.clone(),
+            layout: sequence.layout,
+            simulated: sequence.simulated.is_some(),
+            other_devices: other_devices(sequence),
+            seconds: steps.len() as f64 * crate::drive::DT,
+            metres: steps.iter().map(|step| (step.wheels[0] + step.wheels[1]).abs() / 2.0).sum(),
+            refused: estimates.refused.clone(),
+            methods,
+            order,
+        };
+        (errors, paths)
+    }
+}
+
+fn other_devices(sequence: &Sequence) -> bool {
+    match &sequence.simulated {
+        Some(spec) => spec.device != 1,
+        None => {
+            let number = sequence.name.trim_start_matches(|c: char| !c.is_ascii_digit());
+            sequence.layout == Layout::Kaist && number.parse().is_ok_and(|number: u32| number >= 18)
+        }
+    }
+}
+
+impl Errors {
+    fn new(
+        turns: &[f64],
+        estimate: &super::methods::Estimate,
+        points: &[Point],
+        truth: &[Point],
+    ) -> Option<Self> {
+        let rates = |turns: &[f64]| turns.iter().map(|turn| turn / crate::drive::DT).collect::<Vec<f64>>();
+        let yaw = YawError::new(&rates(&estimate.turns), &rates(turns))?;
+        let ate = TrajectoryError::new(points, truth)?;
+        let aligned = TrajectoryError::aligned(points, truth)?;
+        Some(Self {
+            mean_1s_rad: yaw.mean_1s_rad,
+            final_rad: yaw.final_rad,
+            final_unwrapped_rad: yaw.final_unwrapped_rad,
+            ate_m: ate.rmse_m,
+            ate_mean_m: ate.mean_m,
+            aligned_ate_m: aligned.rmse_m,
+            aligned_ate_mean_m: aligned.mean_m,
+            run_time_s: estimate.run_time,
+        })
+    }
+
+    fn mean(errors: &[Self]) -> Self {
+        let mean = |of: fn(&Self) -> f64| errors.iter().map(of).sum::<f64>() / errors.len() as f64;
+        Self {
+            mean_1s_rad: mean(|e| e.mean_1s_rad),
+            final_rad: mean(|e| e.final_rad),
+            final_unwrapped_rad: mean(|e| e.final_unwrapped_rad),
+            ate_m: mean(|e| e.ate_m),
+            ate_mean_m: mean(|e| e.ate_mean_m),
+            aligned_ate_m: mean(|e| e.aligned_ate_m),
+            aligned_ate_mean_m: mean(|e| e.aligned_ate_mean_m),
+            run_time_s: mean(|e| e.run_time_s),
+        }
+    }
+}
+
+/// Mean of each method over the sequences that all of them could be run on by it.
+#[must_use]
+pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod {
+    let mut all: BTreeMap<&'static str, Vec<Errors>> = BTreeMap::new();
+    let mut count = 0;
+    for sequence in sequences {
+        count += 1;
+        for (key, errors) in &sequence.methods {
+            all.entry(key).or_default().push(*errors);
+        }
+    }
+    // A mean over fewer sequences than another's cannot stand beside it.
+    all.into_iter().filter(|(_, e)| e.len() == count).map(|(key, e)| (key, Errors::mean(&e))).collect()
+}
+
+/// Everything, as JSON has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// Some sequence is simulated.
+    pub simulated: bool,
+    /// One for each sequence.
+    pub sequences: Vec<SequenceErrors>,
+    /// Over all sequences, of the methods that all of them have.
+    pub mean: ByMethod,
+    /// Over the sequences of each data set's layout.
+    pub mean_of_layout: BTreeMap<&'static str, ByMethod>,
+    /// GyroNet's error in 1 s over that of static initialisation, of the means.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyronet_to_static: Option<f64>,
+    /// The same of the paper's Table I.
+    pub gyronet_to_static_paper: f64,
+}
+
+impl Results {
+    /// Adds the means.
+    #[must_use]
+    pub fn new(sequences: Vec<SequenceErrors>) -> Self {
+        let mean_all = mean(sequences.iter());
+        let of = |layout| sequences.iter().filter(move |sequence| sequence.layout == layout);
+        let mean_of_layout = [("kaist", Layout::Kaist), ("nclt", Layout::Nclt)]
+            .into_iter()
+            .filter(|(_, layout)| of(*layout).next().is_some())
+            .map(|(name, layout)| (name, mean(of(layout))))
+            .collect();
+        let error = |key: &str| mean_all.get(key).map(|errors| errors.mean_1s_rad);
+        let gyronet_to_static = error("gyronet").zip(error("static")).map(|(network, still)| network / still);
+        Self {
+            simulated: sequences.iter().any(|sequence| sequence.simulated),
+            mean: mean_all,
+            mean_of_layout,
+            gyronet_to_static,
+            gyronet_to_static_paper: super::paper::GYRONET_TO_STATIC,
+            sequences,
+        }
+    }
+}

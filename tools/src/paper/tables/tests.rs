@@ -1,0 +1,159 @@
+use super::methods::{Estimate, Estimates, FOG, GYRONET, RAW, STATIC};
+use super::results::{Path, Results, SequenceErrors};
+use super::{html, methods, pictures, table};
+use crate::paper::sequence::{Sequence, Step, StreamSummary};
+use crate::simulate::layout::{self, Layout, Spec};
+use gyronet::model::window::{Features, WINDOW};
+use gyronet::model::{Estimate as WindowEstimate, WindowNetwork};
+use gyronet::odometry::Track;
+use gyronet::units::AngularRate;
+use std::path::PathBuf;
+
+/// Never corrects anything.
+struct Nothing;
+
+impl WindowNetwork for Nothing {
+    fn estimate(&mut self, _window: &[Features; WINDOW]) -> WindowEstimate {
+        let (corrections, scale) = ([AngularRate::ZERO; WINDOW], gyronet::model::SCALE_MAX);
+        WindowEstimate { corrections, scale, clamped_inputs: 0 }
+    }
+}
+
+/// A sequence that is simulated and read back.
+fn sequence(name: &str, layout: Layout, seconds: u32) -> Sequence {
+    let folder = std::env::temp_dir().join(format!("gyronet-tables-{}-{name}", std::process::id()));
+    let spec = Spec { layout, name: name.into(), seconds, device: 1, run: 3 };
+    layout::write(&spec, &folder, || {}).unwrap();
+    let sequence = Sequence::read(&folder, |_| {}).unwrap();
+    std::fs::remove_dir_all(folder).unwrap();
+    sequence
+}
+
+/// One that dead reckoning of the truth reproduces.
+fn exact() -> Sequence {
+    let mut track = Track { position: [100.0, -50.0], yaw: 2.0 };
+    let step = |k: usize| {
+        let turned = if k < 400 { 0.0 } else { 0.003 * (k as f64 * 0.002).sin() };
+        let way = if k < 400 { 0.0 } else { 0.1 };
+        track.step([way; 2], turned);
+        // Every axis flickers as a sensor does, with mean zero over three steps: equal readings are stuck ones.
+        let noise = 1e-4 * ((k % 3) as f32 - 1.0);
+        Step {
+            specific_force: [10.0 * noise, 10.0 * noise, 9.8 + 10.0 * noise],
+            angular_rate: [noise, noise, (turned / 0.01 + 0.002) as f32 + noise],
+            imu_gap: false,
+            fog: turned,
+            wheels: [way; 2],
+            position: track.position,
+            yaw: track.yaw,
+            vendor_yaw: track.yaw,
+        }
+    };
+    let file = || StreamSummary::new(&PathBuf::from("a.csv"), 1e9, 100.0);
+    Sequence {
+        name: "urban18".into(),
+        path: PathBuf::from("urban18"),
+        layout: Layout::Kaist,
+        simulated: None,
+        has_gyro: true,
+        has_vendor: true,
+        wheel_base: None,
+        steps: (0..6_000).map(step).collect(),
+        in_gap: [0; 4],
+        files: [file(), file(), file(), file()],
+    }
+}
+
+#[test]
+fn the_truth_has_no_error() {
+    let sequence = exact();
+    let turns = sequence.turns()[300..].to_vec();
+    let truth = Estimate { method: FOG, turns, run_time: 0.0 };
+    let estimates = Estimates { start: 300, methods: vec![truth], refused: None };
+    let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
+    let fog = errors.methods["fog"];
+    assert!(fog.ate_m < 1e-9 && fog.aligned_ate_m < 1e-9 && fog.mean_1s_rad < 1e-12, "{fog:?}");
+    assert_eq!(paths[0].points.len(), 5_700);
+    assert!(errors.other_devices && !errors.simulated);
+    assert!((errors.metres - 560.0).abs() < 0.2, "{}", errors.metres);
+}
+
+#[test]
+fn each_method_does_what_it_says() {
+    let sequence = exact();
+    let estimates = methods::run(&sequence, &mut Nothing, || {});
+    let (errors, _) = SequenceErrors::new(&sequence, &estimates);
+    let final_rad = |key: &str| errors.methods[key].final_unwrapped_rad;
+    let seconds = 57.0;
+    assert!((final_rad("raw") - 0.002 * seconds).abs() < 1e-4, "the bias alone: {}", final_rad("raw"));
+    assert!(final_rad("static") < 1e-4, "{}", final_rad("static"));
+    // A network that says nothing leaves static initialisation.
+    assert!((final_rad("gyronet") - final_rad("static")).abs() < 1e-5);
+    assert!((final_rad("gyronet_online") - final_rad("static")).abs() < 1e-5);
+    assert!((final_rad("gyronet_loop") - final_rad("static")).abs() < 1e-5);
+    assert!(final_rad("fog") < 1e-9 && final_rad("vendor") < 1e-9);
+    let earth = 7.292_115e-5 * 36.37f64.to_radians().sin() * seconds;
+    assert!((final_rad("fog_earth") - earth).abs() < 1e-9, "nothing to take off here");
+    assert!(errors.methods["fog"].ate_m < 1e-6);
+}
+
+#[test]
+fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
+    let mut sequence = exact();
+    for (k, step) in sequence.steps.iter_mut().enumerate().take(400) {
+        step.angular_rate[2] = 0.002 * k as f32;
+    }
+    let estimates = methods::run(&sequence, &mut Nothing, || {});
+    let (errors, _) = SequenceErrors::new(&sequence, &estimates);
+    assert!(!errors.methods.contains_key(STATIC.key) && !errors.methods.contains_key(GYRONET.key));
+    assert!(errors.methods.contains_key(RAW.key) && errors.methods.contains_key(FOG.key));
+    assert!(errors.refused.as_ref().is_some_and(|why| why.contains("starts moving")), "{errors:?}");
+}
+
+#[test]
+fn json_and_tables_of_simulated_sequences() {
+    let of = |name: &str, layout| {
+        let sequence = sequence(name, layout, 60);
+        let estimates = methods::run(&sequence, &mut Nothing, || {});
+        let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
+        (sequence, errors, paths)
+    };
+    let (sequence, kaist, paths): (Sequence, SequenceErrors, Vec<Path>) = of("k", Layout::Kaist);
+    let (_, nclt, _) = of("n", Layout::Nclt);
+    let drawn = pictures::draw(&sequence, &kaist, &paths).unwrap();
+    assert_eq!(drawn.len(), 5);
+    assert!(drawn.iter().all(|picture| picture.svg.contains("(simulated)")));
+
+    let results = Results::new(vec![kaist, nclt]);
+    let json = serde_json::to_value(&results).unwrap();
+    assert_eq!(json["simulated"], true);
+    assert_eq!(json["sequences"][0]["layout"], "kaist");
+    for method in ["raw", "static", "fir", "vqf", "gyronet", "fog", "fog_earth"] {
+        for error in ["mean_1s_rad", "final_rad", "ate_m", "aligned_ate_m"] {
+            assert!(json["sequences"][1]["methods"][method][error].is_f64(), "{method} {error}");
+            let mean = json["mean"][method][error].as_f64().unwrap();
+            let each = [0, 1].map(|k| json["sequences"][k]["methods"][method][error].as_f64().unwrap());
+            assert!((mean - (each[0] + each[1]) / 2.0).abs() < 1e-12);
+            assert_eq!(json["mean_of_layout"]["nclt"][method][error].as_f64(), Some(each[1]));
+        }
+    }
+    assert!(json["sequences"][0]["methods"].get("vendor").is_none(), "a simulation has no vendor");
+    assert!((json["gyronet_to_static"].as_f64().unwrap() - 1.0).abs() < 0.01);
+
+    let tables = table::tables(&results);
+    let titles: Vec<&str> = tables.iter().map(|table| table.title.split(':').next().unwrap()).collect();
+    assert_eq!(titles, ["Table I", "Table I", "Table II", "Table VI", "Table VII"]);
+    for table in &tables {
+        assert!(table.to_string().lines().next().unwrap().ends_with("(simulated)"));
+        let columns = table.columns.len();
+        assert!(table.rows.iter().all(|row| row.figures.len() == columns), "{}", table.title);
+        let columns = table.paper_columns.len();
+        assert!(table.paper_rows.iter().all(|row| row.figures.len() == columns), "{}", table.title);
+    }
+    let page = html::page(&tables, &[("k".into(), drawn)]);
+    assert_eq!(page.matches("<span class=\"simulated\">").count(), tables.len());
+    assert!(
+        !page.contains("http://www.w3.org/1999/xlink") && !page.contains("src="),
+        "nothing from elsewhere"
+    );
+}

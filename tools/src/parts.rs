@@ -1,0 +1,140 @@
+//! A recording through the bytes of a part: its samples encoded as the part would send them,
+//! and read back by the parser that the board runs.
+//!
+//! | part | what is sent | what is rounded |
+//! |---|---|---|
+//! | Xsens MTi | an MTData2 message a row, single precision | nothing: every code is an f32 |
+//! | KVH DSP-1760 | ten increments a row about each axis; accelerometer as recorded | f32 increments, the code of their sum |
+//! | ICM-42688-P | a 20-bit FIFO packet a row, over a simulated SPI bus | 1/131 deg/s, 1/8192 g |
+
+pub mod compare;
+pub(crate) mod dsp1760;
+pub(crate) mod icm42688;
+mod xsens;
+
+use crate::drive::recording::{Recording, Row};
+use gyronet::sample::ImuSample;
+use gyronet::units::{AngularRate, SpecificForce};
+
+/// A part that a recording can be sent through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Part {
+    /// Xsens MTi: MTData2 in single precision.
+    Xsens,
+    /// KVH DSP-1760: increments at 1 kHz, summed on the grid beside the recorded accelerometer.
+    Dsp1760,
+    /// TDK ICM-42688-P: FIFO packets of 20 bits over SPI.
+    Icm42688,
+}
+
+impl std::fmt::Display for Part {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Xsens => "Xsens MTi",
+            Self::Dsp1760 => "KVH DSP-1760",
+            Self::Icm42688 => "ICM-42688-P",
+        })
+    }
+}
+
+/// The steps in which a part's readings come; 0 where nothing is rounded.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Quantisation {
+    /// rad/s.
+    pub rate: f64,
+    /// m/s^2.
+    pub force: f64,
+}
+
+/// Why a recording does not come back from a part whole.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ViaError {
+    /// A row's bytes gave no sample.
+    #[error("{path}: line {line}: the {part} delivers no sample: {why}")]
+    NoSample {
+        /// The recording.
+        path: String,
+        /// The row's line.
+        line: u64,
+        /// The part.
+        part: Part,
+        /// What its parser says.
+        why: String,
+    },
+    /// The part did not start.
+    #[error("the {part} does not start: {why}")]
+    NoStart {
+        /// The part.
+        part: Part,
+        /// What its driver says.
+        why: String,
+    },
+}
+
+/// A recording that has been through a part.
+#[derive(Debug, Clone)]
+pub struct Via {
+    /// The same rows, with the samples that the part's parser delivered.
+    pub recording: Recording,
+    /// The part's steps.
+    pub quantisation: Quantisation,
+    /// Bytes that the parser was given.
+    pub bytes: u64,
+}
+
+impl Part {
+    /// Sends a recording through the part.
+    ///
+    /// # Errors
+    /// [`ViaError`].
+    pub fn send(self, recording: &Recording) -> Result<Via, ViaError> {
+        let (samples, bytes) = match self {
+            Self::Xsens => xsens::send(recording)?,
+            Self::Dsp1760 => dsp1760::send(recording)?,
+            Self::Icm42688 => icm42688::send(recording)?,
+        };
+        let rows = recording.rows.iter().zip(samples).map(|(row, sample)| Row { sample, ..*row }).collect();
+        Ok(Via {
+            recording: Recording { rows, ..recording.clone() },
+            quantisation: self.quantisation(recording),
+            bytes,
+        })
+    }
+
+    /// The steps of the part's readings in this recording: of the part itself, of our codes and
+    /// of f32 at the largest rate.
+    fn quantisation(self, recording: &Recording) -> Quantisation {
+        let rates = recording.rows.iter().flat_map(|row| row.sample.angular_rate);
+        let peak = rates.map(|rate| rate.rad_per_sec().abs()).fold(0.0, f64::max);
+        let forces = recording.rows.iter().flat_map(|row| row.sample.specific_force);
+        let peak_force = forces.map(|force| force.metre_per_sec2().abs()).fold(0.0, f64::max);
+        let rate_code = AngularRate(1).rad_per_sec();
+        let force_code = SpecificForce(1).metre_per_sec2();
+        let ulp = f64::from(f32::EPSILON);
+        match self {
+            Self::Xsens => Quantisation::default(),
+            // The increment is rounded once; ten equal ones are wrong alike.
+            Self::Dsp1760 => Quantisation { rate: rate_code + ulp * peak, force: 0.0 },
+            // The driver divides and multiplies in f32: two more roundings.
+            Self::Icm42688 => Quantisation {
+                rate: icm42688::RATE_STEP + rate_code + 3.0 * ulp * peak,
+                force: icm42688::FORCE_STEP + force_code + 3.0 * ulp * peak_force,
+            },
+        }
+    }
+
+    fn no_sample(self, recording: &Recording, row: &Row, why: impl std::fmt::Display) -> ViaError {
+        let (path, line) = (recording.path.clone(), row.line);
+        ViaError::NoSample { path, line, part: self, why: why.to_string() }
+    }
+}
+
+/// The message that an Xsens MTi would send for each row of a recording.
+#[must_use]
+pub fn mti_bytes(recording: &Recording) -> Vec<Vec<u8>> {
+    xsens::messages(recording).collect()
+}
+
+/// What a part delivered for each row, and the bytes that it took.
+type Sent = (Vec<ImuSample>, u64);

@@ -1,0 +1,173 @@
+//! What a part's rounding does to the corrected yaw: measured against the direct replay, and the
+//! bound that follows from the part's steps alone.
+//!
+//! With readings rounded to steps of q, N samples of dt after static initialisation:
+//!
+//! - **rounding**: an error is even within +-q/2, q / sqrt(12) rms, and the next one knows
+//!   nothing of it (the readings' own noise is wider than q). Their sum walks: q / sqrt(12) x dt x
+//!   sqrt(N).
+//! - **bias**: the mean of the 300 samples of static initialisation is off by q / sqrt(12) /
+//!   sqrt(300), and that is taken off every sample: times N dt. Both terms count four times, as
+//!   4 sigma.
+//! - **network**, and the zero-rate updates behind it: their answer is no formula. It is measured, not on
+//!   the part's samples but on stand-ins: the recording with even noise of the same steps on all six channels, from
+//!   [`STAND_INS`] seeds. Twice the largest departure that the sum of the corrections shows.
+//!
+//! The bound is the sum of the three. For the rates' rms they are q/2, four sigma of the bias, and
+//! twice the rms of the stand-ins' corrections. Where a part rounds nothing the bound is zero.
+
+use super::Quantisation;
+use crate::drive::recording::Recording;
+use crate::drive::replay::{Drive, DriveError, Step};
+use crate::drive::wheel_frames::WheelFrames;
+use gyronet::bias::STATIC_SAMPLES;
+use gyronet::model::WindowNetwork;
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::RATE_HZ;
+use gyronet::units::{AngularRate, SpecificForce};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardUniform};
+
+/// Seeds of the network's answer.
+pub const STAND_INS: u64 = 2;
+const SIGMAS: f64 = 4.0;
+const NETWORK_MARGIN: f64 = 2.0;
+
+/// Two replays of a drive, row by row.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Difference {
+    /// Largest difference of the accumulated yaw, rad.
+    pub yaw_largest: f64,
+    /// At the end, rad.
+    pub yaw_final: f64,
+    /// RMS of the rates' difference, rad/s.
+    pub rate_rms: f64,
+    /// Rows that both replays have sent.
+    pub rows: usize,
+    /// Rows that only one of them has sent.
+    pub unpaired: usize,
+}
+
+impl Difference {
+    /// Of the rates that were sent at once.
+    #[must_use]
+    pub fn of_rates(direct: &Drive, via: &Drive) -> Self {
+        Self::of(direct, via, |step| step.vehicle.prompt.rate)
+    }
+
+    /// Of the corrections in them.
+    fn of_corrections(direct: &Drive, via: &Drive) -> Self {
+        Self::of(direct, via, |step| step.vehicle.prompt.correction)
+    }
+
+    /// From the first step after both have been initialised.
+    fn of(direct: &Drive, via: &Drive, what: impl Fn(&Step) -> AngularRate) -> Self {
+        let (mut difference, mut sum, mut squares) = (Self::default(), 0.0, 0.0);
+        let (mut a, mut b) = (direct.steps[direct.start..].iter(), via.steps[via.start..].iter());
+        let (mut left, mut right) = (a.next(), b.next());
+        while let (Some(one), Some(other)) = (left, right) {
+            if one.row != other.row {
+                difference.unpaired += 1;
+                if one.row < other.row {
+                    left = a.next()
+                } else {
+                    right = b.next()
+                }
+                continue;
+            }
+            let off =
+                f64::from(what(other).0.wrapping_sub(what(one).0)) / AngularRate::PER_RAD_PER_SEC as f64;
+            sum += off / f64::from(RATE_HZ);
+            squares += off * off;
+            difference.rows += 1;
+            difference.yaw_largest = difference.yaw_largest.max(sum.abs());
+            (left, right) = (a.next(), b.next());
+        }
+        difference.unpaired += left.iter().chain(&right).count() + a.chain(b).count();
+        difference.yaw_final = sum;
+        difference.rate_rms = (squares / difference.rows.max(1) as f64).sqrt();
+        difference
+    }
+}
+
+/// What the difference may be, term by term.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bound {
+    /// Of the yaw: rounding of each sample, rad.
+    pub rounding: f64,
+    /// Of the yaw: the static bias, rad.
+    pub bias: f64,
+    /// Of the yaw: the network's answer, rad.
+    pub network: f64,
+    /// Of the rates' rms, all together, rad/s.
+    pub rate_rms: f64,
+}
+
+impl Bound {
+    /// From a part's steps; `direct` is the drive without the part. `tick` is called
+    /// [`STAND_INS`] times for each row, unless nothing is rounded.
+    ///
+    /// # Errors
+    /// [`DriveError`], when a stand-in does not initialise.
+    pub fn new(
+        quantisation: Quantisation,
+        recording: &Recording,
+        direct: &Drive,
+        network: &mut impl WindowNetwork,
+        mut tick: impl FnMut(),
+    ) -> Result<Self, DriveError> {
+        if quantisation == Quantisation::default() {
+            return Ok(Self::default());
+        }
+        let (dt, samples) = (1.0 / f64::from(RATE_HZ), (direct.steps.len() - direct.start) as f64);
+        let sigma = quantisation.rate / 12f64.sqrt();
+        let bias = SIGMAS * sigma / f64::from(STATIC_SAMPLES).sqrt();
+        let mut answer = Difference::default();
+        for seed in 0..STAND_INS {
+            let (config, wheels) = (PipelineConfig::DEFAULT, WheelFrames::new(recording));
+            let stand_in = stand_in(recording, quantisation, seed);
+            let drive = Drive::run(&stand_in, &config, wheels, network, &mut tick)?;
+            let one = Difference::of_corrections(direct, &drive);
+            answer.yaw_largest = answer.yaw_largest.max(one.yaw_largest);
+            answer.rate_rms = answer.rate_rms.max(one.rate_rms);
+        }
+        Ok(Self {
+            rounding: SIGMAS * sigma * dt * samples.sqrt(),
+            bias: bias * samples * dt,
+            network: NETWORK_MARGIN * answer.yaw_largest,
+            rate_rms: quantisation.rate / 2.0 + bias + NETWORK_MARGIN * answer.rate_rms,
+        })
+    }
+
+    /// Of the accumulated yaw, anywhere in the drive, rad.
+    #[must_use]
+    pub fn yaw(&self) -> f64 {
+        self.rounding + self.bias + self.network
+    }
+
+    /// Whether a difference keeps to it, every row having gone out in both replays.
+    #[must_use]
+    pub fn holds(&self, difference: &Difference) -> bool {
+        difference.unpaired == 0
+            && difference.yaw_largest <= self.yaw()
+            && difference.rate_rms <= self.rate_rms
+    }
+}
+
+/// The recording with even noise of a step's width on every channel.
+fn stand_in(recording: &Recording, quantisation: Quantisation, seed: u64) -> Recording {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut noise = |codes: f64| {
+        let unit: f64 = StandardUniform.sample(&mut rng);
+        libm::round((unit - 0.5) * codes) as i32
+    };
+    let rate = quantisation.rate / AngularRate(1).rad_per_sec();
+    let force = quantisation.force / SpecificForce(1).metre_per_sec2();
+    let mut recording = recording.clone();
+    for row in &mut recording.rows {
+        row.sample.angular_rate.iter_mut().for_each(|code| code.0 = code.0.saturating_add(noise(rate)));
+        row.sample.specific_force.iter_mut().for_each(|code| code.0 = code.0.saturating_add(noise(force)));
+    }
+    recording
+}

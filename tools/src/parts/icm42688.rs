@@ -1,0 +1,159 @@
+//! FIFO packets of 20 bits, through the driver and a simulated SPI bus: reset, identity,
+//! settings, packets and the register that is checked with each of them.
+
+use super::{Part, Sent, ViaError};
+use crate::drive::recording::Recording;
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use gyronet::sample::ImuSample;
+use gyronet::sensor::icm42688::packet::{Packet, Resolution};
+use gyronet::sensor::icm42688::registers as reg;
+use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
+use gyronet::units::{Micros, STANDARD_GRAVITY};
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// 1/131 deg/s: of its 20 bits the part uses 19 for a rate.
+pub const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
+/// 1/8192 g: 18 bits for an acceleration.
+pub const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
+/// Counts of a 20-bit reading in one step.
+const RATE_COUNTS: f64 = 2.0;
+const FORCE_COUNTS: f64 = 4.0;
+/// The ends of an acceleration's range; what would be lower means "no reading".
+pub const ENDS: [f64; 2] = [-524_256.0, 524_284.0];
+/// The part's counter of 16 bits wraps.
+const WRAP: u64 = 1 << 16;
+/// Microseconds of a turn of the counter, which counts 32/30 us.
+pub const WRAP_US: f64 = WRAP as f64 * 32.0 / 30.0;
+
+pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+    let bus = Bus::default();
+    let no_start = |why: String| ViaError::NoStart { part: Part::Icm42688, why };
+    let mut part = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay)
+        .map_err(|error| no_start(error.to_string()))?;
+    let mut samples = Vec::with_capacity(recording.rows.len());
+    for row in &recording.rows {
+        let error = |why: String| Part::Icm42688.no_sample(recording, row, why);
+        bus.fill(packet(&row.sample).emit());
+        let sample = part.next_sample().map_err(|e| error(e.to_string()))?;
+        let sample = sample.ok_or_else(|| error("its FIFO seems empty".to_owned()))?;
+        // The part's clock begins anywhere, and the turns that it makes in a silence show in the
+        // arrival alone.
+        let (sent, read) = (counts(row.sample.time), counts(sample.time));
+        let turns = sent.saturating_sub(read) / WRAP;
+        samples.push(ImuSample { time: micros(read + turns * WRAP), ..sample });
+    }
+    let bytes = bus.part().bytes;
+    Ok((samples, bytes))
+}
+
+/// Returns the nearest count of the part's counter at a time, as if it never wrapped.
+const fn counts(time: Micros) -> u64 {
+    (time.0 * 30 + 16) / 32
+}
+
+/// Returns the nearest microsecond.
+const fn micros(counts: u64) -> Micros {
+    Micros((counts * 32 + 15) / 30)
+}
+
+/// The packet of a sample, its readings rounded to the part's steps and clipped at its ends.
+pub fn packet(sample: &ImuSample) -> Packet {
+    let reading = |value: f64, step: f64, counts: f64| {
+        Some((libm::round(value / step) * counts).clamp(ENDS[0], ENDS[1]) as i32)
+    };
+    Packet {
+        resolution: Resolution::Bits20,
+        acceleration: sample
+            .specific_force
+            .map(|force| reading(force.metre_per_sec2(), FORCE_STEP, FORCE_COUNTS)),
+        rate: sample.angular_rate.map(|rate| reading(rate.rad_per_sec(), RATE_STEP, RATE_COUNTS)),
+        temperature: sample.temperature.map(|code| (f32::from(code.0) * 1.3248 - 3312.0).round() as i16),
+        time: (counts(sample.time) % WRAP) as u16,
+    }
+}
+
+/// The part on its bus: registers that hold what is written, and a FIFO.
+#[derive(Debug, Default)]
+struct Simulated {
+    registers: std::collections::HashMap<(u8, u8), u8>,
+    bank: u8,
+    fifo: VecDeque<u8>,
+    bytes: u64,
+}
+
+impl Simulated {
+    fn write(&mut self, address: u8, value: u8) {
+        if address == reg::BANK_SEL {
+            self.bank = value;
+        } else if (self.bank, address) != (0, reg::DEVICE_CONFIG.address) {
+            self.registers.insert((self.bank, address), value);
+        }
+    }
+
+    fn read(&mut self, address: u8, to: &mut [u8]) {
+        let waiting = (self.fifo.len() as u16).to_be_bytes();
+        for (offset, byte) in to.iter_mut().enumerate() {
+            *byte = match address {
+                a if a == reg::FIFO_DATA.address => self.fifo.pop_front().unwrap_or(0x80),
+                a if a == reg::FIFO_COUNTH.address => waiting[offset % 2],
+                a if a == reg::WHO_AM_I.address => reg::IDENTITY,
+                a => self.registers.get(&(self.bank, a)).copied().unwrap_or(0),
+            };
+        }
+    }
+}
+
+/// The simulated part, shared by the driver and whoever fills its FIFO.
+#[derive(Debug, Clone, Default)]
+pub struct Bus(Arc<Mutex<Simulated>>);
+
+impl Bus {
+    /// The part puts bytes into its FIFO.
+    pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
+        self.part().fifo.extend(bytes);
+    }
+
+    fn part(&self) -> MutexGuard<'_, Simulated> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl ErrorType for Bus {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Bus {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let mut part = self.part();
+        let mut selected = 0;
+        for operation in operations {
+            match operation {
+                Operation::Write(bytes) => {
+                    part.bytes += bytes.len() as u64;
+                    match **bytes {
+                        [address] => selected = address & !reg::READ,
+                        [address, value] => part.write(address, value),
+                        _ => {}
+                    }
+                }
+                Operation::Read(to) => {
+                    part.bytes += to.len() as u64;
+                    part.read(selected, to);
+                }
+                // The driver does none of these.
+                Operation::Transfer(..) | Operation::TransferInPlace(_) | Operation::DelayNs(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Time stands still.
+pub struct NoDelay;
+
+impl DelayNs for NoDelay {
+    fn delay_ns(&mut self, _ns: u32) {}
+}

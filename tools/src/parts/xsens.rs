@@ -1,0 +1,49 @@
+//! MTData2 messages in single precision, byte by byte through the parser.
+
+use super::{Part, Sent, ViaError};
+use crate::drive::recording::Recording;
+use gyronet::sample::ImuSample;
+use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::units::Micros;
+
+/// All six clipping bits of the status word.
+const CLIPPED: u32 = 0x3F << 8;
+/// Self-test passed, filter valid.
+const GOOD: u32 = 3;
+/// Microseconds of a tick of SampleTimeFine.
+const TICK_US: u64 = 100;
+
+pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+    let mut mti = Mti::new();
+    let (mut samples, mut bytes) = (Vec::with_capacity(recording.rows.len()), 0);
+    // What the first of the part's 32-bit ticks leaves out of the recording's time: whole wraps.
+    let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
+    let epoch = first - first % (TICK_US << 32);
+    for (row, frame) in recording.rows.iter().zip(messages(recording)) {
+        bytes += frame.len() as u64;
+        frame.iter().for_each(|byte| mti.receive(*byte));
+        let delivered = mti.next_sample().ok_or_else(|| "no frame was found".to_owned());
+        let sample = delivered.and_then(|sample| sample.map_err(|error| error.to_string()));
+        let sample = sample.map_err(|why| Part::Xsens.no_sample(recording, row, why))?;
+        samples.push(ImuSample { time: Micros(sample.time.0 + epoch), ..sample });
+    }
+    Ok((samples, bytes))
+}
+
+/// The bytes of each row's message.
+pub fn messages(recording: &Recording) -> impl Iterator<Item = Vec<u8>> {
+    let rows = recording.rows.iter().enumerate();
+    rows.map(|(number, row)| message(number, &row.sample).emit().to_vec())
+}
+
+/// The message of a sample. Its codes came from f32 and go back to the same ones.
+fn message(number: usize, sample: &ImuSample) -> MtData2 {
+    MtData2 {
+        packet_counter: Some(number as u16),
+        sample_time_fine: Some((sample.time.0 / TICK_US) as u32),
+        acceleration: Some(sample.specific_force.map(|force| force.metre_per_sec2() as f32)),
+        rate_of_turn: Some(sample.angular_rate.map(|rate| rate.rad_per_sec() as f32)),
+        temperature: sample.temperature.map(|code| f32::from(code.0) / 100.0),
+        status: Some(GOOD | if !sample.validity.is_good() { CLIPPED } else { 0 }),
+    }
+}

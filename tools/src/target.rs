@@ -1,0 +1,11 @@
+//! What the firmware takes on its processor. [`emulator`] runs an image in QEMU; [`bench`] counts instructions and
+//! modelled cycles of the networks and parsers, [`tasks`] those of every interrupt handler, from which [`schedule`]
+//! computes worst response times. [`size`] and [`stack`] read the image's ELF file.
+
+pub mod bench;
+pub mod emulator;
+pub mod parser_load;
+pub mod schedule;
+pub mod size;
+pub mod stack;
+pub mod tasks;

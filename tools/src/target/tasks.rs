@@ -1,0 +1,182 @@
+//! What every task and interrupt of the flashed image costs, counted while it runs in the
+//! emulator: one sample after the other goes in, with wheel speeds, questions on the service
+//! line and a host's commands beside it.
+
+mod drive;
+mod symbols;
+
+use crate::target::bench::{BenchError, field};
+use crate::target::emulator::EmulatorError;
+use std::path::Path;
+use symbols::Symbols;
+
+/// Kinds of activations of a handler: by how many bytes it has moved, or samples processed; the last
+/// one is as many or more.
+pub const KINDS: usize = 5;
+
+/// Everything that was counted of an image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Tasks {
+    /// Its handlers.
+    pub handlers: Vec<Handler>,
+    /// For which all interrupts were off, at worst.
+    pub all_off: Cycles,
+    /// For which idle kept the output task out, at worst.
+    pub some_off: Cycles,
+}
+
+/// Modelled cycles: the largest at zero wait states, and the largest on an STM32F405 at 168 MHz.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Cycles {
+    /// At zero wait states.
+    pub zero: u64,
+    /// With flash at 5 wait states and empty caches at the start.
+    pub five: u64,
+}
+
+/// The cheapest of some activations, preemption left out; zero: there was none.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Least {
+    /// Of that one.
+    pub cycles: Cycles,
+    /// Lines that it has put into the caches.
+    pub fills: u64,
+}
+
+impl std::fmt::Display for Least {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} fills={}", self.cycles, self.fills)
+    }
+}
+
+impl Cycles {
+    /// The larger one of each.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self { zero: self.zero.max(other.zero), five: self.five.max(other.five) }
+    }
+}
+
+impl std::ops::Add for Cycles {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { zero: self.zero + other.zero, five: self.five + other.five }
+    }
+}
+
+impl std::ops::Mul<u64> for Cycles {
+    type Output = Self;
+
+    fn mul(self, times: u64) -> Self {
+        Self { zero: self.zero * times, five: self.five * times }
+    }
+}
+
+impl std::fmt::Display for Cycles {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "cycles={} cycles_5ws={}", self.zero, self.five)
+    }
+}
+
+/// One interrupt handler of the image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Handler {
+    /// As the vector table names it.
+    pub name: String,
+    /// The larger the more urgent.
+    pub priority: u8,
+    /// Of each kind, the worst.
+    pub activations: [Option<Activation>; KINDS],
+    /// The cheapest activation.
+    pub least: Least,
+    /// The cheapest one that looks at every line and processes no sample, where there is one.
+    pub looking: Least,
+    /// Halfwords of its code, what it calls left out.
+    pub code: u64,
+}
+
+/// The worst of the activations of a handler, preemption left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Activation {
+    /// How many there were.
+    pub runs: u64,
+    /// Instructions of the longest one.
+    pub instructions: u64,
+    /// Of the most expensive one.
+    pub cycles: Cycles,
+    /// Lines that the one with most has put into the caches.
+    pub fills: u64,
+}
+
+impl std::fmt::Display for Handler {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "task/{} priority={}", self.name, self.priority)?;
+        if self.least.cycles.zero == 0 {
+            write!(f, " runs=0")?;
+        }
+        for (kind, activation) in self.activations.iter().enumerate() {
+            if let Some(Activation { runs, instructions, cycles, fills }) = activation {
+                let more = if kind == KINDS - 1 { "+" } else { "" };
+                write!(f, " [{kind}{more}: runs={runs} instructions={instructions} {cycles} fills={fills}]")?;
+            }
+        }
+        if self.least.cycles.zero > 0 {
+            write!(f, " least: {}", self.least)?;
+        }
+        if self.looking.cycles.zero > 0 {
+            write!(f, " looking: {}", self.looking)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::fmt::Display for Tasks {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.handlers.iter().try_for_each(|handler| writeln!(f, "{handler}"))?;
+        write!(f, "interrupts off: {}; output kept out by idle: {}", self.all_off, self.some_off)
+    }
+}
+
+/// Runs the image with the plugin; all of its handlers.
+///
+/// # Errors
+/// [`BenchError`], also when the image does not answer.
+pub fn measure(image: &Path, plugin: &Path) -> Result<Tasks, BenchError> {
+    let Symbols { handlers, watched, looking } = Symbols::read(image).map_err(BenchError::Line)?;
+    let mut options = format!("{},watch={watched:x},look={looking:x}", plugin.display());
+    handlers.iter().for_each(|(_, option)| options += option);
+    let (mut all_off, mut some_off) = (Cycles::default(), Cycles::default());
+    let mut found: Vec<Handler> = handlers.into_iter().map(|(handler, _)| handler).collect();
+    let failed = |error: EmulatorError| BenchError::Failed {
+        program: image.display().to_string(),
+        output: error.to_string(),
+    };
+    let printed = drive::run(image, &options).map_err(failed)?;
+    for line in printed.lines() {
+        let (what, rest) = line.split_once(' ').unwrap_or_default();
+        let number = |key| field(line, key).ok_or_else(|| BenchError::Line(line.to_owned()));
+        if what == "LOCKED" {
+            all_off = Cycles { zero: number("all=")?, five: number("all_waited=")? };
+            some_off = Cycles { zero: number("some=")?, five: number("some_waited=")? };
+        }
+        let name = rest.split(' ').next().unwrap_or_default();
+        let Some(handler) = found.iter_mut().find(|handler| handler.name == name) else { continue };
+        if what == "HANDLER" {
+            let least = |zero, five, fills| {
+                let cycles = Cycles { zero: number(zero)?, five: number(five)? };
+                Ok::<_, BenchError>(Least { cycles, fills: number(fills)? })
+            };
+            handler.least = least("least=", "least_waited=", "least_fills=")?;
+            handler.looking = least("looking=", "looking_waited=", "looking_fills=")?;
+        } else if let Some(activation) = handler.activations.get_mut(number("seen=")? as usize) {
+            *activation = Some(Activation {
+                runs: number("runs=")?,
+                instructions: number("insns=")?,
+                cycles: Cycles { zero: number("cycles=")?, five: number("waited=")? },
+                fills: number("fills=")?,
+            });
+        }
+    }
+    Ok(Tasks { handlers: found, all_off, some_off })
+}
