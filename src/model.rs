@@ -1,12 +1,17 @@
 //! The networks of the paper, with their topology, on top of [`crate::nn`].
 
+#[doc(hidden)]
 pub mod background;
+#[doc(hidden)]
 pub mod blob;
-pub mod file;
+pub(crate) mod file;
 pub mod fognet;
+#[doc(hidden)]
 pub mod fognet_blob;
+#[doc(hidden)]
 pub mod fognet_f32;
 pub mod gyronet;
+#[doc(hidden)]
 pub mod gyronet_f32;
 mod input;
 pub mod weights;

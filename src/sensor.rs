@@ -51,9 +51,11 @@
 //!    `src/bin/coprocessor`, the list of what it drives in `start.rs`).
 
 pub mod adis16465;
+#[doc(hidden)]
 pub mod crc;
 pub mod dsp1760;
 pub mod dsp3000;
+#[doc(hidden)]
 pub mod framer;
 pub mod icm42688;
 pub mod serial;
