@@ -1,4 +1,4 @@
-//! From the network's estimates to the rates that go out.
+//! This module computes corrected rates from the network's estimates.
 //!
 //! A sample's best estimate is the mean of what the windows that cover it say ([`Mode`]). It is
 //! known some samples later; two rates go out for every sample all the same:

@@ -1,4 +1,5 @@
-//! The coprocessor: readings, CAN frames and time in; CAN frames, windows for the networks and observations out.
+//! The coprocessor takes readings, CAN frames and time, and returns CAN frames, windows for the networks and
+//! observations.
 //!
 //! [`Coprocessor`] owns the order in which the parts of the product work, and does no input or output itself: the
 //! firmware image, a replay of a recorded drive, the fault campaign and a board of your own are adapters around
@@ -318,9 +319,9 @@ impl Coprocessor {
     }
 
     fn advance(&mut self, now: Micros) -> Result<Micros, InputError> {
-        self.timeline.advance(now).map_err(|by_us| {
+        self.timeline.advance(now).map_err(|by| {
             count(&mut self.counters.clock_back, 1);
-            InputError::ClockWentBack { by_us }
+            InputError::ClockWentBack { by }
         })
     }
 

@@ -1,4 +1,4 @@
-//! From FoGNet's estimates to the turn that goes out, frame by frame.
+//! This module computes corrected turns from FoGNet's estimates, frame by frame.
 //!
 //! A window covers a minute, and there is a new one every second, so 60 windows cover each
 //! second. The estimate of the newest window is used in the second after next: whoever has time

@@ -1,4 +1,4 @@
-//! What the board thinks of itself: status, source and one counter for each kind of event.
+//! These types are the board's report of itself: status, source and one counter for each kind of event.
 
 use crate::sample::Validity;
 

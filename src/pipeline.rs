@@ -1,4 +1,4 @@
-//! One sample of the inertial sensor in, its corrected yaw rates out.
+//! The pipeline computes the corrected yaw rates of one sample of the inertial sensor.
 //!
 //! This file owns the order of the stages (grid, mounting, initialisation, window, compensation, zero-rate
 //! updates, report) and nothing else. The stages do not import each other; they share the types of samples,

@@ -1,4 +1,4 @@
-//! A part's clock, taken to the board's.
+//! This module translates the time stamps of a part's clock to the board's clock.
 //!
 //! A time stamp says when a reading was taken, by a clock that started at another time and
 //! runs at another speed than the board's. Its arrival is by the board's clock, but late by a

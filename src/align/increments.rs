@@ -1,4 +1,4 @@
-//! Increments of a fibre-optic gyro, summed from one grid step to the next.
+//! This module sums the increments of a fibre-optic gyro from one grid step to the next.
 //!
 //! The rules:
 //! - An increment belongs to the time since the one before it. One that straddles a grid step

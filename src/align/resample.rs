@@ -1,4 +1,4 @@
-//! An inertial sensor of any rate onto the grid: linear between the samples before and after.
+//! This module interpolates an inertial sensor of any rate on the grid, linearly between two samples.
 //!
 //! | samples around the grid step | value |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! An inertial sensor and a fibre-optic gyro, each with its own clock and rate, on one grid.
+//! This module puts an inertial sensor and a fibre-optic gyro, each with its own clock and rate, on one grid.
 //!
 //! Grid steps are the multiples of 10 ms of the board's clock. A step comes out as soon as both
 //! streams have passed it, and [`MAX_DELAY_US`] after its time at the latest, with what there

@@ -1,4 +1,4 @@
-//! Mean and spread of a run of readings, in one pass.
+//! This module computes mean and spread of a run of readings in one pass, so that no reading is kept.
 
 /// Sum (exact) and squared deviations (Welford's way: B. P. Welford, Technometrics 4, 1962).
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,4 +1,4 @@
-//! Static initialisation: the gyro's bias as its mean over the first three seconds.
+//! Static initialisation takes the gyro's bias as its mean over the first three seconds.
 //!
 //! A vehicle with its engine running shakes but goes nowhere, so stillness is judged twice:
 //! the spread inside the three seconds must stay below what an engine does, and the means of

@@ -1,4 +1,4 @@
-//! The Bosch MM5.10 yaw-rate message, 0x174 at 100 Hz: a drop-in for sensors that are in cars.
+//! The Bosch MM5.10 yaw-rate message, 0x174 at 100 Hz, makes the board a drop-in for sensors that are in cars.
 //!
 //! | bytes | signal | scale |
 //! |---|---|---|

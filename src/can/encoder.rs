@@ -1,4 +1,4 @@
-//! The frames of one sample of the inertial sensor, as they are configured.
+//! This encoder makes the configured frames of one sample of the inertial sensor.
 
 use super::DataFrame;
 use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};

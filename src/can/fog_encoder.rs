@@ -1,4 +1,5 @@
-//! The yaw messages of a fibre-optic gyro: sent from when it is heard, from the start where one is configured.
+//! This encoder makes the yaw messages of a fibre-optic gyro. They are sent from its first sample on, or from the
+//! start where one is configured.
 
 use super::DataFrame;
 use super::config::SAMPLE_MS;

@@ -1,4 +1,4 @@
-//! SAE J1939: vehicle dynamic stability control 2 (VDC2), the yaw rate on trucks and machines.
+//! SAE J1939 carries the yaw rate on trucks and machines in its message VDC2 (vehicle dynamic stability control 2).
 //!
 //! | bytes | SPN | signal | scale |
 //! |---|---|---|---|

@@ -1,4 +1,4 @@
-//! A fibre-optic gyro from its samples to the rate that is sent every 10 ms.
+//! The pipeline computes the rate that is sent every 10 ms from a fibre-optic gyro's samples.
 //!
 //! The gyro's increments are summed on the grid of the time that the caller gives ([`Streams`]). The newest
 //! readings of inertial sensor and wheels stand for those of the step: they are a step or two old, which is

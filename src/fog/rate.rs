@@ -1,4 +1,4 @@
-//! Increments to rates and back, without losing anything in the sum.
+//! These types convert increments to rates and back without losing anything in the sum.
 
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, AngularRate};

@@ -1,4 +1,4 @@
-//! The last minute in steps of a second, as FoGNet sees it.
+//! FoGNet sees the last minute in steps of a second.
 //!
 //! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged; all
 //! in integers, the gyro's increments to the last bit. A gap in the gyro ends the window, for an

@@ -1,4 +1,4 @@
-//! The wheels as the pipeline needs them: whether the vehicle stands, and whether a wheel has fallen silent.
+//! The pipeline needs two facts of the wheels: whether the vehicle stands, and whether a wheel has fallen silent.
 
 use crate::sample::{Standstill, WHEELS, WheelSample};
 

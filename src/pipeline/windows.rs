@@ -1,4 +1,5 @@
-//! GyroNet's windows: the samples of the next one, the one that is out, and whether the newest estimate counts.
+//! This module holds GyroNet's windows: the samples of the next one, the one that is out, and the use of the newest
+//! estimate.
 
 use super::DueWindow;
 use crate::health::Faults;

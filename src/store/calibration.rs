@@ -1,4 +1,4 @@
-//! What the board has found out about its own sensor.
+//! A calibration holds what the board has found out about its own sensor.
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;

@@ -1,4 +1,4 @@
-//! The whole MM5.10 set: three messages of one shape, each with one rate and one acceleration.
+//! The whole MM5.10 set has three messages of one shape, each with one rate and one acceleration.
 //!
 //! | message | identifier | rate | acceleration | byte 2, low nibble | byte 3 |
 //! |---|---|---|---|---|---|
