@@ -1,4 +1,4 @@
-//! `gyronet size`: what the firmware image takes, against its budgets.
+//! `gyronet size`: the sizes of the firmware image against their budgets.
 
 use super::Common;
 use gyronet_tools::target::bench;
@@ -7,11 +7,11 @@ use gyronet_tools::target::stack::{Handler, ImageStack, Way};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Measure the firmware image: flash, static RAM and the worst stack, bytes.
+/// Measure flash, static RAM and the worst stack of the firmware image, bytes.
 ///
-/// Static RAM is SRAM: statics, and the code that runs from there, which counts as flash too.
-/// The stack is an upper bound from the machine code: handlers of all priorities, one inside the
-/// other. Exit status 1 when a budget is exceeded.
+/// Static RAM is SRAM: statics, and the code that runs from there, which counts as flash too. The stack is an upper
+/// bound from the machine code, with handlers of all priorities one inside the other. The exit status is 1 when a
+/// budget is exceeded.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Measure this ELF file [default: the image is built].

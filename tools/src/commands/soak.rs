@@ -1,4 +1,4 @@
-//! `gyronet soak`: hours of a drive, every clock and counter wrapping.
+//! `gyronet soak`: hours of a drive in which every clock and counter wraps.
 
 use super::weights::Weights;
 use super::{Common, print_json, progress};
@@ -7,11 +7,10 @@ use gyronet::sample::RATE_HZ;
 use gyronet_tools::campaign::soak;
 use std::io::Write;
 
-/// Run hours of a simulated drive from bytes to bytes, every counter wrapping.
+/// Run hours of a simulated drive, in which every clock and counter wraps.
 ///
-/// From a part's bytes to a receiver of the CAN frames. Every clock and counter on the way wraps. Prints
-/// what was counted; exit status 1 where a sample or frame is lost, a clock or the yaw drifts, or memory
-/// grows.
+/// The drive goes from a part's bytes to a receiver of the CAN frames. The command prints all counters. The exit
+/// status is 1 where a sample or frame is lost, a clock or the yaw drifts, or memory grows.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:

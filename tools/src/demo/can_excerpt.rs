@@ -1,4 +1,4 @@
-//! The messages of one sample, read as a receiver reads them.
+//! The messages of one sample in words.
 
 use crate::drive::replay::Drive;
 use embedded_can::{Frame, Id};
@@ -8,18 +8,18 @@ use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage, SIGMA_UNKNOWN}
 use gyronet::can::{DataFrame, j1939::Vdc2};
 use serde::Serialize;
 
-/// One message.
+/// A message in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Message {
-    /// When its sample was taken, since the recording's first, s.
+    /// The time of its sample since the recording's first, s.
     pub time: String,
-    /// As the data base `gyronet.dbc` has it.
+    /// The name in `gyronet.dbc`.
     pub name: String,
     /// Hexadecimal.
     pub id: String,
     /// Hexadecimal.
     pub data: String,
-    /// What it says.
+    /// The content in words.
     pub says: String,
 }
 

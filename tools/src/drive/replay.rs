@@ -1,4 +1,4 @@
-//! A recorded drive through the coprocessor, as the board would run it.
+//! A recorded drive that runs through the coprocessor as on the board.
 
 use crate::drive::candump::Log;
 use crate::drive::recording::Recording;
@@ -13,7 +13,7 @@ use gyronet::units::{AngularRate, Micros, Yaw};
 use std::io::{self, Write};
 use std::ops::Range;
 
-/// Why a recording gives no corrected rate.
+/// The error of a recording that gives no corrected rate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriveError {
@@ -24,7 +24,7 @@ pub enum DriveError {
         path: String,
         /// The line with which the three seconds were over.
         line: u64,
-        /// What gave it away.
+        /// The check that failed.
         source: StaticError,
     },
     /// The recording ends before three seconds without a gap were seen.
@@ -42,7 +42,7 @@ pub struct Step {
     pub row: usize,
     /// The sample's time stamp.
     pub time: Micros,
-    /// Everything that was sent with this row.
+    /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
     /// The navigation rate of this row's sample, which was sent some samples later; `None` before static
     /// initialisation is over, and for the last samples, whose turn never came.
@@ -57,13 +57,13 @@ pub struct Step {
 /// A drive with its corrected yaw rate.
 #[derive(Debug, Clone)]
 pub struct Drive {
-    /// One for each row that found its place in time.
+    /// One step for each row that has a place on the grid.
     pub steps: Vec<Step>,
     /// The first step after static initialisation.
     pub start: usize,
     /// The gyro's static bias.
     pub gyro_bias: [AngularRate; 3],
-    /// What the navigation rates still owe at the end.
+    /// The yaw that the navigation rates still carry at the end.
     pub owed: Yaw,
     /// The numbers of events.
     pub counters: Counters,
@@ -172,7 +172,7 @@ impl Drive {
         log.finish()
     }
 
-    /// How many steps had each status.
+    /// Returns the number of steps with each status.
     #[must_use]
     pub fn status_counts(&self) -> [(Status, usize); 4] {
         [Status::Init, Status::Degraded, Status::Ready, Status::Clipped].map(|status| {

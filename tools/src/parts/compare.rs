@@ -39,7 +39,7 @@ const NETWORK_MARGIN: f64 = 2.0;
 pub struct Difference {
     /// Largest difference of the accumulated yaw, rad.
     pub yaw_largest: f64,
-    /// At the end, rad.
+    /// The difference at the end, rad.
     pub yaw_final: f64,
     /// RMS of the rates' difference, rad/s.
     pub rate_rms: f64,
@@ -50,18 +50,18 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Of the rates that were sent at once.
+    /// Compares the rates that were sent at once.
     #[must_use]
     pub fn of_rates(direct: &Drive, via: &Drive) -> Self {
         Self::of(direct, via, |step| step.vehicle.prompt.rate)
     }
 
-    /// Of the corrections in them.
+    /// Compares the corrections in them.
     fn of_corrections(direct: &Drive, via: &Drive) -> Self {
         Self::of(direct, via, |step| step.vehicle.prompt.correction)
     }
 
-    /// From the first step after both have been initialised.
+    /// Compares from the first step after both have been initialised.
     fn of(direct: &Drive, via: &Drive, what: impl Fn(&Step) -> AngularRate) -> Self {
         let (mut difference, mut sum, mut squares) = (Self::default(), 0.0, 0.0);
         let (mut a, mut b) = (direct.steps[direct.start..].iter(), via.steps[via.start..].iter());
@@ -91,22 +91,22 @@ impl Difference {
     }
 }
 
-/// What the difference may be, term by term.
+/// The bound of the difference, term by term.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bound {
-    /// Of the yaw: rounding of each sample, rad.
+    /// The yaw from the rounding of each sample, rad.
     pub rounding: f64,
-    /// Of the yaw: the static bias, rad.
+    /// The yaw from the static bias, rad.
     pub bias: f64,
-    /// Of the yaw: the network's answer, rad.
+    /// The yaw from the network's answer, rad.
     pub network: f64,
-    /// Of the rates' rms, all together, rad/s.
+    /// The rms of the rates from all of them, rad/s.
     pub rate_rms: f64,
 }
 
 impl Bound {
-    /// From a part's steps; `direct` is the drive without the part. `tick` is called
-    /// [`STAND_INS`] times for each row, unless nothing is rounded.
+    /// Computes the bound from a part's steps; `direct` is the drive without the part. `tick` is called [`STAND_INS`]
+    /// times for each row, unless nothing is rounded.
     ///
     /// # Errors
     /// [`DriveError`], when a stand-in does not initialise.
@@ -140,13 +140,13 @@ impl Bound {
         })
     }
 
-    /// Of the accumulated yaw, anywhere in the drive, rad.
+    /// Returns the bound of the accumulated yaw anywhere in the drive, rad.
     #[must_use]
     pub fn yaw(&self) -> f64 {
         self.rounding + self.bias + self.network
     }
 
-    /// Whether a difference keeps to it, every row having gone out in both replays.
+    /// Returns whether a difference is within the bound, with every row in both replays.
     #[must_use]
     pub fn holds(&self, difference: &Difference) -> bool {
         difference.unpaired == 0

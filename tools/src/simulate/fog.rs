@@ -45,7 +45,7 @@ impl Fog {
         Self { config: *config, random, matrix, bias }
     }
 
-    /// What it says to have turned, rad, while it turned at this rate for so many seconds.
+    /// Returns the measured turn, rad, of a motion at this rate for so many seconds.
     pub fn increment(&mut self, rate: [f64; 3], seconds: f64) -> [f64; 3] {
         let seen = seen(&self.matrix, rate);
         let (noise, root) = (self.random.normals(), seconds.sqrt());

@@ -27,7 +27,7 @@ use std::path::Path;
 /// File of a sequence's folder that says that it is simulated.
 pub const MARKER: &str = "simulated.json";
 
-/// Which data set's.
+/// The layout of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
@@ -48,7 +48,7 @@ impl Layout {
     }
 }
 
-/// What to simulate; written into [`MARKER`].
+/// The specification of a sequence; written into [`MARKER`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spec {
     /// Whose layout.
@@ -124,7 +124,7 @@ impl Drive {
         self.mems.measure(self.mems.tilt(force), self.mems.tilt(rate))
     }
 
-    /// What a magnetometer says in a field of the world, with noise of that size.
+    /// Returns the reading of a magnetometer in a field of the world, with noise of that size.
     fn magnetic(&mut self, truth: &Truth, field: [f64; 3], noise: f64) -> [f64; 3] {
         let seen = truth.in_vehicle(field);
         let normals = self.magnetometer.normals();

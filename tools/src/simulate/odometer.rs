@@ -8,7 +8,7 @@ use super::car::GRAVITY;
 use super::random::{Purpose, Random};
 use std::f64::consts::PI;
 
-/// What the calibration says, and by how much it is wrong.
+/// The calibration, and its errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Diameters as calibrated, left and right, m.
@@ -43,8 +43,7 @@ impl Odometer {
         Self { config: *config, diameter, turns: [0.0; 2] }
     }
 
-    /// So many seconds at a speed along the road (m/s), an acceleration (m/s^2) and a heading
-    /// rate (rad/s).
+    /// Moves for so many seconds at a speed along the road (m/s), an acceleration (m/s^2) and a heading rate (rad/s).
     pub fn step(&mut self, speed: f64, acceleration: f64, heading_rate: f64, seconds: f64) {
         let slip = acceleration / (GRAVITY * self.config.slip_stiffness);
         let half = heading_rate * self.config.base / 2.0;

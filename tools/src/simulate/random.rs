@@ -1,10 +1,10 @@
-//! Random numbers: one stream for each purpose, so that a change to one leaves the others be.
+//! Random numbers: each purpose has a stream of its own, so that a change to one does not affect the others.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-/// What the numbers are for.
+/// The purpose of a stream of random numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Purpose {
     Route,

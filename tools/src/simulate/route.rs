@@ -1,4 +1,4 @@
-//! Where the driver wants to go: streets with bends, wide corners and stops, one after another.
+//! The route of the driver: streets with bends, wide corners and stops, one after another.
 //!
 //! The car turns by at most some 0.3 rad/s, as in the recordings; nobody parks.
 
@@ -7,7 +7,7 @@ use super::random::{Purpose, Random};
 use super::town::Town;
 use std::f64::consts::FRAC_PI_2;
 
-/// Where the legs come from.
+/// The source of the legs.
 #[derive(Debug, Clone)]
 pub enum Way {
     /// The short course of [`Route`].

@@ -1,4 +1,4 @@
-//! When a message arrives: its stamp is the logger's, not the part's.
+//! The arrival of a message: its stamp is the logger's, not the part's.
 
 use crate::simulate::random::{Purpose, Random};
 use crate::simulate::vehicles::Delays;
@@ -24,7 +24,7 @@ impl Delay {
         delay
     }
 
-    /// When a message of this time arrives, later than the one before, s.
+    /// Returns the arrival of a message of this time, later than the one before, s.
     pub fn arrival(&mut self, time: f64) -> f64 {
         while time > self.blocked[1] {
             self.block();

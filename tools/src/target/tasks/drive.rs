@@ -1,4 +1,4 @@
-//! What the emulated image is given to do while it is counted.
+//! The input of the emulated image while it is counted.
 
 use crate::simulate::{Config, Sample, Simulation};
 use crate::target::emulator::{Board, EmulatorError};
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// Samples: static initialisation, and forty windows.
 const SAMPLES: usize = 500;
-/// How long a sample may take, and how long an answer is waited for before it is asked again.
+/// The longest time that a sample may take.
 const TURN: Duration = Duration::from_secs(10);
 const ASK: Duration = Duration::from_millis(20);
 /// Windows of the network that must have run, or nothing is known of it.
@@ -63,7 +63,7 @@ fn ask(board: &mut Board, question: &[u8]) -> Result<(), EmulatorError> {
     question.iter().try_for_each(|byte| board.send(SERVICE, &[*byte], TURN))
 }
 
-/// What the image has said of its pipeline.
+/// The answers of the image about its pipeline.
 #[derive(Default)]
 struct Told {
     deframer: Deframer,
@@ -71,7 +71,7 @@ struct Told {
     read: usize,
     samples: u32,
     windows: u32,
-    /// Of the fibre-optic gyro.
+    /// Messages of the fibre-optic gyro.
     messages: u32,
 }
 
@@ -101,7 +101,7 @@ impl Told {
         Ok(())
     }
 
-    /// Takes the newest of all answers.
+    /// Reads the newest of all answers.
     fn read(&mut self, bytes: &[u8]) {
         for byte in bytes.get(self.read..).unwrap_or_default() {
             if let Some(Ok((_, Reply::Counters(AllCounters { pipeline, fog, .. })))) =
