@@ -4,9 +4,9 @@
 //! RTNeural 54 us, ONNX Runtime f32 65 us, PyTorch 330 us.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet::window::{FEATURES, Features, WINDOW};
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use std::hint::black_box;
 use std::path::Path;

@@ -10,7 +10,6 @@ use super::spread::Spread;
 use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
-use serde::{Deserialize, Serialize};
 
 /// Samples of the static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
@@ -19,7 +18,8 @@ const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 /// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
 /// none of 656 (overlapping) stretches with standing wheels and a running engine is refused, and
 /// 3,177 of 3,247 driven ones are.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StaticConfig {
     /// Standard deviation of each gyro axis, rad/s.
     pub gyro_std: f32,
@@ -39,12 +39,13 @@ impl StaticConfig {
         Self { gyro_std: 0.05, accel_std: 1.5, gyro_drift: 0.004, accel_drift: 0.12, gyro_bias: 0.0873 };
 }
 
-/// What gave the vehicle's motion away; `axis` is 0, 1, 2 for x, y, z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The sign of motion that was found; `axis` is 0, 1, 2 for x, y, z.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StaticError {
     /// Gyro too restless, rad/s.
+    #[error("the vehicle moves during static initialisation: gyro {} has a spread of {std:.4} rad/s", name(*.axis))]
     GyroNoise {
         /// The axis.
         axis: u8,
@@ -52,6 +53,10 @@ pub enum StaticError {
         std: f32,
     },
     /// Accelerometer too restless, m/s^2.
+    #[error(
+        "the vehicle moves during static initialisation: accelerometer {} has a spread of {std:.3} m/s^2",
+        name(*.axis)
+    )]
     AccelNoise {
         /// The axis.
         axis: u8,
@@ -59,6 +64,7 @@ pub enum StaticError {
         std: f32,
     },
     /// The gyro's mean changed from one second to another, rad/s.
+    #[error("the vehicle moves during static initialisation: gyro {} changes its mean by {spread:.4} rad/s", name(*.axis))]
     GyroDrift {
         /// The axis.
         axis: u8,
@@ -66,6 +72,10 @@ pub enum StaticError {
         spread: f32,
     },
     /// The accelerometer's mean changed from one second to another, m/s^2.
+    #[error(
+        "the vehicle moves during static initialisation: accelerometer {} changes its mean by {spread:.3} m/s^2",
+        name(*.axis)
+    )]
     AccelDrift {
         /// The axis.
         axis: u8,
@@ -73,6 +83,7 @@ pub enum StaticError {
         spread: f32,
     },
     /// The mean is more than any bias: a steady turn, rad/s.
+    #[error("the vehicle moves during static initialisation: gyro {} shows a steady {mean:.4} rad/s", name(*.axis))]
     GyroBias {
         /// The axis.
         axis: u8,
@@ -80,39 +91,17 @@ pub enum StaticError {
         mean: f32,
     },
     /// The wheels turn.
+    #[error("the vehicle moves during static initialisation: the wheels turn")]
     Wheels,
     /// The accelerometer shows no vertical.
+    #[error(transparent)]
     Level(LevelError),
 }
 
-impl core::fmt::Display for StaticError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let name = |axis: u8| ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?");
-        if let Self::Level(error) = self {
-            return error.fmt(f);
-        }
-        f.write_str("the vehicle moves during static initialisation: ")?;
-        match *self {
-            Self::GyroNoise { axis, std } => write!(f, "gyro {} has a spread of {std:.4} rad/s", name(axis)),
-            Self::AccelNoise { axis, std } => {
-                write!(f, "accelerometer {} has a spread of {std:.3} m/s^2", name(axis))
-            }
-            Self::GyroDrift { axis, spread } => {
-                write!(f, "gyro {} changes its mean by {spread:.4} rad/s", name(axis))
-            }
-            Self::AccelDrift { axis, spread } => {
-                write!(f, "accelerometer {} changes its mean by {spread:.3} m/s^2", name(axis))
-            }
-            Self::GyroBias { axis, mean } => {
-                write!(f, "gyro {} shows a steady {mean:.4} rad/s", name(axis))
-            }
-            Self::Wheels => f.write_str("the wheels turn"),
-            Self::Level(_) => Ok(()),
-        }
-    }
+/// Returns the letter of an axis.
+fn name(axis: u8) -> &'static str {
+    ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?")
 }
-
-impl core::error::Error for StaticError {}
 
 /// One axis.
 #[derive(Debug, Clone, Copy, Default)]
@@ -123,12 +112,12 @@ struct Axis {
 }
 
 impl Axis {
-    fn push(&mut self, code: i32, value: f32) {
+    fn add(&mut self, code: i32, value: f32) {
         self.seconds[(self.all.count() / RATE_HZ) as usize % SECONDS] += i64::from(code);
-        self.all.push(code, value);
+        self.all.add(code, value);
     }
 
-    /// Largest less smallest one-second mean, in units.
+    /// Returns the largest less the smallest one-second mean, in units.
     fn drift(&self, per_unit: f32) -> f32 {
         let largest = self.seconds.iter().max().copied().unwrap_or(0);
         let smallest = self.seconds.iter().min().copied().unwrap_or(0);
@@ -136,7 +125,7 @@ impl Axis {
     }
 }
 
-/// What the sensor reads at rest.
+/// The mean readings of the sensor at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rest {
@@ -168,14 +157,14 @@ impl StaticInit {
     }
 
     /// Takes a sample; after [`STATIC_SAMPLES`] of them returns what it reads at rest, or why there
-    /// is none, and starts anew.
-    pub fn process(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
+    /// is none, and begins again.
+    pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {
             let rate = sample.angular_rate[axis].0;
             let force = sample.specific_force[axis].0;
-            self.gyro[axis].push(rate, rate as f32 / AngularRate::PER_RAD_PER_SEC);
-            self.accel[axis].push(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
+            self.gyro[axis].add(rate, rate as f32 / AngularRate::PER_RAD_PER_SEC);
+            self.accel[axis].add(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
         let [first, ..] = &self.gyro;
         if first.all.count() < STATIC_SAMPLES {
@@ -186,8 +175,8 @@ impl StaticInit {
         Some(result)
     }
 
-    /// The wheels turn, whatever the sample looks like: forgets what was collected. Says so once,
-    /// not with every sample of a drive.
+    /// Drops the collected samples because the wheels turn. Returns the error once, not with every sample of a
+    /// drive.
     pub fn refuse_wheels(&mut self) -> Option<StaticError> {
         let refused = self.wheels_refused;
         self.restart();

@@ -11,22 +11,15 @@ pub enum ByteOrder {
 }
 
 /// The value does not lie inside eight bytes, or has no bits, or over 32.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("{} bits from bit {} do not lie inside a frame", .len, .start)]
 pub struct OutsideFrame {
     /// Start bit as given.
     pub start: u8,
     /// Length as given.
     pub len: u8,
 }
-
-impl core::fmt::Display for OutsideFrame {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} bits from bit {} do not lie inside a frame", self.len, self.start)
-    }
-}
-
-impl core::error::Error for OutsideFrame {}
 
 /// Bits of a frame that are one value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +35,7 @@ pub struct BitField {
 }
 
 impl BitField {
-    /// Start bit and length as in a DBC file.
+    /// Makes a field from start bit and length, as a DBC file gives them.
     ///
     /// # Errors
     /// [`OutsideFrame`].
@@ -67,13 +60,13 @@ impl BitField {
         Ok(Self { shift, len, order, signed, bytes: end.div_ceil(8) })
     }
 
-    /// Bits of the value, 1 to 32.
+    /// Returns the number of bits of the value, 1 to 32.
     #[must_use]
     pub const fn bits(&self) -> u8 {
         self.len
     }
 
-    /// The bits as they are; `None` when the frame is too short.
+    /// Returns the bits as they are; `None` when the frame is too short.
     #[must_use]
     pub fn raw(&self, data: &[u8]) -> Option<u32> {
         if data.len() < usize::from(self.bytes) {
@@ -90,7 +83,7 @@ impl BitField {
         Some((word >> self.shift & ((1 << self.len) - 1)) as u32)
     }
 
-    /// The value, sign included.
+    /// Returns the value with its sign.
     #[must_use]
     pub fn value(&self, data: &[u8]) -> Option<i64> {
         let raw = i64::from(self.raw(data)?);

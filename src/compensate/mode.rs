@@ -1,8 +1,7 @@
 //! Which of a window's outputs are used, how often a window runs, and how late the rate goes out.
 
-use crate::window::WINDOW;
+use crate::model::window::WINDOW;
 use core::ops::Range;
-use serde::{Deserialize, Serialize};
 
 /// An estimate is used this many samples after its window's newest one, whatever the time the
 /// network took: the board's frames then do not depend on its speed. A window every sample has
@@ -10,8 +9,9 @@ use serde::{Deserialize, Serialize};
 pub const DELAY: u32 = 2;
 
 /// Samples between two windows: 1 to [`WINDOW`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "u8", into = "u8")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hop(u8);
 
@@ -19,13 +19,13 @@ impl Hop {
     /// Half a window: every sample is seen by two.
     pub const HALF: Self = Self(WINDOW as u8 / 2);
 
-    /// `None` outside the range: samples would be left without an estimate.
+    /// Returns `None` outside the range, where samples would be left without an estimate.
     #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples >= 1 && samples as usize <= WINDOW { Some(Self(samples)) } else { None }
     }
 
-    /// In samples.
+    /// Returns the number of samples.
     #[must_use]
     pub const fn samples(self) -> u32 {
         self.0 as u32
@@ -47,24 +47,25 @@ impl From<Hop> for u8 {
 }
 
 /// Samples between one that was taken and the frame with its rate: 0 to [`Lag::MAX`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "u8", into = "u8")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lag(u8);
 
 impl Lag {
-    /// At once.
+    /// The rate goes out at once.
     pub const NONE: Self = Self(0);
-    /// From here on no window changes a sample's estimate any more.
+    /// The lag from which on no window changes a sample's estimate.
     pub const MAX: Self = Self((WINDOW + DELAY as usize - 1) as u8);
 
-    /// `None` beyond [`Lag::MAX`]: waiting longer gains nothing.
+    /// Returns `None` beyond [`Lag::MAX`], where waiting longer gains nothing.
     #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples <= Self::MAX.0 { Some(Self(samples)) } else { None }
     }
 
-    /// In samples.
+    /// Returns the number of samples.
     #[must_use]
     pub const fn samples(self) -> usize {
         self.0 as usize
@@ -86,27 +87,21 @@ impl From<Lag> for u8 {
 }
 
 /// A number of samples that makes no sense.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("{} samples are not within {} to {}", .samples, .low, .high)]
 pub struct OutOfRange {
     samples: u8,
     low: u8,
     high: u8,
 }
 
-impl core::fmt::Display for OutOfRange {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} samples are not within {} to {}", self.samples, self.low, self.high)
-    }
-}
-
-impl core::error::Error for OutOfRange {}
-
-/// How the estimate of a sample is chosen from the windows that cover it.
+/// The rule that chooses the estimate of a sample from the windows that cover it.
 ///
 /// The newest output of a window knows only the past and is the worst, those in the middle know
 /// both sides. `cargo gyronet evaluate --ablation` compares the modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
     /// A window every sample, of which the newest output is used: the obvious online choice.
@@ -121,7 +116,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Samples between two windows.
+    /// Returns the number of samples between two windows.
     #[must_use]
     pub const fn hop(self) -> u32 {
         match self {
@@ -131,13 +126,13 @@ impl Mode {
         }
     }
 
-    /// Samples from a window's newest one to the use of its estimate.
+    /// Returns the number of samples from a window's newest one to the use of its estimate.
     #[must_use]
     pub const fn delay(self) -> u32 {
         if self.hop() < DELAY { self.hop() } else { DELAY }
     }
 
-    /// The outputs of a window that are used, oldest first.
+    /// Returns the outputs of a window that are used, oldest first.
     #[must_use]
     pub const fn used(self) -> Range<usize> {
         match self {
@@ -149,7 +144,7 @@ impl Mode {
         }
     }
 
-    /// Samples after which no window changes an estimate any more.
+    /// Returns the number of samples after which no window changes an estimate any more.
     #[must_use]
     pub const fn settled_after(self) -> usize {
         WINDOW - 1 - self.used().start + self.delay() as usize

@@ -3,7 +3,7 @@
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// Why the board runs on its internal oscillator of 16 MHz, which is too inexact for CAN.
+/// The reason why the board runs on its internal oscillator of 16 MHz, which is too inexact for CAN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -23,16 +23,19 @@ pub enum ClockFault {
     Pll,
 }
 
-/// Why the CAN controller does not take part in the bus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The reason why the CAN controller does not take part in the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CanFault {
     /// The clock is not exact enough.
+    #[error("the clock is not exact enough")]
     Clock,
     /// The controller did not leave its sleep mode.
+    #[error("the controller does not wake up")]
     Sleeping,
     /// The controller did not enter initialisation mode.
+    #[error("the controller does not enter initialisation mode")]
     NotInitialising,
 }
 
@@ -48,15 +51,5 @@ impl fmt::Display for ClockFault {
             }
             Self::Pll => f.write_str("the PLL did not lock"),
         }
-    }
-}
-
-impl fmt::Display for CanFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Clock => "the clock is not exact enough",
-            Self::Sleeping => "the controller does not wake up",
-            Self::NotInitialising => "the controller does not enter initialisation mode",
-        })
     }
 }

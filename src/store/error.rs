@@ -29,7 +29,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// The field as a user writes it.
+    /// Returns the field as a user writes it.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -54,16 +54,17 @@ impl Field {
     }
 }
 
-/// Why a configuration or calibration is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// The reason why a configuration or calibration is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FieldError {
     /// A value is not a number or outside its range.
+    #[error("{}: {value} is not within {low} to {high}", .field.name())]
     Range {
-        /// Which one.
+        /// The field.
         field: Field,
-        /// What it is.
+        /// The value.
         value: f32,
         /// Least that it may be.
         low: f32,
@@ -71,29 +72,15 @@ pub enum FieldError {
         high: f32,
     },
     /// The messages on the bus are no configuration.
+    #[error("can: {0}")]
     Can(ConfigError),
     /// This firmware image does not drive the part.
+    #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,
     /// This firmware image does not drive the bus at this rate, bit/s.
+    #[error("can.bits_per_second: this firmware image does not drive the bus at {0} bit/s")]
     BitRateNotInImage(u32),
 }
-
-impl core::fmt::Display for FieldError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Range { field, value, low, high } => {
-                write!(f, "{}: {value} is not within {low} to {high}", field.name())
-            }
-            Self::Can(error) => write!(f, "can: {error}"),
-            Self::BitRateNotInImage(rate) => {
-                write!(f, "can.bits_per_second: this firmware image does not drive the bus at {rate} bit/s")
-            }
-            Self::PartNotInImage => f.write_str("sensor: this firmware image does not drive the part"),
-        }
-    }
-}
-
-impl core::error::Error for FieldError {}
 
 /// Passes a value that is inside its range.
 pub(super) fn within(field: Field, value: f32, low: f32, high: f32) -> Result<(), FieldError> {
@@ -101,69 +88,51 @@ pub(super) fn within(field: Field, value: f32, low: f32, high: f32) -> Result<()
     if (low..=high).contains(&value) { Ok(()) } else { Err(FieldError::Range { field, value, low, high }) }
 }
 
-/// What the flash itself said.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The fault that the flash reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FlashFault {
     /// An address that is no start of a word or sector.
+    #[error("not the start of a word or sector")]
     NotAligned,
-    /// Beyond the end.
+    /// The address is beyond the end.
+    #[error("beyond its end")]
     OutOfBounds,
     /// It did not take the operation, or did not finish it in time.
+    #[error("did not take or finish the operation")]
     Refused,
 }
 
-impl core::fmt::Display for FlashFault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::NotAligned => "not the start of a word or sector",
-            Self::OutOfBounds => "beyond its end",
-            Self::Refused => "did not take or finish the operation",
-        })
-    }
-}
-
-/// Why the store has not done what it was asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// The reason why the store has not done what was requested.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StoreError {
     /// No flash controller answers (the emulator has none): nothing can be stored.
+    #[error("no flash controller answers: nothing can be stored")]
     NoFlash,
     /// The flash reports an error.
+    #[error("flash: {0}")]
     Flash(FlashFault),
-    /// No room is left.
+    /// There is no room left.
+    #[error("no room is left for the record")]
     Full,
     /// A record of another layout.
+    #[error("the record has layout {found}, this firmware reads {expected}")]
     Version {
-        /// As stored.
+        /// The version as stored.
         found: u8,
-        /// What this firmware reads.
+        /// The version that this firmware reads.
         expected: u8,
     },
     /// A record that is not what its version says.
+    #[error("the record is not what its version says")]
     Encoding,
     /// A value is out of its range.
+    #[error(transparent)]
     Field(FieldError),
 }
-
-impl core::fmt::Display for StoreError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::NoFlash => f.write_str("no flash controller answers: nothing can be stored"),
-            Self::Flash(fault) => write!(f, "flash: {fault}"),
-            Self::Full => f.write_str("no room is left for the record"),
-            Self::Version { found, expected } => {
-                write!(f, "the record has layout {found}, this firmware reads {expected}")
-            }
-            Self::Encoding => f.write_str("the record is not what its version says"),
-            Self::Field(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for StoreError {}
 
 impl From<FieldError> for StoreError {
     fn from(error: FieldError) -> Self {

@@ -5,7 +5,6 @@
 
 use super::Fault;
 use super::header::ShortHeader;
-use serde::{Deserialize, Serialize};
 
 /// Start 0, final XOR 0; not the J1850 of other messages, although the polynomial is.
 pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
@@ -25,8 +24,9 @@ pub(super) const COUNTERS: u16 = 15;
 const MAX_LEN: usize = 30;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// How the 16-bit identifier enters the CRC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The way in which the 16-bit identifier enters the CRC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DataIdMode {
     /// Low byte, high byte (variant 1A).
@@ -45,7 +45,7 @@ pub enum DataIdMode {
 pub struct P01 {
     /// Identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
     pub data_id: u16,
-    /// How it enters the CRC.
+    /// The way in which it enters the CRC.
     pub mode: DataIdMode,
 }
 

@@ -17,40 +17,31 @@ pub struct WheelSettings {
     pub timeout_us: u64,
     /// Up to this speed a wheel may stand still.
     pub still_speed: WheelSpeed,
-    /// So long all wheels must be that slow.
+    /// The time for which all wheels must be that slow.
     pub still_for_us: u64,
 }
 
-/// Why wheel settings are no configuration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The reason why wheel settings are no configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelConfigError {
-    /// Not two or four wheels.
+    /// There are not two or four wheels.
+    #[error("{0} wheels instead of two or four")]
     Wheels(usize),
     /// A wheel that does not exist, or is in two signals.
+    #[error("wheel {0} does not exist or is there twice")]
     Wheel(usize),
     /// Two frames under one identifier.
+    #[error("wheel frame {0:x} is there twice")]
     DuplicateIdentifier(u32),
     /// A counter of over 8 bits.
+    #[error("wheel counter of {0} bits, over 8")]
     Counter(u8),
     /// A checksum beyond byte 7.
+    #[error("wheel checksum in byte {0}, beyond 7")]
     Checksum(usize),
 }
-
-impl core::fmt::Display for WheelConfigError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Wheels(count) => write!(f, "{count} wheels instead of two or four"),
-            Self::Wheel(wheel) => write!(f, "wheel {wheel} does not exist or is there twice"),
-            Self::DuplicateIdentifier(id) => write!(f, "wheel frame {id:x} is there twice"),
-            Self::Counter(len) => write!(f, "wheel counter of {len} bits, over 8"),
-            Self::Checksum(at) => write!(f, "wheel checksum in byte {at}, beyond 7"),
-        }
-    }
-}
-
-impl core::error::Error for WheelConfigError {}
 
 impl WheelSettings {
     /// Wheel speeds as many cars of one large maker send them: identifier 0xAA, four big-endian
@@ -63,7 +54,7 @@ impl WheelSettings {
         still_for_us: 500_000,
     };
 
-    /// The wheels that there are, each in one signal.
+    /// Returns the wheels that the settings name, each in one signal.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
         let mut expected = [false; WHEELS];
         let frames = || self.frames.iter().flatten();

@@ -20,7 +20,7 @@ pub const BURST: usize = 20;
 /// Bytes of a burst that are summed.
 const SUMMED: usize = 18;
 
-/// Which part; its scales.
+/// The part, which fixes the scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Model {
@@ -55,7 +55,7 @@ impl Model {
     }
 }
 
-/// What the part says of itself; reading it clears it.
+/// The part's report of its own state; reading it clears it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiagStat(pub u16);
@@ -75,63 +75,52 @@ impl DiagStat {
     pub const MEMORY: Self = Self(1 << 6);
     /// The clocks disagree.
     pub const CLOCK: Self = Self(1 << 7);
-    /// What makes the readings worthless. An overrun, a failed write to flash or a transfer
-    /// error concerns another transfer than this one, whose sum fits.
+    /// The bits that make readings useless. An overrun, a failed write to flash or a transfer error concerns
+    /// another transfer than this one, whose sum fits.
     pub const FATAL: Self = Self(Self::STANDBY.0 | Self::SELF_TEST.0 | Self::MEMORY.0 | Self::CLOCK.0);
 
-    /// Whether any of these bits is set.
+    /// Returns whether any of these bits is set.
     #[must_use]
     pub const fn intersects(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
 }
 
-/// Why bytes are no burst, or a burst gives no sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The reason why bytes are no burst, or a burst gives no sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BurstError {
     /// The sum does not fit.
+    #[error("ADIS164xx: the bytes add up to {computed:04x}, but the burst says {stored:04x}")]
     Checksum {
-        /// Of the bytes.
+        /// The value that the bytes give.
         computed: u16,
         /// The one in the burst.
         stored: u16,
     },
-    /// Nothing but zeros or nothing but ones: no part answers.
+    /// The bytes are all zeros or all ones: no part answers.
+    #[error("ADIS164xx: no part answers")]
     Silent,
     /// The part says that its readings are worthless.
+    #[error("ADIS164xx: DIAG_STAT {:04x}", .0.0)]
     Diagnosis(DiagStat),
     /// The data counter stands still: the same readings again.
+    #[error("ADIS164xx: the data counter stands still at {counter}")]
     Repeated {
         /// The counter.
         counter: u16,
     },
     /// A reading that no part of this kind can measure.
+    #[error("ADIS164xx: a reading is {0}")]
     Reading(RangeError),
 }
-
-impl core::fmt::Display for BurstError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Checksum { computed, stored } => {
-                write!(f, "ADIS164xx: the bytes add up to {computed:04x}, but the burst says {stored:04x}")
-            }
-            Self::Silent => write!(f, "ADIS164xx: no part answers"),
-            Self::Diagnosis(DiagStat(bits)) => write!(f, "ADIS164xx: DIAG_STAT {bits:04x}"),
-            Self::Repeated { counter } => write!(f, "ADIS164xx: the data counter stands still at {counter}"),
-            Self::Reading(error) => write!(f, "ADIS164xx: a reading is {error}"),
-        }
-    }
-}
-
-impl core::error::Error for BurstError {}
 
 /// A burst in the part's own counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Burst {
-    /// What the part says of itself.
+    /// The part reports a fault.
     pub diagnosis: DiagStat,
     /// x, y, z.
     pub rate: [i16; 3],
@@ -167,7 +156,7 @@ impl Burst {
         })
     }
 
-    /// The burst's bytes.
+    /// Returns the burst's bytes.
     #[must_use]
     pub fn emit(&self) -> [u8; BURST] {
         let ([gx, gy, gz], [ax, ay, az]) = (self.rate, self.acceleration);
@@ -183,7 +172,7 @@ impl Burst {
         bytes
     }
 
-    /// The readings in the pipeline's units, taken at `time`.
+    /// Converts the readings, taken at `time`, to the pipeline's units.
     ///
     /// # Errors
     /// `Diagnosis` or `Reading`.

@@ -24,7 +24,7 @@ const CONTENT: u8 = 0xFC;
 const NO_READING_16: i32 = -32_768;
 const NO_READING_20: i32 = -524_288;
 
-/// Which packet.
+/// The packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Resolution {
@@ -36,7 +36,7 @@ pub enum Resolution {
 }
 
 impl Resolution {
-    /// Bytes of a packet.
+    /// Returns the number of bytes of a packet.
     #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
@@ -46,12 +46,13 @@ impl Resolution {
     }
 }
 
-/// Why bytes are no packet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The reason why bytes are no packet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PacketError {
     /// Another number of bytes than the packet has.
+    #[error("ICM-42688: {got} bytes for a packet of {expected}")]
     Length {
         /// Bytes given.
         got: usize,
@@ -59,31 +60,21 @@ pub enum PacketError {
         expected: usize,
     },
     /// The FIFO was empty.
+    #[error("ICM-42688: the FIFO was empty")]
     Empty,
     /// Another content than was set: the packets' beginnings are lost, or a setting is.
+    #[error("ICM-42688: header {got:02x} is not what was set")]
     Header {
         /// The header.
         got: u8,
     },
 }
 
-impl core::fmt::Display for PacketError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Length { got, expected } => write!(f, "ICM-42688: {got} bytes for a packet of {expected}"),
-            Self::Empty => write!(f, "ICM-42688: the FIFO was empty"),
-            Self::Header { got } => write!(f, "ICM-42688: header {got:02x} is not what was set"),
-        }
-    }
-}
-
-impl core::error::Error for PacketError {}
-
 /// A packet's readings in the part's own counts; `None` is "no reading".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// Which packet.
+    /// The packet.
     pub resolution: Resolution,
     /// x, y, z, 16 or 20 bits.
     pub acceleration: [Option<i32>; 3],
@@ -138,7 +129,7 @@ impl Packet {
         })
     }
 
-    /// The packet's bytes; of each reading the bits that it has there.
+    /// Encodes the packet's bytes, with the bits that each reading has there.
     #[must_use]
     pub fn emit(&self) -> Vec<u8, MAX_PACKET> {
         let mut bytes = Vec::new();

@@ -8,8 +8,8 @@ use gyronet::model::blob::HIDDEN;
 use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogNetF32;
 use gyronet::model::gyronet_f32::GyroNetF32;
+use gyronet::model::window::FEATURES;
 use gyronet::nn::reference::LstmWeights;
-use gyronet::window::FEATURES;
 use std::marker::PhantomData;
 use std::path::Path;
 

@@ -29,43 +29,32 @@ pub use p05::P05;
 pub use p11::{P11, P11Mode};
 pub use sequence::{Sequence, Verdict};
 
-/// Why protected data are not to be believed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The reason why protected data are not to be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
     /// Shorter than the header, or longer than the profile covers.
+    #[error("E2E: {0} bytes do not fit the profile")]
     Length(usize),
     /// The CRC does not fit: damaged, or not the data that were meant (identifier).
+    #[error("E2E: CRC is {received:x}, should be {computed:x}")]
     Crc {
         /// Over what was received.
         computed: u16,
-        /// As received.
+        /// The value as received.
         received: u16,
     },
     /// The part of the identifier that is sent is another one.
+    #[error("E2E: identifier nibble {received:x} is foreign")]
     DataId {
-        /// As received.
+        /// The value as received.
         received: u8,
     },
     /// A counter value that does not occur.
+    #[error("E2E: counter {0} does not occur")]
     Counter(u8),
 }
-
-impl core::fmt::Display for Fault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Length(len) => write!(f, "E2E: {len} bytes do not fit the profile"),
-            Self::Crc { computed, received } => {
-                write!(f, "E2E: CRC is {received:x}, should be {computed:x}")
-            }
-            Self::DataId { received } => write!(f, "E2E: identifier nibble {received:x} is foreign"),
-            Self::Counter(counter) => write!(f, "E2E: counter {counter} does not occur"),
-        }
-    }
-}
-
-impl core::error::Error for Fault {}
 
 /// One of the profiles with its identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,7 +71,7 @@ pub enum Profile {
 }
 
 impl Profile {
-    /// Bytes at the start of the data that belong to the profile.
+    /// Returns the number of bytes at the start of the data that belong to the profile.
     #[must_use]
     pub const fn header_len(&self) -> usize {
         match self {
@@ -91,7 +80,7 @@ impl Profile {
         }
     }
 
-    /// Number of counter values; after the last one comes 0.
+    /// Returns the number of counter values; after the last one comes 0.
     #[must_use]
     pub const fn counters(&self) -> u16 {
         match self {
@@ -136,13 +125,13 @@ pub struct Protector {
 }
 
 impl Protector {
-    /// The first message gets counter 0.
+    /// Begins with counter 0.
     #[must_use]
     pub const fn new(profile: Profile) -> Self {
         Self { profile, counter: 0 }
     }
 
-    /// Protects the next message.
+    /// Protects the next message: it sets the counter and the checksum.
     ///
     /// # Errors
     /// [`Fault::Length`]; the counter stays.
@@ -161,8 +150,8 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// `max_delta`: the largest step of the counter that still counts as loss (1: none may be
-    /// lost).
+    /// Begins before the first message. `max_delta` is the largest step of the counter that still counts as loss
+    /// (1: no message may be lost).
     #[must_use]
     pub const fn new(profile: Profile, max_delta: u8) -> Self {
         Self { profile, sequence: Sequence::new(profile.counters(), max_delta) }
@@ -175,6 +164,6 @@ impl Checker {
     /// [`Fault`].
     pub fn check(&mut self, data: &[u8]) -> Result<Verdict, Fault> {
         let counter = self.profile.check(data)?;
-        Ok(self.sequence.process(counter))
+        Ok(self.sequence.check(counter))
     }
 }

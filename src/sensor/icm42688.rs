@@ -25,54 +25,40 @@ const RESET_POLLS: u8 = 10;
 /// The gyro needs this long from switched on to good, ms.
 const START_MS: u32 = 45;
 
-/// What can go wrong with the part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The error of the part or its bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Icm42688Error<E> {
     /// The bus failed.
+    #[error("ICM-42688: the bus failed: {0:?}")]
     Bus(E),
     /// The part did not come back from its reset.
+    #[error("ICM-42688: no answer after the reset")]
     Reset,
     /// Another part answers, or none.
+    #[error("ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY)]
     Identity {
-        /// What it says.
+        /// The identity that it reports.
         got: u8,
     },
-    /// A register does not hold what was written: configure the part anew.
+    /// A register does not hold what was written: configure the part again.
+    #[error("ICM-42688: register {:02x} of bank {} holds {got:02x}, not {expected:02x}", .register.address, .register.bank)]
     Setting {
-        /// Which register.
+        /// The register.
         register: Register,
-        /// What it holds in the bits that are set.
+        /// The bits that it holds.
         got: u8,
-        /// What was written.
+        /// The bits that were written.
         expected: u8,
     },
     /// A packet in which an axis has no reading.
+    #[error("ICM-42688: a packet in which an axis has no reading")]
     NoReading,
-    /// What came out of the FIFO is no packet; the FIFO was emptied.
+    /// The bytes from the FIFO are no packet; the FIFO was emptied.
+    #[error(transparent)]
     Packet(PacketError),
 }
-
-impl<E: core::fmt::Debug> core::fmt::Display for Icm42688Error<E> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Bus(error) => write!(f, "ICM-42688: the bus failed: {error:?}"),
-            Self::Reset => write!(f, "ICM-42688: no answer after the reset"),
-            Self::Identity { got } => write!(f, "ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY),
-            Self::Setting { register: Register { bank, address }, got, expected } => {
-                write!(
-                    f,
-                    "ICM-42688: register {address:02x} of bank {bank} holds {got:02x}, not {expected:02x}"
-                )
-            }
-            Self::NoReading => write!(f, "ICM-42688: a packet in which an axis has no reading"),
-            Self::Packet(error) => error.fmt(f),
-        }
-    }
-}
-
-impl<E: core::fmt::Debug> core::error::Error for Icm42688Error<E> {}
 
 /// The part on its bus, configured.
 #[derive(Debug)]
@@ -116,12 +102,12 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         Ok(part)
     }
 
-    /// The bus back.
+    /// Returns the bus.
     pub fn destroy(self) -> SPI {
         self.spi
     }
 
-    /// The oldest sample in the FIFO, if there is one. Checks one setting each time.
+    /// Returns the oldest sample in the FIFO, if there is one. It checks one setting each time.
     ///
     /// # Errors
     /// `Bus`, `Setting`, `NoReading` or `Packet`; a sample is not made up.
@@ -174,7 +160,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         self.write(reg::SIGNAL_PATH_RESET.address, reg::FIFO_FLUSH)
     }
 
-    /// Does something in a register's bank and goes back to bank 0.
+    /// Runs an action in a register's bank and goes back to bank 0.
     fn in_bank<T>(
         &mut self,
         register: Register,

@@ -22,7 +22,8 @@ const STAMP_MODULUS: u64 = 60_000;
 
 const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
 
-/// `tIIILDD..` for a standard identifier, `TIIIIIIIILDD..` for an extended one, CR at the end.
+/// Encodes a frame as `tIIILDD..` for a standard identifier or `TIIIIIIIILDD..` for an extended one, with CR at the
+/// end.
 ///
 /// `None` for a frame that is no classic data frame (remote, or more than eight bytes).
 #[must_use]
@@ -47,7 +48,7 @@ pub fn emit(frame: &impl Frame) -> Option<Line> {
     Some(line)
 }
 
-/// As [`emit`], with milliseconds modulo a minute in four digits behind the data, as a host
+/// Encodes a frame as [`emit`] does, with milliseconds modulo a minute in four digits behind the data, as a host
 /// asks for with `Z1`.
 #[must_use]
 pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
@@ -62,41 +63,32 @@ pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
     Some(stamped)
 }
 
-/// Two digits.
+/// Writes a byte as two digits.
 fn hex(byte: u8) -> [u8; 2] {
     [DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 0xF)]]
 }
 
-/// Why a line is no data frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The reason why a line is no data frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SlcanError {
     /// The first letter is not `t` or `T`.
+    #[error("not a data frame line")]
     Kind,
     /// A character is not a hexadecimal digit.
+    #[error("no hexadecimal digit at column {at}")]
     Digit {
-        /// Where in the line.
+        /// The column in the line.
         at: usize,
     },
     /// The line is shorter or longer than its length digit says.
+    #[error("line length does not fit the frame")]
     Length,
     /// The identifier is too large for its kind.
+    #[error("identifier out of range")]
     Identifier,
 }
-
-impl core::fmt::Display for SlcanError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Kind => f.write_str("not a data frame line"),
-            Self::Digit { at } => write!(f, "no hexadecimal digit at column {at}"),
-            Self::Length => f.write_str("line length does not fit the frame"),
-            Self::Identifier => f.write_str("identifier out of range"),
-        }
-    }
-}
-
-impl core::error::Error for SlcanError {}
 
 /// Reads one data frame line with a time stamp, without its CR; gives the frame and its
 /// milliseconds.
