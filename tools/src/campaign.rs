@@ -22,7 +22,6 @@
 //! begin at another sample then, and two estimates that are equally good need not be equal.
 
 pub mod board;
-pub mod draw;
 pub mod drive;
 mod encode;
 pub mod exceptions;
@@ -40,7 +39,7 @@ pub mod weight_upsets;
 pub mod wire;
 
 use crate::parts::Part;
-use draw::Draw;
+use crate::random::Random;
 use drive::Drive;
 use exceptions::{Exception, excepted};
 use fault::{Fault, Kind, Span};
@@ -157,7 +156,7 @@ pub fn run(plan: Plan, scenes: &[Scene<'_>], blob: &Blob<'_>, tick: impl Fn() + 
 }
 
 fn one(seed: u64, number: usize, scenes: &[Scene<'_>], networks: &mut Integer<'_>) -> Run {
-    let mut draw = Draw::new(seed, number as u64);
+    let mut draw = Random::new(seed, number as u64);
     let at = draw.below(scenes.len());
     let scene = &scenes[at];
     let last_state = scene.rows().saturating_sub(ROWS) / STATE_EVERY;

@@ -21,5 +21,6 @@ pub mod network;
 pub mod paper;
 pub mod parts;
 pub mod plot;
+mod random;
 pub mod simulate;
 pub mod target;

@@ -22,7 +22,7 @@ pub mod layout;
 pub mod leg;
 pub mod mems;
 pub mod odometer;
-mod random;
+mod purpose;
 pub mod route;
 pub mod town;
 pub mod vehicles;

@@ -7,7 +7,7 @@ use gyronet_host_tests::recordings;
 use gyronet_tools::bundled::SIMULATED_DRIVE;
 use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::{Drive, DriveError};
+use gyronet_tools::drive::replay::{Replay, ReplayError};
 
 fn parse(text: &str) -> Result<Recording, DataError> {
     Recording::parse("drive.csv", text.as_bytes())
@@ -34,9 +34,9 @@ fn cut(text: &str, skip: usize) -> String {
     format!("{header}\n{}\n", rows.join("\n"))
 }
 
-fn run(recording: &Recording) -> Result<Drive, DriveError> {
+fn run(recording: &Recording) -> Result<Replay, ReplayError> {
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-    Drive::run(recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
+    Replay::run(recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn real_drives_that_start_moving() {
             assert!(matches!(error.fault, DataFault::Moving { .. }), "{place}: {error}");
             let recording = parse(&cut(&without_wheels, skip)).expect("nothing else is wrong with it");
             let error = run(&recording).expect_err(&place);
-            assert!(matches!(error, DriveError::StartsMoving { line: 301, .. }), "{place}: {error}");
+            assert!(matches!(error, ReplayError::StartsMoving { line: 301, .. }), "{place}: {error}");
             let start =
                 "drive.csv: starts moving: line 301: the vehicle moves during static initialisation: ";
             assert!(error.to_string().starts_with(start), "{error}");

@@ -8,7 +8,7 @@ use gyronet::units::{AngularRate, Micros};
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::{Recording, Row};
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::parts::compare::{Bound, Difference};
 use gyronet_tools::parts::{Part, Quantisation, Via};
@@ -17,8 +17,8 @@ fn network() -> GyroNet<'static> {
     GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"))
 }
 
-fn drive(recording: &Recording) -> Drive {
-    Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), &mut network(), || {})
+fn drive(recording: &Recording) -> Replay {
+    Replay::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), &mut network(), || {})
         .expect("it stands still first")
 }
 

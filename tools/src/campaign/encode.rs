@@ -1,12 +1,12 @@
 //! The messages of a part for one reading: those of [`crate::parts`], with the effects of a fault.
 
-use super::draw::Draw;
 use super::drive::Reading;
 use super::fault::Line;
 use super::wire::Message;
 use crate::parts::dsp1760::{MESSAGE_US, MESSAGES, message};
 use crate::parts::icm42688::{ENDS, packet};
 use crate::parts::{Part, adis16465, xsens};
+use crate::random::Random;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::sensor::adis16465::{Burst, DiagStat};
 use gyronet::sensor::dsp1760::message::{Extra, Validity};
@@ -78,7 +78,7 @@ const fn no_number(form: usize) -> f32 {
 fn increment(reading: &Reading, at: u64) -> Vec<u8> {
     let mut message = message(at, &ImuSample { angular_rate: reading.fog, ..reading.sample });
     if !reading.fog_stuck {
-        message.rotation[2] += Draw::new(at, 0).between(-2e-7, 2e-7) as f32;
+        message.rotation[2] += Random::new(at, 0).between(-2e-7, 2e-7) as f32;
     }
     let time = stamp(reading).wrapping_add(at).wrapping_sub(reading.at) as u32;
     message.extra = Extra::Timed { time, temperature: 25 };

@@ -1,7 +1,7 @@
 //! The kinds of faults, and how a seed draws one.
 
-use super::draw::Draw;
 use crate::parts::Part;
+use crate::random::Random;
 use serde::Serialize;
 
 /// Kinds of faults.
@@ -179,7 +179,7 @@ pub struct Span {
 impl Fault {
     /// Draws one of a kind.
     #[must_use]
-    pub fn draw(kind: Kind, part: Part, span: Span, draw: &mut Draw) -> Self {
+    pub fn draw(kind: Kind, part: Part, span: Span, draw: &mut Random) -> Self {
         let lines: &[Line] = match (kind, part) {
             (Kind::CanLoss, _) => &[Line::Wheels, Line::Out],
             // What the part sends is what the campaign is about: every second fault is there.
@@ -242,8 +242,8 @@ impl Fault {
 
     /// Returns the random numbers that are drawn while the fault lasts.
     #[must_use]
-    pub fn draw_on(&self) -> Draw {
-        Draw::new(self.seed, 0)
+    pub fn draw_on(&self) -> Random {
+        Random::new(self.seed, 0)
     }
 }
 

@@ -5,7 +5,7 @@
 //! piece, while they are used ([`gyronet::model::background`]). Until that finds a flipped bit,
 //! the limits of [`gyronet::compensate::CompensateConfig`] are what bounds its effect.
 
-use super::draw::Draw;
+use crate::random::Random;
 use gyronet::compensate::CompensateConfig;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::blob::{HEADER_LEN, HIDDEN};
@@ -119,7 +119,7 @@ impl WeightUpsets {
         }
         let mut network = GyroNet::new(*loaded);
         let undamaged: Vec<Estimate> = windows.iter().map(|window| network.estimate(window)).collect();
-        let mut draw = Draw::new(seed, 0);
+        let mut draw = Random::new(seed, 0);
         let mut found = Vec::new();
         for _ in 0..bits {
             let bit = first + draw.below(8 * (file.len() - 4) - first);

@@ -1,6 +1,7 @@
 //! Messages on a line, and the faults of a line.
 
 use super::fault::{Fault, Kind, Line};
+use crate::random::Random;
 
 /// Bytes that came over a line together.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,7 +20,7 @@ pub struct Message {
 pub fn damage(messages: &mut Vec<Message>, fault: &Fault) -> Option<u64> {
     let mut draw = fault.draw_on();
     let mut first = None;
-    let mut hit = |message: &Message, draw: &mut super::draw::Draw| {
+    let mut hit = |message: &Message, draw: &mut Random| {
         let hit = message.line == fault.line
             && fault.holds(message.row)
             && (first.is_none() || draw.chance(fault.share));

@@ -48,7 +48,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let coprocessor = ImageSize::read(&image)?;
     let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
     let out = &mut io::stdout().lock();
-    let told = if common.json {
+    let written = if common.json {
         writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))
     } else {
         print(out, &counts, &coprocessor, tasks.as_ref())
@@ -60,7 +60,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if tasks.is_some_and(|(_, schedule)| !schedule.met()) {
         return Err("a task of the image can miss its deadline".into());
     }
-    Ok(told?)
+    Ok(written?)
 }
 
 /// Cycles of the networks, the pipeline and the parsers under each policy, a line each.

@@ -7,12 +7,12 @@ use gyronet::model::{FogNet, GyroNet};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use gyronet_tools::network::quantization_error::{Both, QuantizationError};
 use gyronet_tools::network::quantize::{Report, fognet, quantize};
 use gyronet_tools::network::weight_file::WeightFile;
-use gyronet_tools::paper::fog_drive;
+use gyronet_tools::paper::fog_replay;
 use gyronet_tools::paper::sequence::Sequence;
 use serde::Serialize;
 use std::fmt;
@@ -103,7 +103,7 @@ fn gyronet(args: &Args) -> Made {
     for drive in &drives {
         let (mut integer, mut reference) = (GyroNet::new(weights.blob()?), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
-        Drive::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
+        Replay::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
         let error = both.error();
         added.push(Added { scale_rms: Some(error.scale_rms()), ..Added::new(drive.name(), &error) });
     }
@@ -121,7 +121,7 @@ fn fognet(args: &Args) -> Made {
         let (mut integer, mut reference) =
             (FogNet::new(weights.fog_blob()?, &mut state), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
-        fog_drive::run(&sequence, &mut both, FogConfig::DEFAULT, || {});
+        fog_replay::run(&sequence, &mut both, FogConfig::DEFAULT, || {});
         added.push(Added::new(&sequence.name, &both.error()));
     }
     Ok((bytes, report, added))

@@ -5,7 +5,7 @@ use super::{Common, WriteError, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::parts::compare::{Bound, Difference, STAND_INS};
 use gyronet_tools::parts::{Part, Via};
@@ -98,12 +98,12 @@ fn replay(
     part: Option<Part>,
     network: &mut GyroNet<'_>,
     mut tick: impl FnMut(),
-) -> Result<(Drive, Option<Detour>), Box<dyn std::error::Error>> {
+) -> Result<(Replay, Option<Detour>), Box<dyn std::error::Error>> {
     let config = PipelineConfig::DEFAULT;
-    let direct = Drive::run(recording, &config, WheelFrames::new(recording), network, &mut tick)?;
+    let direct = Replay::run(recording, &config, WheelFrames::new(recording), network, &mut tick)?;
     let Some(part) = part else { return Ok((direct, None)) };
     let via = part.send(recording)?;
-    let drive = Drive::run(&via.recording, &config, WheelFrames::new(recording), network, &mut tick)?;
+    let drive = Replay::run(&via.recording, &config, WheelFrames::new(recording), network, &mut tick)?;
     let bound = Bound::new(via.quantisation, recording, &direct, network, &mut tick)?;
     let difference = Difference::of_rates(&direct, &drive);
     Ok((drive, Some(Detour { part, via, difference, bound })))
@@ -167,14 +167,14 @@ impl std::fmt::Display for Detour {
 }
 
 /// Writes a drive's frames to a file.
-pub(super) fn write_file(drive: &Drive, path: &Path) -> Result<u64, WriteError> {
+pub(super) fn write_file(drive: &Replay, path: &Path) -> Result<u64, WriteError> {
     let error = WriteError::to(path);
     let file = File::create(path).map_err(&error)?;
     drive.log(BufWriter::new(file)).map_err(&error)
 }
 
 /// Returns all counters that are not zero.
-fn events(drive: &Drive) -> Vec<(&'static str, u32)> {
+fn events(drive: &Replay) -> Vec<(&'static str, u32)> {
     let c = &drive.counters;
     let all = [
         ("samples", c.samples),

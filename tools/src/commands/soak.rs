@@ -32,11 +32,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     bar.finish_and_clear();
     let faults = soak.faults();
     let out = &mut std::io::stdout().lock();
-    let told = if common.json {
+    let written = if common.json {
         print_json(out, &serde_json::json!({ "soak": soak, "faults": faults }))
     } else {
         writeln!(out, "{soak}").map_err(Into::into)
     };
     // Whether somebody reads it or not.
-    if faults.is_empty() { told } else { Err(faults.join("; ").into()) }
+    if faults.is_empty() { written } else { Err(faults.join("; ").into()) }
 }

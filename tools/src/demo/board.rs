@@ -5,7 +5,7 @@
 //! emulated board has no CAN.
 
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, DriveError};
+use crate::drive::replay::{Replay, ReplayError};
 use crate::parts::{self, Part, ViaError};
 use crate::target::bench::{self, BenchError};
 use crate::target::emulator::{self, EmulatorError};
@@ -53,7 +53,7 @@ pub enum BoardError {
     Via(#[from] ViaError),
     /// The drive has no corrected rate in so short a time.
     #[error(transparent)]
-    Drive(#[from] DriveError),
+    Replay(#[from] ReplayError),
 }
 
 /// The outcome of the comparison.
@@ -152,7 +152,7 @@ impl Agreement {
         let recording = Recording { rows, ..recording.clone() };
         let bytes = parts::mti_bytes(&recording).concat();
         let sent = Part::Xsens.send(&recording)?.recording;
-        let drive = Drive::run(&sent, &PipelineConfig::DEFAULT, None, network, || {})?;
+        let drive = Replay::run(&sent, &PipelineConfig::DEFAULT, None, network, || {})?;
         let frames: Vec<DataFrame> = drive.frames().map(|sent| sent.frame).collect();
 
         let start = Instant::now();

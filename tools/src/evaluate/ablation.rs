@@ -2,7 +2,7 @@
 //! board can run.
 
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, DriveError};
+use crate::drive::replay::{Replay, ReplayError};
 use crate::drive::wheel_frames::{self, WheelFrames};
 use crate::evaluate::methods::with_mode;
 use crate::evaluate::metrics::{WINDOW, YawError};
@@ -110,21 +110,21 @@ pub struct Floor {
 /// Runs variants over one drive.
 ///
 /// # Errors
-/// [`DriveError`].
+/// [`ReplayError`].
 pub fn run(
     recording: &Recording,
     network: &mut impl WindowNetwork,
     variants: &[Variant],
     mut tick: impl FnMut(),
-) -> Result<Vec<Score>, DriveError> {
+) -> Result<Vec<Score>, ReplayError> {
     variants
         .iter()
         .filter_map(|Variant { name, config, network: with_network, wheels }| {
             let wheels = wheels.then(|| WheelFrames::new(recording)).flatten();
             let drive = if *with_network {
-                Drive::run(recording, config, wheels, network, &mut tick)
+                Replay::run(recording, config, wheels, network, &mut tick)
             } else {
-                Drive::run(recording, config, wheels, &mut Nothing, &mut tick)
+                Replay::run(recording, config, wheels, &mut Nothing, &mut tick)
             };
             let drive = match drive {
                 Ok(drive) => drive,

@@ -2,7 +2,7 @@
 //! the paper's, and the rates of one drive by each of them.
 
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, DriveError};
+use crate::drive::replay::{Replay, ReplayError};
 use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::fir;
 use gyronet::compensate::{CompensateConfig, Mode};
@@ -160,7 +160,7 @@ pub struct Rates {
     /// The true yaw rate, rad/s; `None` where a sample has none.
     pub reference: Option<Vec<f64>>,
     /// The drive as the board would run it.
-    pub drive: Drive,
+    pub drive: Replay,
     /// What that run took on this machine.
     pub run_time: Duration,
 }
@@ -173,30 +173,45 @@ impl Rates {
     /// [`RUNS`] times for each row.
     ///
     /// # Errors
-    /// [`DriveError`], when static initialisation does not succeed.
+    /// [`ReplayError`], when static initialisation does not succeed.
     pub fn new(
         recording: &Recording,
         float: &mut impl WindowNetwork,
         integer: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
-    ) -> Result<Self, DriveError> {
+    ) -> Result<Self, ReplayError> {
         let start = Instant::now();
-        let drive =
-            Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), integer, &mut tick)?;
+        let drive = Replay::run(
+            recording,
+            &PipelineConfig::DEFAULT,
+            WheelFrames::new(recording),
+            integer,
+            &mut tick,
+        )?;
         let run_time = start.elapsed();
         let float =
-            Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), float, &mut tick)?;
-        let newest =
-            Drive::run(recording, &with_mode(Mode::Newest), WheelFrames::new(recording), integer, &mut tick)?;
-        let middle =
-            Drive::run(recording, &with_mode(Mode::Middle), WheelFrames::new(recording), integer, &mut tick)?;
+            Replay::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), float, &mut tick)?;
+        let newest = Replay::run(
+            recording,
+            &with_mode(Mode::Newest),
+            WheelFrames::new(recording),
+            integer,
+            &mut tick,
+        )?;
+        let middle = Replay::run(
+            recording,
+            &with_mode(Mode::Middle),
+            WheelFrames::new(recording),
+            integer,
+            &mut tick,
+        )?;
         let compared = || drive.steps[drive.compared()].iter();
         let [.., bias] = drive.gyro_bias;
         let gyro = |row: usize| yaw_rate(&recording.rows[row].sample);
         // A filter starts with the recording.
         let raw: Vec<f64> = drive.steps.iter().map(|step| gyro(step.row)).collect();
         let filtered = fir::filter(&fir::Design::PAPER.taps(), &raw);
-        let settled = |drive: &Drive| drive.settled().map(|rate| rate.rad_per_sec()).collect();
+        let settled = |drive: &Replay| drive.settled().map(|rate| rate.rad_per_sec()).collect();
         let rates = PerMethod::new(|method| match method {
             Method::RAW => compared().map(|step| gyro(step.row)).collect(),
             Method::STATIC => compared().map(|step| gyro(step.row) - bias.rad_per_sec()).collect(),

@@ -6,8 +6,9 @@
 
 use super::DT;
 use super::leg::Leg;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use super::route::{Route, Way};
+use crate::random::Random;
 use std::f64::consts::TAU;
 
 /// m/s^2.
@@ -159,7 +160,7 @@ impl Car {
     /// Starts at rest on a way.
     #[must_use]
     pub fn on(config: &Config, mut way: Way, seed: u64) -> Self {
-        let mut road = Random::new(seed, Purpose::Road);
+        let mut road = Purpose::Road.stream(seed);
         let (first, second) = (way.next_leg(), way.next_leg());
         Self {
             config: *config,
@@ -174,7 +175,7 @@ impl Car {
             pitch: Spring::default(),
             bank: Slope::new(config.road_bank, config.bank_waves, &mut road),
             grade: Slope::new(config.road_grade, GRADE_WAVES, &mut road),
-            wheel_noise: Random::new(seed, Purpose::Wheels),
+            wheel_noise: Purpose::Wheels.stream(seed),
         }
     }
 

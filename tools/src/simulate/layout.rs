@@ -14,11 +14,12 @@ mod text;
 use super::fog::Fog;
 use super::mems::Mems;
 use super::odometer::Odometer;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use super::route::Way;
 use super::town::Town;
 use super::vehicles::{self, Vehicle};
 use super::world::{Truth, World};
+use crate::random::Random;
 use gyronet::sample::RATE_HZ;
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -106,13 +107,13 @@ impl Drive {
     fn new(spec: &Spec) -> Self {
         let vehicle = spec.layout.vehicle();
         let way = Way::Town(Town::new(&vehicle.town, spec.run));
-        let heading = Random::new(spec.run, Purpose::Stamps).between(0.0, std::f64::consts::TAU);
+        let heading = Purpose::Stamps.stream(spec.run).between(0.0, std::f64::consts::TAU);
         Self {
             world: World::new(&vehicle.world, way, heading, spec.run),
             mems: Mems::of_device(&vehicle.mems, spec.device, spec.run),
             fog: Fog::of_device(&vehicle.fog, spec.device, spec.run),
             odometer: Odometer::new(&vehicle.wheels, spec.run),
-            magnetometer: Random::new(spec.run, Purpose::Magnetometer),
+            magnetometer: Purpose::Magnetometer.stream(spec.run),
             ticks: (spec.seconds * RATE_HZ) as usize,
         }
     }

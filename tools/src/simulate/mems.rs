@@ -5,7 +5,8 @@
 
 use super::DT;
 use super::car::turned_in;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
+use crate::random::Random;
 
 /// The sizes of a part's errors. Those marked sigma are drawn for each seed and axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,7 +111,7 @@ impl Mems {
     /// Another part for each seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Mems);
+        let mut random = Purpose::Mems.stream(seed);
         let mut triad = |noise, walk, bias| {
             let matrix = axes(config.scale, config.misalignment, &mut random);
             Triad::new(matrix, noise, walk, bias, &mut random)
@@ -124,8 +125,8 @@ impl Mems {
     /// force are the device's, its bias at power-on and its noise the run's.
     #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
-        let mut fixed = Random::new(device, Purpose::Device);
-        let mut random = Random::new(run, Purpose::Mems);
+        let mut fixed = Purpose::Device.stream(device);
+        let mut random = Purpose::Mems.stream(run);
         let mut triad = |noise, walk, bias| {
             let matrix = axes(config.scale, config.misalignment, &mut fixed);
             Triad::new(matrix, noise, walk, bias, &mut random)

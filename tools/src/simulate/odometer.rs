@@ -5,7 +5,7 @@
 //! tyres (Rajamani, Vehicle Dynamics and Control, chapter 4).
 
 use super::car::GRAVITY;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use std::f64::consts::PI;
 
 /// The calibration, and its errors.
@@ -37,7 +37,7 @@ impl Odometer {
     /// Tyres of one run: pressure and load change from day to day.
     #[must_use]
     pub fn new(config: &Config, run: u64) -> Self {
-        let mut random = Random::new(run, Purpose::Odometer);
+        let mut random = Purpose::Odometer.stream(run);
         let common = config.common_error * random.normal();
         let diameter = config.diameter.map(|d| d * (1.0 + common + config.wheel_error * random.normal()));
         Self { config: *config, diameter, turns: [0.0; 2] }

@@ -3,8 +3,9 @@
 //! The car turns by at most some 0.3 rad/s, as in the recordings; nobody parks.
 
 use super::leg::Leg;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use super::town::Town;
+use crate::random::Random;
 use std::f64::consts::FRAC_PI_2;
 
 /// The source of the legs.
@@ -40,7 +41,7 @@ impl Route {
     /// Another one for each seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Route);
+        let mut random = Purpose::Route.stream(seed);
         let side = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
         Self { random, legs: 0, side }
     }

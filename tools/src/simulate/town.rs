@@ -5,7 +5,8 @@
 //! acceleration give the speed.
 
 use super::leg::Leg;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
+use crate::random::Random;
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
@@ -44,7 +45,7 @@ impl Town {
     /// Another one for each seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Route);
+        let mut random = Purpose::Route.stream(seed);
         let [from, to] = config.before;
         let first = Leg::Stand { seconds: random.between(from, to) };
         Self { config: *config, random, legs: VecDeque::from([first]) }

@@ -6,7 +6,8 @@
 //! car, and what it does to a yaw taken after one second is an angle of about rate / (2 pi f).
 
 use super::DT;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
+use crate::random::Random;
 use std::f64::consts::{PI, TAU};
 
 /// A source of vibration.
@@ -143,7 +144,7 @@ impl Vibration {
     /// Starts with the engine running.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Vibration);
+        let mut random = Purpose::Vibration.stream(seed);
         let engine = Shaker::new(config.engine, &mut random);
         let road = config.road.map(|source| Shaker::new(source, &mut random));
         let mut vibration = Self { random, engine, road, road_speed: config.road_speed };

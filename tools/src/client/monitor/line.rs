@@ -56,7 +56,7 @@ pub struct Splitter {
 
 impl Splitter {
     /// Takes a byte and returns the line that it ends, unless the line is empty.
-    pub fn push(&mut self, byte: u8) -> Option<String> {
+    pub fn feed(&mut self, byte: u8) -> Option<String> {
         if !matches!(byte, b'\r' | b'\n' | 7) {
             self.too_long |= self.line.len() == MAX_LINE;
             if !self.too_long {

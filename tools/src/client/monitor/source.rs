@@ -106,13 +106,13 @@ impl Source {
             Err(error) if is_silence(&error) => 0,
             Err(error) => return Err(self.broken(error)),
         };
-        let lines = bytes.iter().take(count).filter_map(|byte| self.splitter.push(*byte));
+        let lines = bytes.iter().take(count).filter_map(|byte| self.splitter.feed(*byte));
         Ok(Lines::Some(lines.collect()))
     }
 
     /// A log may end without an end of line.
     fn last(&mut self) -> Lines {
-        self.splitter.push(b'\n').map_or(Lines::End, |line| Lines::Some(vec![line]))
+        self.splitter.feed(b'\n').map_or(Lines::End, |line| Lines::Some(vec![line]))
     }
 
     fn say(&mut self, text: &str) -> io::Result<()> {

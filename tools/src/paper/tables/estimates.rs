@@ -9,11 +9,11 @@
 
 use crate::drive::DT;
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, Step};
+use crate::drive::replay::{Replay, Step};
 use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::fir;
 use crate::evaluate::methods::Method;
-use crate::paper::fog_drive;
+use crate::paper::fog_replay;
 use crate::paper::sequence::Sequence;
 use crate::simulate::world::EARTH_RATE;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
@@ -84,7 +84,7 @@ impl Estimates {
         {
             let started = Instant::now();
             let config = FogConfig { padding, ..FogConfig::DEFAULT };
-            let drive = fog_drive::run(sequence, network, config, &mut tick);
+            let drive = fog_replay::run(sequence, network, config, &mut tick);
             let run_time = started.elapsed().as_secs_f64();
             let turns = drive.turns[self.start..].to_vec();
             self.methods.push(Estimate { method, turns, run_time });
@@ -104,10 +104,10 @@ impl Estimates {
         let started = Instant::now();
         // The paper's network alone: no zero-rate updates behind it.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let drive = Drive::run(recording, &config, None, network, &mut tick);
+        let drive = Replay::run(recording, &config, None, network, &mut tick);
         let run_time = started.elapsed().as_secs_f64();
         let wheels = WheelFrames::new(recording);
-        let looped = Drive::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
+        let looped = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
         self.add(Method::RAW, || constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {
             Ok((drive, looped)) => {
@@ -157,7 +157,7 @@ impl Estimates {
 
 /// One of the rates of each step; where the board got no sample, the gyro's value in between, less
 /// what was last taken off.
-fn corrected(drive: &Drive, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
+fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
     let mut steps = drive.steps.iter().peekable();
     let mut taken_off = 0.0;
     let rate = |(k, gyro): (usize, &f64)| {

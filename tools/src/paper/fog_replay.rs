@@ -13,7 +13,7 @@ const STATIC_STEPS: usize = 300;
 
 /// The results of a sequence.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct FogDrive {
+pub struct FogReplay {
     /// Corrected turn of each step, rad.
     pub turns: Vec<f64>,
     /// Steps with a correction.
@@ -34,10 +34,10 @@ pub fn run(
     network: &mut impl MinuteNetwork,
     config: FogConfig,
     mut tick: impl FnMut(),
-) -> FogDrive {
+) -> FogReplay {
     let inertial = features(sequence);
     let mut corrector = FogCorrector::new(config);
-    let mut drive = FogDrive::default();
+    let mut drive = FogReplay::default();
     for (step, inertial) in sequence.steps.iter().zip(inertial) {
         let wheels = step.wheels.map(|way| {
             let speed = way * f64::from(RATE_HZ) * f64::from(1u32 << WheelSpeed::FRACTION_BITS);

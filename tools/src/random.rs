@@ -1,15 +1,16 @@
-//! Random numbers of a run: the same for the same seed and run on every machine.
+//! Random numbers that are the same on every machine: a seed has many streams, and a change to one does not affect the
+//! others.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardUniform};
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
 /// A stream of random numbers.
 #[derive(Debug, Clone)]
-pub struct Draw(ChaCha8Rng);
+pub struct Random(ChaCha8Rng);
 
-impl Draw {
-    /// Stream `stream` of a seed; streams know nothing of each other.
+impl Random {
+    /// Starts one stream of a seed.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -22,6 +23,16 @@ impl Draw {
         StandardUniform.sample(&mut self.0)
     }
 
+    /// Returns a normally distributed number with mean 0 and variance 1.
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+
+    /// Returns three such numbers.
+    pub fn normals(&mut self) -> [f64; 3] {
+        [self.normal(), self.normal(), self.normal()]
+    }
+
     /// Returns a number from an even distribution between two limits.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         let unit: f64 = StandardUniform.sample(&mut self.0);
@@ -31,6 +42,11 @@ impl Draw {
     /// Returns a number between two positive limits; each power of ten is as likely as the next.
     pub fn log_between(&mut self, low: f64, high: f64) -> f64 {
         libm::exp(self.between(libm::log(low), libm::log(high)))
+    }
+
+    /// Returns an exponentially distributed number from 0 on, with a mean.
+    pub fn exponential(&mut self, mean: f64) -> f64 {
+        -mean * libm::log(1.0 - self.between(0.0, 1.0))
     }
 
     /// Returns 0 to `count` - 1, and 0 for an empty list.
