@@ -1,4 +1,4 @@
-//! Mean and spread of a run of readings, in one pass.
+//! This module computes mean and spread of a run of readings in one pass, so that no reading is kept.
 
 /// Sum (exact) and squared deviations (Welford's way: B. P. Welford, Technometrics 4, 1962).
 #[derive(Debug, Clone, Copy, Default)]
@@ -14,7 +14,7 @@ impl Spread {
     pub const EMPTY: Self = Self { count: 0, sum: 0, mean: 0.0, squares: 0.0 };
 
     /// Takes a reading as code and as value.
-    pub fn push(&mut self, code: i32, value: f32) {
+    pub fn add(&mut self, code: i32, value: f32) {
         self.count += 1;
         self.sum += i64::from(code);
         let delta = value - self.mean;
@@ -22,23 +22,23 @@ impl Spread {
         self.squares += delta * (value - self.mean);
     }
 
-    /// How many readings.
+    /// Returns the number of readings.
     pub fn count(&self) -> u32 {
         self.count
     }
 
-    /// Mean of the codes, rounded to nearest; zero of none.
+    /// Returns the mean of the codes, rounded to nearest; zero without readings.
     pub fn mean_code(&self) -> i32 {
         let count = i64::from(self.count.max(1));
         (self.sum + count / 2).div_euclid(count) as i32
     }
 
-    /// Variance of the values.
+    /// Returns the variance of the values.
     pub fn variance(&self) -> f32 {
         self.squares / self.count.max(1) as f32
     }
 
-    /// Standard deviation of the values.
+    /// Returns the standard deviation of the values.
     pub fn std(&self) -> f32 {
         libm::sqrtf(self.variance())
     }

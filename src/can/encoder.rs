@@ -1,4 +1,4 @@
-//! The frames of one sample of the inertial sensor, as they are configured.
+//! This encoder makes the configured frames of one sample of the inertial sensor.
 
 use super::DataFrame;
 use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};
@@ -38,7 +38,7 @@ impl CanEncoder {
         Self { config, yaw, ..Self::START }
     }
 
-    /// Messages that reported "failed" because a value does not fit its signal.
+    /// Returns the number of messages that reported "failed" because a value does not fit its signal.
     #[must_use]
     pub fn out_of_range(&self) -> u32 {
         self.out_of_range
@@ -82,7 +82,8 @@ impl CanEncoder {
     }
 }
 
-/// The grid step is the counter, so that a receiver sees what is missing.
+/// Collects what the Bosch set carries. The grid step is its counter, so that a receiver sees which samples are
+/// missing.
 fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
     Motion {
         angular_rate: [sample.roll_rate, sample.pitch_rate, sample.prompt.rate],

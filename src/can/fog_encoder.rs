@@ -1,4 +1,5 @@
-//! The yaw messages of a fibre-optic gyro: sent from when it is heard, from the start where one is configured.
+//! This encoder makes the yaw messages of a fibre-optic gyro. They are sent from its first sample on, or from the
+//! start where one is configured.
 
 use super::DataFrame;
 use super::config::SAMPLE_MS;
@@ -25,7 +26,7 @@ impl FogEncoder {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }
 
-    /// The protection of each message.
+    /// Returns the protection of each message.
     #[must_use]
     pub const fn profiles([rate, angle, detail]: [u16; 3]) -> [Profile; 3] {
         const fn profile(data_id: u16) -> Profile {
@@ -34,7 +35,7 @@ impl FogEncoder {
         [profile(rate), profile(angle), profile(detail)]
     }
 
-    /// Every message of the gyro; none for identifiers of over 11 bits.
+    /// Returns every message of the gyro; none for identifiers of over 11 bits.
     #[must_use]
     pub fn messages(ids: [u16; 3]) -> Vec<Periodic, 3> {
         let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS };

@@ -1,4 +1,4 @@
-//! The sending side of the yaw messages: estimates in, three protected messages out.
+//! This encoder makes three protected messages from each estimate.
 
 use super::DataFrame;
 use super::carry::{RoundingCarry, Scale};

@@ -1,4 +1,4 @@
-//! Everything that can be set about a coprocessor, and every way to use it wrongly.
+//! These types are everything that can be set about a coprocessor, and every error of its use.
 
 use crate::align::AlignError;
 use crate::align::clock::ClockError;
@@ -8,6 +8,7 @@ use crate::can::wheel::{WheelError, WheelReceiver};
 use crate::can::yaw::FOG_IDS;
 use crate::fog::FogConfig;
 use crate::pipeline::PipelineConfig;
+use crate::units::Duration;
 
 /// The clock that `now` comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -45,12 +46,12 @@ pub struct Config {
     pub fog: FogConfig,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
-    /// Whether a fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
+    /// A fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
     /// Otherwise they are sent from its first sample on.
     pub fog_expected: bool,
-    /// Whether somebody runs GyroNet. Without it no window is due, and the messages report damaged data.
+    /// The caller runs GyroNet. Without it no window is due, and the messages report damaged data.
     pub has_gyronet: bool,
-    /// Whether somebody runs FoGNet, likewise.
+    /// The caller runs FoGNet; without it, likewise.
     pub has_fognet: bool,
     /// The clock that `now` comes from.
     pub clock: Clock,
@@ -90,10 +91,10 @@ impl Default for Config {
 #[non_exhaustive]
 pub enum InputError {
     /// `now` is before the newest time; the following times are taken as going on from there.
-    #[error("the clock goes back by {by_us} us")]
+    #[error("the clock goes back by {} us", .by.0)]
     ClockWentBack {
-        /// Microseconds.
-        by_us: u64,
+        /// The time by which it went back.
+        by: Duration,
     },
     /// The time stamp of an inertial sample has no place on the grid.
     #[error("inertial sensor: {0}")]

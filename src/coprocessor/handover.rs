@@ -1,4 +1,4 @@
-//! GyroNet's window on its way to the network and back, and the rule for late ones.
+//! GyroNet's window waits here on its way to the network and back; a late estimate is not used.
 //!
 //! From when a window is due, its estimate has as many sample periods by the outside clock as the pipeline uses it
 //! later. Until then the sample that wants the estimate stays where it waits, should samples come faster
@@ -25,7 +25,7 @@ impl Handover {
         Self { has_network, delay, due: None, out: None }
     }
 
-    /// Whether there is a network with good weights.
+    /// Returns whether there is a network with good weights.
     pub const fn has_network(&self) -> bool {
         self.has_network
     }
@@ -50,7 +50,7 @@ impl Handover {
         self.has_network
     }
 
-    /// Whether the sample after `tick` is the one that wants the estimate, which is not late yet.
+    /// Returns whether the sample after `tick` needs the estimate, which is not late yet.
     pub fn must_wait(&self, tick: u32, now: Micros) -> bool {
         self.out.is_some_and(|(end, until)| tick.wrapping_sub(end) + 1 >= self.delay && now.0 < until)
     }

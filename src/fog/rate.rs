@@ -1,4 +1,4 @@
-//! Increments to rates and back, without losing anything in the sum.
+//! These types convert increments to rates and back without losing anything in the sum.
 
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, AngularRate};
@@ -18,7 +18,7 @@ impl IncrementRate {
     /// No frame, and nothing owed.
     pub const START: Self = Self { rest: 0 };
 
-    /// Rate of a frame that turned by this much; saturates at the limits of [`AngularRate`].
+    /// Returns the rate of a frame that turned by this much, saturated at the limits of [`AngularRate`].
     pub fn rate(&mut self, turn: Angle) -> AngularRate {
         let codes = turn.0.saturating_mul(FRAMES).saturating_add(self.rest);
         let rate = codes.div_euclid(CODES).clamp(i32::MIN.into(), i32::MAX.into());
@@ -35,7 +35,7 @@ pub struct PseudoFog {
 }
 
 impl PseudoFog {
-    /// Turn of one frame at this rate; the sum of the turns is exact.
+    /// Returns the turn of one frame at this rate; the sum of the turns is exact.
     pub fn turn(&mut self, rate: AngularRate) -> Angle {
         let codes = i64::from(rate.0) * CODES + self.rest;
         self.rest = codes.rem_euclid(FRAMES);

@@ -1,4 +1,5 @@
-//! Weights in use against their own checksum, a piece at a time.
+//! The background check compares the weights in use with their checksum, a piece at a time, because flash can lose
+//! bits.
 
 use super::blob::{Blob, BlobError, CRC};
 
@@ -11,19 +12,19 @@ pub struct BackgroundCheck<'w> {
 }
 
 impl<'w> BackgroundCheck<'w> {
-    /// At the first byte.
+    /// Begins at the first byte.
     #[must_use]
     pub fn new(blob: &Blob<'w>) -> Self {
         Self { content: blob.content, stored: blob.crc, digest: CRC.digest(), at: 0 }
     }
 
-    /// Bytes of one round.
+    /// Returns the number of bytes of one round.
     #[must_use]
     pub fn len(&self) -> usize {
         self.content.len()
     }
 
-    /// Whether there is nothing to check; weights are never empty.
+    /// Returns whether there is nothing to check; weights are never empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.content.is_empty()

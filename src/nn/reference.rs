@@ -1,4 +1,4 @@
-//! The networks in plain f32: what the integer code is measured against. Never optimised.
+//! This module is the networks in plain f32, which the integer code is measured against. Never optimised.
 //!
 //! Equations 7 to 12 of Zhao et al., with the weights as PyTorch lays them out: the rows of
 //! `weight_ih` (4H, I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows
@@ -52,13 +52,13 @@ pub fn lstm<const I: usize, const H: usize, const W: usize>(
     }
 }
 
-/// A fully-connected layer of one output: `weight` (I) and `bias` over `x` (I).
+/// Computes a fully-connected layer of one output: `weight` (I) and `bias` over `x` (I).
 #[must_use]
 pub fn dense(weight: &[f32], bias: f32, x: &[f32]) -> f32 {
     weight.iter().zip(x).fold(bias, |sum, (w, x)| sum + w * x)
 }
 
-/// The logistic function, 1 / (1 + e^-x).
+/// Returns the logistic function, 1 / (1 + e^-x).
 #[must_use]
 pub fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-x))

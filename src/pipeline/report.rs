@@ -1,4 +1,5 @@
-//! From compensated rates to the estimates that are sent: yaw, uncertainty, status, faults, the other axes.
+//! This module makes the sent estimates from compensated rates: yaw, uncertainty, status, faults, the other
+//! axes.
 
 use super::{Pipeline, Rates};
 use crate::bias::ZeroRate;
@@ -60,7 +61,7 @@ impl Pipeline {
         }
     }
 
-    /// Everything that is wrong with this sample.
+    /// Returns everything that is wrong with this sample.
     fn faults(&self, sample: &ImuSample) -> Faults {
         let contradicted = self.zero_rate().is_some_and(ZeroRate::contradicted);
         self.state

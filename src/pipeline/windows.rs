@@ -1,9 +1,10 @@
-//! GyroNet's windows: the samples of the next one, the one that is out, and whether the newest estimate counts.
+//! This module holds GyroNet's windows: the samples of the next one, the one that is out, and the use of the newest
+//! estimate.
 
 use super::DueWindow;
 use crate::health::Faults;
 use crate::model::Estimate;
-use crate::window::{Features, Window};
+use crate::model::window::{Features, Window};
 
 /// The samples of the next window and the state of the last one.
 #[derive(Debug, Clone)]
@@ -23,8 +24,8 @@ impl Windows {
         Self { window: Window::EMPTY, since: 0, out: None, accepted: false, faults: Faults::NONE };
 
     /// Adds a good sample.
-    pub fn push(&mut self, features: Features) {
-        self.window.push(features);
+    pub fn add(&mut self, features: Features) {
+        self.window.add(features);
         self.since += 1;
     }
 
@@ -73,12 +74,12 @@ impl Windows {
         (self.accepted, self.faults) = (false, fault);
     }
 
-    /// Whether an estimate is in use.
+    /// Returns whether an estimate is in use.
     pub fn is_accepted(&self) -> bool {
         self.accepted
     }
 
-    /// The fault of the newest estimate.
+    /// Returns the fault of the newest estimate.
     pub fn faults(&self) -> Faults {
         self.faults
     }

@@ -1,4 +1,4 @@
-//! Whether the flash may be written: an erase stalls the processor for up to 2 s, so it waits for standstill.
+//! The flash may be written only at standstill, because an erase stalls the processor for up to 2 s.
 //!
 //! Wheels prove standstill or motion. Without wheels the inertial sensor must have been as quiet as at
 //! static initialisation for three seconds. While the sensor is silent no rate is sent that a receiver
@@ -21,7 +21,7 @@ impl StandstillGate {
         Self { quiet: None, open: true }
     }
 
-    /// Whether the flash may be written now.
+    /// Returns whether the flash may be written now.
     #[must_use]
     pub const fn is_open(&self) -> bool {
         self.open
@@ -31,7 +31,7 @@ impl StandstillGate {
     pub fn observe(&mut self, sample: Option<&ImuSample>, wheels: Standstill, limits: &StaticConfig) {
         let quiet =
             self.quiet.get_or_insert_with(|| QuietDetector::new(QuietConfig::DEFAULT, limits, &ANY_REST));
-        let still = sample.is_none_or(|sample| quiet.process(sample));
+        let still = sample.is_none_or(|sample| quiet.observe(sample));
         self.open = match wheels {
             Standstill::Still => true,
             Standstill::Moving => false,

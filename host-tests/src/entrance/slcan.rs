@@ -24,7 +24,7 @@ pub fn board(data: &[u8]) {
     let mut sent = Vec::new();
     for (k, byte) in (0..).zip(data) {
         if k % 8 == 0 {
-            port.push(own, Micros(k * 10_000));
+            port.enqueue(own, Micros(k * 10_000));
         }
         if let Some(frame) = port.receive(*byte) {
             let line = emit(&frame).expect("a data frame");
@@ -64,7 +64,7 @@ pub fn host(data: &[u8]) {
     let mut splitter = Splitter::default();
     let mut monitor = Monitor::new(&Config::DEFAULT);
     for (k, byte) in data.iter().enumerate() {
-        let Some(line) = splitter.push(*byte) else { continue };
+        let Some(line) = splitter.feed(*byte) else { continue };
         let _ = monitor.take_line(&line, k as f64 * 1e-3);
         if let Ok((_, frame)) = parse_line(&line) {
             let line = emit(&frame).expect("a data frame");

@@ -164,7 +164,7 @@ impl Received {
             lines[both..].iter().flat_map(|frame| slcan::emit(frame).expect("a data frame")).collect();
         self.slcan.splice(..0, ahead);
         for byte in board.sent(SERVICE) {
-            match self.deframer.push(byte) {
+            match self.deframer.receive(byte) {
                 Some(Ok((_, Reply::Counters(counters)))) => {
                     self.answers += 1;
                     self.counters = Some(counters);

@@ -10,7 +10,7 @@ use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init};
 use gyronet::pipeline::Output;
 use gyronet::sample::PERIOD_US;
-use gyronet::units::{Micros, WheelSpeed};
+use gyronet::units::{Duration, Micros, WheelSpeed};
 use gyronet_host_tests::stream::{faults, new, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
 
@@ -31,9 +31,9 @@ fn receiver() -> WheelReceiver {
     };
     WheelReceiver::new(WheelSettings {
         frames: [Some(frame), None, None, None],
-        timeout_us: TIMEOUT,
+        timeout: Duration(TIMEOUT),
         still_speed: WheelSpeed(0),
-        still_for_us: 500_000,
+        still_for: Duration(500_000),
     })
     .expect("two wheels")
 }
@@ -47,12 +47,12 @@ fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<u16>) -> Vec<Output> {
         if let Some(speed) = wheels(tick) {
             let [low, high] = speed.to_le_bytes();
             let frame = DataFrame::new(ID, &[low, high, low, high]).expect("four bytes");
-            receiver.process(&frame, now).expect("a wheel frame").expect("a good one");
+            receiver.decode(&frame, now).expect("a wheel frame").expect("a good one");
         }
         if let Some(known) = receiver.poll(now) {
             pipeline.wheels(known);
         }
-        pipeline.process(turning(tick, rate(0.001))).expect("a place on the grid")
+        pipeline.correct(turning(tick, rate(0.001))).expect("a place on the grid")
     };
     (0..ticks).map(step).collect()
 }

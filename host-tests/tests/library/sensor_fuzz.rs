@@ -21,7 +21,7 @@ fn random(seed: u8) -> TestRng {
 fn samples<P: ByteSource>(part: &mut P, stream: &[u8]) -> Vec<P::Sample> {
     let mut samples = Vec::new();
     for byte in stream {
-        part.push(*byte);
+        part.receive(*byte);
         while let Some(sample) = part.next_sample() {
             samples.extend(sample);
         }
@@ -127,7 +127,7 @@ fn any_bytes_are_survived_by_all() {
     assert_eq!(got, 0, "a CRC of 32 bits lets nothing through here");
     println!("MTi: {} samples out of noise", samples(&mut Mti::new(), &noise).len());
     let mut lines = Dsp3000Ascii::new();
-    println!("DSP-3000: {} lines out of noise", noise.iter().filter_map(|b| lines.push(*b)?.ok()).count());
+    println!("DSP-3000: {} lines out of noise", noise.iter().filter_map(|b| lines.receive(*b)?.ok()).count());
 }
 
 /// A parser holds one frame, its counters and its clock.

@@ -2,17 +2,17 @@
 //! of the built-in weight file in its output.
 
 use gyronet::model::blob::HIDDEN;
+use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet::window::{FEATURES, Features, WINDOW};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
-use gyronet_tools::network::checkpoint::Checkpoint;
+use gyronet_tools::network::checkpoint::{self, Checkpoint};
 
 #[test]
 fn every_layer_equals_pytorch() {
     let path = workspace().join("tools/weights/gyronet.safetensors");
-    let checkpoint = Checkpoint::read(&path).expect("the committed checkpoint");
+    let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&path).expect("the committed checkpoint");
     let network = checkpoint.network();
     let golden = Golden::read("gyronet");
 

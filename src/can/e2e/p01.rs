@@ -1,4 +1,5 @@
-//! Profile 1: byte 0 CRC, low nibble of byte 1 counter, four ways to bring in the identifier.
+//! Profile 1 has its CRC in byte 0, its counter in the low nibble of byte 1, and four ways to include the
+//! identifier.
 //!
 //! AUTOSAR describes the CRC by the interface of its CRC library, whose start and final XOR
 //! values cancel: what is on the bus is polynomial 0x1D with start 0 and no final XOR.
@@ -24,7 +25,7 @@ pub(super) const COUNTERS: u16 = 15;
 const MAX_LEN: usize = 30;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// How the 16-bit identifier enters the CRC.
+/// The way in which the 16-bit identifier enters the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -45,7 +46,7 @@ pub enum DataIdMode {
 pub struct P01 {
     /// Identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
     pub data_id: u16,
-    /// How it enters the CRC.
+    /// The way in which it enters the CRC.
     pub mode: DataIdMode,
 }
 

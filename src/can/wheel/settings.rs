@@ -1,8 +1,8 @@
-//! Which frames the wheel speeds come in.
+//! The settings name the frames that carry the wheel speeds.
 
 use super::layout::{Checksum, WheelFrame};
 use crate::sample::WHEELS;
-use crate::units::WheelSpeed;
+use crate::units::{Duration, WheelSpeed};
 use embedded_can::Id;
 
 /// Most frames that wheel speeds may be spread over.
@@ -14,19 +14,19 @@ pub struct WheelSettings {
     /// The frames.
     pub frames: [Option<WheelFrame>; MAX_FRAMES],
     /// A speed that is older says nothing.
-    pub timeout_us: u64,
+    pub timeout: Duration,
     /// Up to this speed a wheel may stand still.
     pub still_speed: WheelSpeed,
-    /// So long all wheels must be that slow.
-    pub still_for_us: u64,
+    /// The time for which all wheels must be that slow.
+    pub still_for: Duration,
 }
 
-/// Why wheel settings are no configuration.
+/// The reason why wheel settings are no configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelConfigError {
-    /// Not two or four wheels.
+    /// There are not two or four wheels.
     #[error("{0} wheels instead of two or four")]
     Wheels(usize),
     /// A wheel that does not exist, or is in two signals.
@@ -49,12 +49,12 @@ impl WheelSettings {
     /// `WHEEL_SPEEDS`). Still below 0.1 km/h for half a second, silent after 0.1 s.
     pub const TOYOTA: Self = Self {
         frames: [Some(WheelFrame::TOYOTA), None, None, None],
-        timeout_us: 100_000,
+        timeout: Duration::from_millis(100),
         still_speed: WheelSpeed(1_820),
-        still_for_us: 500_000,
+        still_for: Duration::from_millis(500),
     };
 
-    /// The wheels that there are, each in one signal.
+    /// Returns the wheels that the settings name, each in one signal.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
         let mut expected = [false; WHEELS];
         let frames = || self.frames.iter().flatten();

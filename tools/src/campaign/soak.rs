@@ -1,5 +1,5 @@
-//! Hours of a simulated drive through the whole way of the data, as fast as the host can: bytes
-//! of an MTi in, frames as SLCAN text out, read back as a receiver reads them.
+//! Hours of a simulated drive through all stages, as fast as the host can: bytes of an MTi go in, frames come out as
+//! SLCAN text, and a receiver reads them.
 //!
 //! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
 //! 32-bit microseconds begin half the drive before their end, packet counters and the counters
@@ -11,7 +11,7 @@ use crate::drive::wheel_frames;
 use crate::simulate::{Config as Simulated, Sample, Simulation};
 use gyronet::can::slcan::emit_stamped;
 use gyronet::coprocessor::{Config, Coprocessor};
-use gyronet::health::{Counters, Status, WatchCounters};
+use gyronet::health::{Counters, MonitorCounters, Status};
 use gyronet::model::WindowNetwork;
 use gyronet::sample::{PERIOD_US, RATE_HZ, WHEELS};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
@@ -29,19 +29,19 @@ const GOOD: u32 = 3;
 const FRAMES: u64 = 6;
 /// Samples until the first one that is corrected, with something to spare.
 const INITIALISED: u32 = 100 * RATE_HZ;
-/// Half a least bit of the angle message, and one of each value that is summed: deg.
+/// Half a least bit of the angle message, and one of each value that is summed, deg.
 const YAW_TOLERANCE: f64 = 1e-6;
 
-/// What came of it.
+/// The results of a soak.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Soak {
     /// Samples sent.
     pub samples: u32,
-    /// What the pipeline counted.
+    /// The pipeline's counters.
     pub pipeline: Counters,
-    /// What the sensor monitor counted.
-    pub watch: WatchCounters,
-    /// What the receiver counted.
+    /// The sensor monitor's counters.
+    pub watch: MonitorCounters,
+    /// The receiver's counters.
     pub receiver: Counts,
     /// Samples with each status: initialising, degraded, ready.
     pub statuses: [u32; 3],
@@ -57,8 +57,7 @@ pub struct Soak {
     pub turns: f64,
     /// Times that the part's ticks, the board's and the gyro's 32-bit microseconds wrapped.
     pub wraps: [u32; 3],
-    /// Resident memory after a tenth of the drive and at its end, KiB; `None` where it cannot be
-    /// told.
+    /// Resident memory after a tenth of the drive and at its end, KiB; `None` where the system does not report it.
     pub memory_kib: Option<[u64; 2]>,
 }
 
@@ -134,7 +133,7 @@ impl Drive {
             temperature: None,
             status: Some(GOOD),
         };
-        message.emit().iter().for_each(|byte| self.mti.push(*byte));
+        message.emit().iter().for_each(|byte| self.mti.receive(*byte));
         let received = self.mti.next_sample().and_then(Result::ok).expect("a message of our own");
         let sent = u64::from(self.starts[0]) * 100 + u64::from(k) * PERIOD_US;
         self.clock_error_us = received.time.0 as i64 - sent as i64;
@@ -175,7 +174,7 @@ impl Drive {
             validity: Validity::GYRO,
             sequence: (k % 128) as u8,
         };
-        message.emit().iter().for_each(|byte| self.gyro.push(*byte));
+        message.emit().iter().for_each(|byte| self.gyro.receive(*byte));
         while let Some(received) = self.gyro.next_sample() {
             match received {
                 Ok(received) => {
@@ -211,13 +210,13 @@ impl Drive {
 }
 
 impl Soak {
-    /// What is not as it must be; empty when all is.
+    /// Returns the names of the checks that do not hold.
     #[must_use]
     pub fn faults(&self) -> Vec<String> {
         let samples = u64::from(self.samples);
         let Counters { missing, misplaced, clock_jumps, late, .. } = self.pipeline;
         let Counts { foreign, lost, repeated, out_of_sequence, damaged, unreadable, frames } = self.receiver;
-        let WatchCounters { silences, stuck, .. } = self.watch;
+        let MonitorCounters { silences, stuck, .. } = self.watch;
         let yaw = self.yaw_error_deg.abs() <= YAW_TOLERANCE;
         let memory = self.memory_kib.is_none_or(|[early, late]| late <= early + 64);
         let [init, ..] = self.statuses;
@@ -275,7 +274,7 @@ impl fmt::Display for Soak {
     }
 }
 
-/// Resident memory of this process, where the system tells it as Linux does.
+/// Returns the resident memory of this process, where the system reports it as Linux does.
 fn resident_kib() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

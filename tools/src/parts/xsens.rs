@@ -7,7 +7,7 @@ use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 
 /// All six clipping bits of the status word.
-const CLIPPED: u32 = 0x3F << 8;
+pub const CLIPPED: u32 = 0x3F << 8;
 /// Self-test passed, filter valid.
 const GOOD: u32 = 3;
 /// Microseconds of a tick of SampleTimeFine.
@@ -21,7 +21,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let epoch = first - first % (TICK_US << 32);
     for (row, frame) in recording.rows.iter().zip(messages(recording)) {
         bytes += frame.len() as u64;
-        frame.iter().for_each(|byte| mti.push(*byte));
+        frame.iter().for_each(|byte| mti.receive(*byte));
         let delivered = mti.next_sample().ok_or_else(|| "no frame was found".to_owned());
         let sample = delivered.and_then(|sample| sample.map_err(|error| error.to_string()));
         let sample = sample.map_err(|why| Part::Xsens.no_sample(recording, row, why))?;
@@ -36,8 +36,8 @@ pub fn messages(recording: &Recording) -> impl Iterator<Item = Vec<u8>> {
     rows.map(|(number, row)| message(number, &row.sample).emit().to_vec())
 }
 
-/// The message of a sample. Its codes came from f32 and go back to the same ones.
-fn message(number: usize, sample: &ImuSample) -> MtData2 {
+/// Returns the message of a sample. Its codes came from f32 and go back to the same ones.
+pub fn message(number: usize, sample: &ImuSample) -> MtData2 {
     MtData2 {
         packet_counter: Some(number as u16),
         sample_time_fine: Some((sample.time.0 / TICK_US) as u32),

@@ -1,4 +1,4 @@
-//! How much flash and RAM a firmware image takes, read from its ELF file.
+//! Flash and RAM of a firmware image, read from its ELF file.
 
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
@@ -11,7 +11,7 @@ pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 12 << 10];
 pub struct ImageSize {
     /// Vectors, code, constants and the initial values of data.
     pub flash: u64,
-    /// Of that, the two assembly kernels.
+    /// The part of the flash that the two assembly kernels take.
     pub kernels: u64,
     /// Statics in SRAM, and the code that runs from there.
     pub static_ram: u64,
@@ -19,7 +19,7 @@ pub struct ImageSize {
     pub ccm: u64,
 }
 
-/// Why an image cannot be measured.
+/// The error of an image that cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum SizeError {
     /// The file cannot be read.
@@ -27,15 +27,15 @@ pub enum SizeError {
     Io {
         /// The file.
         path: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Not an object file.
+    /// The file is no object file.
     #[error("{path}: {source}")]
     Format {
         /// The file.
         path: String,
-        /// What the reader said.
+        /// The reader's error.
         source: object::Error,
     },
 }

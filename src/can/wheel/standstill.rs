@@ -1,4 +1,4 @@
-//! Wheel speeds from wherever they come, and whether the vehicle stands.
+//! The wheels decide whether the vehicle stands.
 //!
 //! Standing still is decided here, because a bias estimator that trusts the gyro alone takes a
 //! slow turn for bias. It is asserted late and dropped at once: all wheels must have been fresh
@@ -6,18 +6,18 @@
 //! sensors of the passive kind show zero below walking pace, hence the while.
 
 use crate::sample::{Standstill, WHEELS, WheelSample};
-use crate::units::{Micros, WheelSpeed};
+use crate::units::{Duration, Micros, WheelSpeed};
 
-/// When wheels count as standing, and when as silent.
+/// The limits by which wheels count as standing, and as silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StandstillRule {
     /// A speed that is older says nothing.
-    pub timeout_us: u64,
+    pub timeout: Duration,
     /// Up to this speed a wheel may stand still.
     pub still_speed: WheelSpeed,
-    /// So long all wheels must be that slow.
-    pub still_for_us: u64,
+    /// The time for which all wheels must be that slow.
+    pub still_for: Duration,
 }
 
 /// The wheels of a vehicle: the newest speed of each, and since when they have been slow.
@@ -31,7 +31,7 @@ pub struct Wheels {
 }
 
 impl Wheels {
-    /// Nothing known yet.
+    /// Begins before the first speed.
     #[must_use]
     pub const fn new(rule: StandstillRule, expected: [bool; WHEELS]) -> Self {
         Self { rule, expected, speeds: [None; WHEELS], still_since: None }
@@ -40,7 +40,7 @@ impl Wheels {
     /// Drops what is too old. Call it before new speeds are taken.
     pub fn expire(&mut self, now: Micros) {
         for slot in &mut self.speeds {
-            let old = |(_, at): &(_, Micros)| now.0.saturating_sub(at.0) > self.rule.timeout_us;
+            let old = |(_, at): &(_, Micros)| now.since(*at) > self.rule.timeout;
             *slot = slot.take_if(|speed| !old(speed));
         }
         if !self.complete() {
@@ -55,7 +55,7 @@ impl Wheels {
         }
     }
 
-    /// Judges standing or moving anew, by the speeds that have been set.
+    /// Judges standing or moving by the speeds that have been set.
     pub fn judge(&mut self, now: Micros) {
         let limit = self.rule.still_speed.0.unsigned_abs();
         let slow = self.speeds.iter().flatten().all(|(speed, _)| speed.0.unsigned_abs() <= limit);
@@ -66,11 +66,11 @@ impl Wheels {
         }
     }
 
-    /// What is known now.
+    /// Returns the newest speeds, and whether the vehicle stands.
     #[must_use]
     pub fn sample(&self, now: Micros) -> WheelSample {
         let standstill = match self.still_since {
-            Some(since) if now.0.saturating_sub(since.0) >= self.rule.still_for_us => Standstill::Still,
+            Some(since) if now.since(since) >= self.rule.still_for => Standstill::Still,
             Some(_) => Standstill::Unknown,
             None if self.complete() => Standstill::Moving,
             None => Standstill::Unknown,
@@ -78,7 +78,7 @@ impl Wheels {
         WheelSample { time: now, speeds: self.speeds.map(|speed| speed.map(|(speed, _)| speed)), standstill }
     }
 
-    /// Every wheel that there is has a fresh speed.
+    /// Returns whether every expected wheel has a fresh speed.
     fn complete(&self) -> bool {
         self.speeds.iter().zip(self.expected).all(|(speed, expected)| speed.is_some() || !expected)
     }
