@@ -172,8 +172,8 @@ fn part_that_falls_silent_comes_back() {
     let silent = board.counts().time;
     board.run(SECOND / 2);
     let without = rates(&mut board);
-    let first = without.iter().find(|(_, rate)| rate.is_none()).expect("silence is told").0;
-    println!("{TEST}: silence is told after {:?}", first - silent);
+    let first = without.iter().find(|(_, rate)| rate.is_none()).expect("silence is reported").0;
+    println!("{TEST}: silence is reported after {:?}", first - silent);
     assert!(first - silent < 45 * MS, "{:?}", first - silent);
     assert!(known(&without) <= 2, "no rate is made up");
     assert!(without.len() >= 44, "{} message sets", without.len());
@@ -204,13 +204,13 @@ fn wrong_part_is_named_and_gives_no_rate() {
     board.power_on();
     board.run(START + SECOND);
     assert_eq!(service::info(&mut board).sensor, Some(SensorFault::Identity(OTHER)));
-    // Silence is told from two seconds on.
+    // Silence is reported from two seconds on.
     board.run(SECOND * 3 / 2);
-    let told = rates(&mut board);
-    assert!(told.len() > 30 && told.iter().all(|(_, rate)| rate.is_none()), "{told:?}");
+    let silent = rates(&mut board);
+    assert!(silent.len() > 30 && silent.iter().all(|(_, rate)| rate.is_none()), "{silent:?}");
     let Ok(Reply::Log(log)) = service::ask(&mut board, &Request::Log { after: 0 }) else { panic!("no log") };
     let named = |kind: &EventKind| *kind == EventKind::Sensor(Some(SensorFault::Identity(OTHER)));
-    // It is tried again every second, and told once.
+    // It is tried again every second, and reported once.
     assert_eq!(log.events.iter().filter(|event| named(&event.kind)).count(), 1);
     board.configure("SPI1.imu_who_am_i", 0x47);
     board.run(SECOND + SECOND / 5);

@@ -27,17 +27,17 @@ enum Stage {
 }
 
 impl FogNetwork {
-    /// Nothing to do yet; without good weights there never is.
+    /// Begins without a window; without good weights none is ever taken.
     pub fn new(parts: Option<&'static mut FogParts>) -> Self {
         Self { parts, stage: Stage::Waiting }
     }
 
-    /// Whether it could take a window.
+    /// Returns whether it could take a window.
     pub fn is_waiting(&self) -> bool {
         self.parts.is_some() && self.stage == Stage::Waiting
     }
 
-    /// Whether a window is being worked on.
+    /// Returns whether a window is being worked on.
     pub fn is_running(&self) -> bool {
         self.stage != Stage::Waiting
     }

@@ -22,9 +22,9 @@ use gyronet::units::Micros;
 
 /// Bytes of a line in one turn: all that can wait.
 pub const TURN: usize = board::IMU_RING;
-/// What a look at the part on SPI counts as: four a turn.
+/// The bytes that a look at the part on SPI counts as: four looks a turn.
 const LOOK: usize = TURN / 4;
-/// From one attempt to bring it up to the next one.
+/// The time from one attempt to bring it up to the next one.
 const RETRY_MS: u32 = 1_000;
 /// Looks at the time before a delay is given up, should it stand still: a millisecond has some ten
 /// thousand.
@@ -51,14 +51,14 @@ pub enum Imu {
 }
 
 impl Imu {
-    /// Of the part that is configured. What the image does not drive, no configuration has.
+    /// Returns the end of the part that is configured. A configuration names only parts that the image drives.
     #[inline]
     pub fn new(part: ImuPart, line: serial::Port<{ board::IMU_RING }>) -> Self {
         if part == ImuPart::Icm42688 { Self::Spi(SpiPart::default()) } else { Self::Line(line, Mti::new()) }
     }
 
-    /// The next sample, or that there is none where one was due; `None`: nothing waits, or the turn
-    /// is over.
+    /// Returns the next sample, or an error where one was due and is damaged; `None` when nothing waits or the turn is
+    /// over.
     pub fn next_sample(&mut self, turn: &mut usize) -> Option<Result<ImuSample, ()>> {
         match self {
             Self::Line(port, mti) => loop {
@@ -75,7 +75,7 @@ impl Imu {
         }
     }
 
-    /// Bytes that came damaged, and bytes that had to wait.
+    /// Returns the numbers of bytes that came damaged and of bytes that had to wait.
     pub fn line_faults(&self) -> [u32; 2] {
         match self {
             Self::Line(port, _) => [port.lost(), port.held()],
@@ -140,7 +140,7 @@ pub struct BringUp {
 }
 
 impl BringUp {
-    /// Where such a part is configured.
+    /// Returns idle's end where such a part is configured.
     pub fn new(part: ImuPart, spi: Spi) -> Option<Self> {
         (part == ImuPart::Icm42688).then_some(Self { spi, tried: None })
     }

@@ -24,7 +24,7 @@ const DRIVES: SupportedHardware = SupportedHardware {
     fogs: &[FogPart::Dsp1760],
     bits_per_second: &[BITS_PER_SECOND],
 };
-/// Whose wheel frames are understood.
+/// The maker whose wheel frames are understood.
 pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
 
 /// The identifiers of the frames that CAN receives.
@@ -32,7 +32,7 @@ pub fn received() -> impl Iterator<Item = embedded_can::Id> {
     WHEELS.frames.into_iter().flatten().map(|frame| frame.id)
 }
 
-/// What each task gets.
+/// The parts that the tasks get.
 pub struct Parts {
     pub output: OutputParts,
     pub config: Config,
@@ -42,7 +42,7 @@ pub struct Parts {
     pub device: Stored,
 }
 
-/// `None` when they have been made before.
+/// Makes the parts; `None` when they have been made before.
 #[inline(never)]
 pub fn parts(board: &Board) -> Option<Parts> {
     // SAFETY: the clock tree is done with the controller, and this runs once.
