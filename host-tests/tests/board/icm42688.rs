@@ -125,7 +125,7 @@ fn samples_come_at_their_rate_and_on_the_grid() {
 
 /// `cargo test -p gyronet-host-tests --test board icm42688 -- --ignored --nocapture`
 #[test]
-#[ignore = "a minute of board time takes two"]
+#[ignore = "a minute of board time takes up to three of processor time"]
 fn samples_come_for_a_minute() {
     in_order("samples_come_for_a_minute", 60);
 }
