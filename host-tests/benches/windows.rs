@@ -7,7 +7,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet_tools::network::checkpoint::Checkpoint;
+use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use std::hint::black_box;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ fn windows(criterion: &mut Criterion) {
         bench.iter(|| integer.estimate_newest(black_box(&window)));
     });
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tools/weights/gyronet.safetensors");
-    let checkpoint = Checkpoint::read(&path).expect("the checkpoint is good");
+    let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&path).expect("the checkpoint is good");
     let mut reference = checkpoint.network();
     criterion.bench_function("gyronet/f32", |bench| {
         bench.iter(|| reference.estimate(black_box(&window)));

@@ -9,7 +9,7 @@ use gyronet::odometry::Track;
 use gyronet_host_tests::parallel;
 use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
 use gyronet_tools::network::quantization_error::Both;
-use gyronet_tools::paper::fog_drive::{self, FogDrive};
+use gyronet_tools::paper::fog_replay::{self, FogReplay};
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set};
 use gyronet_tools::simulate::world::EARTH_RATE;
@@ -99,9 +99,9 @@ fn judge(sequence: &Sequence) -> ([f64; 5], String, Vec<String>) {
     let mut state = FogNetState::ZERO;
     let mut network = FogNet::new(blob, &mut state);
     let mut known = Remembering { network: &mut network, known: HashMap::new() };
-    let mut drive = |padding| -> FogDrive {
+    let mut drive = |padding| -> FogReplay {
         let config = FogConfig { padding, ..FogConfig::DEFAULT };
-        fog_drive::run(sequence, &mut known, config, || {})
+        fog_replay::run(sequence, &mut known, config, || {})
     };
     let [repeat, edge, none] = [Padding::Repeat, Padding::Edge, Padding::None].map(&mut drive);
     let earth = EARTH_RATE * sequence.latitude_deg().to_radians().sin() / 100.0;
@@ -115,7 +115,7 @@ fn judge(sequence: &Sequence) -> ([f64; 5], String, Vec<String>) {
     let (mut integer, mut reference) =
         (Sampled { network: known, windows: 0 }, Sampled { network: checkpoint.network(), windows: 0 });
     let mut both = Both::new(&mut integer, &mut reference);
-    fog_drive::run(sequence, &mut both, FogConfig::DEFAULT, || {});
+    fog_replay::run(sequence, &mut both, FogConfig::DEFAULT, || {});
     let error = both.error();
     let [fog, fog_earth, fognet, fognet_edge, fognet_nopad] = ates;
     let row = format!(

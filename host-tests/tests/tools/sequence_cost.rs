@@ -4,7 +4,7 @@
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::require::skipped;
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set};
 use std::path::Path;
@@ -46,7 +46,7 @@ fn import_and_replay_of_twenty_minutes() {
     if cfg!(debug_assertions) {
         recording.rows.truncate(12_000);
     }
-    let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut network, || {})
+    let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut network, || {})
         .expect("it stands at first");
     let replayed = processor_seconds().expect("it was there") - begin - imported;
     let peak = peak_megabytes().expect("as the other");
