@@ -79,6 +79,9 @@ pub struct Aligner {
 }
 
 impl Aligner {
+    /// The aligner before the first sample.
+    pub const START: Self = Self { last: None };
+
     /// Places a sample on the grid.
     ///
     /// # Errors

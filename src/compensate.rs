@@ -152,8 +152,13 @@ pub struct Compensator {
 impl Compensator {
     /// Begins without an estimate.
     #[must_use]
-    pub fn new(config: CompensateConfig) -> Self {
+    pub const fn new(config: CompensateConfig) -> Self {
         Self { config, kept: [None; KEPT], prior: 0, prompt_carry: 0, navigation_carry: 0, held: [0; 2] }
+    }
+
+    /// Sets the configuration, before the first sample.
+    pub fn configure(&mut self, config: CompensateConfig) {
+        self.config = config;
     }
 
     /// Revises the samples of the window that ended [`Mode::delay`] samples before the next one.

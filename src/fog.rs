@@ -109,6 +109,11 @@ impl FogCorrector {
         }
     }
 
+    /// Sets the configuration, before the first frame.
+    pub fn configure(&mut self, config: FogConfig) {
+        self.config = config;
+    }
+
     /// Takes one frame of 10 ms and corrects its turn.
     #[inline(never)]
     pub fn correct(&mut self, frame: &FogFrame) -> FogOutput {

@@ -53,6 +53,9 @@ pub struct Resampler {
 }
 
 impl Resampler {
+    /// No sample.
+    pub const EMPTY: Self = Self { samples: Deque::new(), dropped: 0 };
+
     /// Takes a sample; its time is the board's and later than the last one's.
     pub fn add(&mut self, sample: ImuSample) {
         if self.samples.is_full() {

@@ -28,6 +28,12 @@ pub struct Events {
     pub increments: IncrementCounters,
 }
 
+impl Events {
+    /// No event.
+    pub const NONE: Self =
+        Self { imu: ClockCounters::NONE, fog: ClockCounters::NONE, increments: IncrementCounters::NONE };
+}
+
 /// The values of one grid step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -70,16 +76,16 @@ pub struct Streams {
 impl Streams {
     /// Begins before the first sample.
     #[must_use]
-    pub fn new(fitted: Fitted) -> Self {
+    pub const fn new(fitted: Fitted) -> Self {
         Self {
             fitted,
-            imu_clock: PartClock::default(),
-            fog_clock: PartClock::default(),
-            imu: Resampler::default(),
-            fog: Increments::default(),
+            imu_clock: PartClock::START,
+            fog_clock: PartClock::START,
+            imu: Resampler::EMPTY,
+            fog: Increments::EMPTY,
             next: None,
             restarts: 0,
-            reported: Events::default(),
+            reported: Events::NONE,
         }
     }
 

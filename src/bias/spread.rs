@@ -10,6 +10,9 @@ pub(super) struct Spread {
 }
 
 impl Spread {
+    /// The spread of no reading.
+    pub const EMPTY: Self = Self { count: 0, sum: 0, mean: 0.0, squares: 0.0 };
+
     /// Takes a reading as code and as value.
     pub fn add(&mut self, code: i32, value: f32) {
         self.count += 1;

@@ -141,6 +141,9 @@ pub struct YawRateSignal {
 pub struct OutOfRange(pub u16);
 
 impl YawRateSignal {
+    /// Nothing owed.
+    pub const START: Self = Self { residual: 0 };
+
     /// Returns the code of a rate, with the rounding residual of the earlier ones.
     ///
     /// # Errors

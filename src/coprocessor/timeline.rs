@@ -16,6 +16,9 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
+    /// Time 0.
+    pub const START: Self = Self { now: Micros(0), shift_us: 0 };
+
     /// Takes the clock's time and returns the shifted one.
     ///
     /// # Errors

@@ -183,6 +183,30 @@ pub struct SecondsWindow<'m> {
     padding: Padding,
 }
 
+/// The copy of a window, for a reader that must not hold up the writer for longer than a copy takes.
+#[derive(Debug, Clone)]
+pub struct WindowCopy {
+    minute: Minute,
+    padding: Padding,
+}
+
+impl WindowCopy {
+    /// The copy of no window.
+    pub const EMPTY: Self = Self { minute: Minute::EMPTY, padding: Padding::Repeat };
+
+    /// Takes a copy of a window.
+    pub fn take(&mut self, window: &SecondsWindow<'_>) {
+        self.minute.clone_from(window.minute);
+        self.padding = window.padding;
+    }
+
+    /// The window; `None` before one was taken.
+    #[must_use]
+    pub fn window(&self) -> Option<SecondsWindow<'_>> {
+        self.minute.window(self.padding)
+    }
+}
+
 impl<'m> SecondsWindow<'m> {
     /// Returns the seconds, oldest first: [`STEPS`] of them.
     pub fn iter(&self) -> impl Iterator<Item = &'m Second> + use<'m> {

@@ -35,7 +35,7 @@ pub struct Uncertainty {
 impl Uncertainty {
     /// Begins before the first window.
     #[must_use]
-    pub fn new(config: UncertaintyConfig) -> Self {
+    pub const fn new(config: UncertaintyConfig) -> Self {
         Self { config, scale_square: None }
     }
 

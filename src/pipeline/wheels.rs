@@ -3,7 +3,7 @@
 use crate::sample::{Standstill, WHEELS, WheelSample};
 
 /// The newest report of the wheels.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Wheels {
     newest: Option<WheelSample>,
     /// Wheels that have had a speed.
@@ -11,6 +11,9 @@ pub(super) struct Wheels {
 }
 
 impl Wheels {
+    /// Nothing known of the wheels.
+    pub const START: Self = Self { newest: None, seen: [false; WHEELS] };
+
     /// Takes a report.
     pub fn update(&mut self, wheels: WheelSample) {
         for (seen, speed) in self.seen.iter_mut().zip(&wheels.speeds) {

@@ -170,6 +170,9 @@ pub struct SetEncoder {
 }
 
 impl SetEncoder {
+    /// Nothing owed.
+    pub const START: Self = Self { rates: [YawRateSignal::START; 3] };
+
     /// Encodes the three messages of one sample, in the order of [`LAYOUTS`]. A value that does not fit its signal
     /// is sent as the nearest limit and marked as failed.
     pub fn encode(&mut self, motion: &Motion) -> [Message; 3] {

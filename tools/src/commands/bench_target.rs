@@ -46,7 +46,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let image = bench::build(&workspace, "coprocessor", &folder)?;
     let coprocessor = ImageSize::read(&image)?;
-    let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
+    let tasks = if counts.exact() { Some(schedule(&workspace, &image, &counts)?) } else { None };
     let out = &mut io::stdout().lock();
     let written = if common.json {
         writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))
@@ -91,10 +91,14 @@ fn policies(workspace: &Path, folder: &Path) -> super::Result {
 type Timing = (Tasks, Schedule);
 
 /// The tasks of the image that is flashed, counted while it runs.
-fn schedule(workspace: &Path, image: &Path) -> Result<Timing, Box<dyn std::error::Error>> {
+fn schedule(workspace: &Path, image: &Path, counts: &Counts) -> Result<Timing, Box<dyn std::error::Error>> {
     let plugin = bench::plugin(workspace).ok_or("the instruction counter cannot be built")?;
     let tasks = tasks::measure(image, &plugin)?;
-    let schedule = Schedule::new(&tasks);
+    let fognet = counts.get("fognet/window").and_then(|count| {
+        let cycles = Cycles { zero: count.cycles?, five: count.cycles_5ws? };
+        Some((count.instructions, cycles))
+    });
+    let schedule = Schedule::new(&tasks, fognet);
     let schedule = schedule.ok_or("the image has other tasks than the table of deadlines")?;
     Ok((tasks, schedule))
 }

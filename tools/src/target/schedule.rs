@@ -247,9 +247,10 @@ impl Task {
 pub struct Schedule(pub Vec<Task>);
 
 impl Schedule {
-    /// Computes the response times from the counts; `None` where the image has a task that is not in the table.
+    /// Makes the table of what was counted; `fognet` are the instructions and cycles of one of FoGNet's windows, which
+    /// idle runs piece by piece. `None`: the image has a task that is not in the table.
     #[must_use]
-    pub fn new(tasks: &Tasks) -> Option<Self> {
+    pub fn new(tasks: &Tasks, fognet: Option<(u64, Cycles)>) -> Option<Self> {
         let Tasks { handlers, all_off, some_off } = tasks;
         let known = |handler: &Handler| {
             LAST.contains(&&*handler.name) || DEMANDS.iter().any(|demand| demand.handler == handler.name)
@@ -277,7 +278,7 @@ impl Schedule {
                 response_5ws_us: None,
             })
         };
-        let mut tasks: Vec<Task> = DEMANDS.iter().filter_map(task).collect();
+        let mut tasks: Vec<Task> = DEMANDS.iter().filter_map(task).chain(fognet.map(in_idle)).collect();
         for k in 0..tasks.len() {
             let blocked = if tasks[k].priority > SHARED { *all_off } else { all_off.max(*some_off) };
             tasks[k].response_us = response(&tasks, k, blocked.zero, |task| [task.cycles, task.each.zero]);
@@ -299,6 +300,26 @@ impl Schedule {
     #[must_use]
     pub fn share(&self) -> f64 {
         self.0.iter().map(Task::share).sum()
+    }
+}
+
+/// FoGNet's window, in the time that all tasks leave: one begins with each second, and its estimate is used with the
+/// next.
+fn in_idle((instructions, cycles): (u64, Cycles)) -> Task {
+    Task {
+        name: "fognet",
+        priority: 0,
+        period_us: 1e6,
+        burst: None,
+        each: cycles,
+        deadline_us: 1e6,
+        why: "used with the next second",
+        runs: 1,
+        instructions,
+        cycles: cycles.zero,
+        cycles_5ws: cycles.five,
+        response_us: None,
+        response_5ws_us: None,
     }
 }
 
@@ -433,7 +454,7 @@ mod tests {
 
     #[test]
     fn responses_by_hand() {
-        let schedule = Schedule::new(&tasks(168_000)).unwrap();
+        let schedule = Schedule::new(&tasks(168_000), None).unwrap();
         let task = |name: &str| schedule.0.iter().find(|task| task.name == name).unwrap();
         let close = |name: &str, us: [f64; 2]| {
             let Task { response_us, response_5ws_us, .. } = task(name);
@@ -462,7 +483,7 @@ mod tests {
     /// spare, after 16 ms it is not.
     #[test]
     fn a_deadline_met_without_spare_time_is_missed() {
-        let window = |us: u64| Schedule::new(&tasks(168 * us)).unwrap();
+        let window = |us: u64| Schedule::new(&tasks(168 * us), None).unwrap();
         let response = |schedule: &Schedule| schedule.0.last().unwrap().response_5ws_us.unwrap();
         let (spare, late) = (window(11_000), window(14_000));
         assert!(spare.met() && response(&spare) > 11_000.0, "{spare}");
@@ -471,13 +492,13 @@ mod tests {
 
     #[test]
     fn a_deadline_that_is_missed_is_reported() {
-        let schedule = Schedule::new(&tasks(168 * 21_000)).unwrap();
+        let schedule = Schedule::new(&tasks(168 * 21_000), None).unwrap();
         assert!(
             !schedule.met() && schedule.to_string().contains("used two samples later: MISSED"),
             "{schedule}"
         );
         let mut more = tasks(168_000);
         more.handlers[0].name = "SPI1".to_owned();
-        assert_eq!(Schedule::new(&more), None);
+        assert_eq!(Schedule::new(&more, None), None);
     }
 }

@@ -3,9 +3,8 @@
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
 
-/// Limits of an image with both networks and everything else, bytes: flash, static RAM, stack. The stack is deepest at the
-/// start, where the coprocessor is made before any interrupt is on.
-pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 24 << 10];
+/// Limits of an image with both networks and everything else, bytes: flash, static RAM, stack.
+pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 12 << 10];
 
 /// Sizes of one image, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
