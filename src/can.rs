@@ -3,6 +3,7 @@
 pub mod bosch;
 mod carry;
 pub mod config;
+#[doc(hidden)]
 pub mod e2e;
 #[doc(hidden)]
 pub mod encoder;
@@ -12,6 +13,7 @@ mod frame;
 pub mod j1939;
 #[doc(hidden)]
 pub mod load;
+#[doc(hidden)]
 pub mod queue;
 #[doc(hidden)]
 pub mod signal;

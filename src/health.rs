@@ -3,6 +3,7 @@
 use crate::sample::Validity;
 
 #[cfg(target_has_atomic = "8")]
+#[doc(hidden)]
 pub mod supervisor;
 
 /// State of the corrected yaw rate: one state machine. No state needs a restart to leave it, but
@@ -114,7 +115,7 @@ impl Faults {
 
     /// Returns the fault that a reading of this validity stands for.
     #[must_use]
-    pub const fn of(validity: Validity) -> Self {
+    pub(crate) const fn of(validity: Validity) -> Self {
         match validity {
             Validity::Good => Self::NONE,
             Validity::Saturated | Validity::Recovering => Self::CLIPPED,
@@ -125,7 +126,7 @@ impl Faults {
 
     /// Returns this fault if it is present, else none.
     #[must_use]
-    pub const fn when(self, present: bool) -> Self {
+    pub(crate) const fn when(self, present: bool) -> Self {
         if present { self } else { Self::NONE }
     }
 

@@ -5,24 +5,27 @@ pub mod background;
 #[doc(hidden)]
 pub mod blob;
 pub(crate) mod file;
+#[doc(hidden)]
 pub mod fognet;
 #[doc(hidden)]
 pub mod fognet_blob;
 #[doc(hidden)]
 pub mod fognet_f32;
+#[doc(hidden)]
 pub mod gyronet;
 #[doc(hidden)]
 pub mod gyronet_f32;
 mod input;
 pub mod weights;
+#[doc(hidden)]
 pub mod window;
 
 pub use blob::{Blob, BlobError};
 pub use fognet::FogNet;
 pub use fognet_blob::FogBlob;
 pub use gyronet::GyroNet;
+pub use window::{FEATURES, Features, WINDOW};
 
-use crate::model::window::{Features, WINDOW};
 use crate::units::AngularRate;
 
 /// Estimates of the yaw gyro's error, one for each sample of a window, oldest first.

@@ -92,6 +92,7 @@ impl Rotation {
     ///
     /// # Errors
     /// [`LevelError`].
+    #[doc(hidden)]
     pub fn levelling(rest: [SpecificForce; 3]) -> Result<(Self, f32), LevelError> {
         let [x, y, z] = rest.map(|force| force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
         let norm = libm::sqrtf(x * x + y * y + z * z);
@@ -115,6 +116,7 @@ impl Rotation {
 
     /// Returns the rotation that turns first by `self`, then by `next`.
     #[must_use]
+    #[doc(hidden)]
     pub fn then(&self, next: &Self) -> Self {
         let Self(first) = self;
         let columns: [[i32; 3]; 3] =
@@ -124,18 +126,21 @@ impl Rotation {
 
     /// Returns an angular rate in the vehicle's axes.
     #[must_use]
+    #[doc(hidden)]
     pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {
         self.turn(rate.map(|axis| axis.0)).map(AngularRate)
     }
 
     /// Returns a specific force in the vehicle's axes.
     #[must_use]
+    #[doc(hidden)]
     pub fn force(&self, force: [SpecificForce; 3]) -> [SpecificForce; 3] {
         self.turn(force.map(|axis| axis.0)).map(SpecificForce)
     }
 
     /// Returns a sample in the vehicle's axes: x forward, y left, z up.
     #[must_use]
+    #[doc(hidden)]
     pub fn sample(&self, sample: &ImuSample) -> ImuSample {
         ImuSample {
             angular_rate: self.rate(sample.angular_rate),

@@ -33,12 +33,16 @@
 //! answered by the offset that comes next. Nothing here waits, and all buffers have one size.
 
 pub mod calibrate;
+#[doc(hidden)]
 pub mod crash;
 pub mod device;
 pub mod event;
+#[doc(hidden)]
 pub mod frame;
+#[doc(hidden)]
 pub mod hardware;
 pub mod message;
+#[doc(hidden)]
 pub mod standstill;
 mod text;
 

@@ -13,8 +13,10 @@
 pub mod calibration;
 pub mod configuration;
 mod error;
+#[doc(hidden)]
 pub mod layout;
 mod record;
+#[doc(hidden)]
 pub mod slots;
 
 pub use calibration::{BiasPoint, Calibration, Level};

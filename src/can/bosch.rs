@@ -22,6 +22,7 @@
 
 mod set;
 
+#[doc(hidden)]
 pub use set::{LAYOUTS, Layout, Message, Motion, SetEncoder};
 
 use crate::units::{AngularRate, CentiCelsius, SpecificForce};
@@ -171,6 +172,7 @@ impl YawRateSignal {
 
 /// Returns the nearest code of a lateral acceleration, and whether it fits (+-4.18 g).
 #[must_use]
+#[doc(hidden)]
 pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
     let code = (i64::from(force.0) * AY_PER_CODE_Q32 + (1 << 31)) >> 32;
     let raw = code + i64::from(ZERO);
@@ -182,6 +184,7 @@ pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
 
 /// Returns the code of a temperature: whole degrees from -50, 0xC9 above 150, 0xFF where it is not known.
 #[must_use]
+#[doc(hidden)]
 pub fn encode_temperature(temperature: Option<CentiCelsius>) -> u8 {
     match temperature {
         None => 0xFF,

@@ -5,11 +5,11 @@
 mod error;
 mod settings;
 
+pub use super::e2e::{DataIdMode, P11Mode};
 pub use error::ConfigError;
 pub use settings::{BoschSettings, E2e, Settings, Vdc2Settings, YawSettings};
 
 use super::bosch::LAYOUTS;
-use super::e2e::{DataIdMode, P11Mode};
 use super::j1939::{VDC2_PGN, VDC2_PRIORITY, broadcast_id};
 use super::load::{Periodic, per_mille};
 use crate::sample::PERIOD_US;
@@ -97,6 +97,7 @@ impl Config {
     ///
     /// # Errors
     /// [`ConfigError::Identifier`], [`ConfigError::DuplicateIdentifier`].
+    #[doc(hidden)]
     pub fn check_further(&self, ids: [u16; 3]) -> Result<(), ConfigError> {
         check_ids(ids, |id| self.sends(Id::Standard(id)))
     }
@@ -121,7 +122,7 @@ impl Config {
 
     /// Returns the number of samples for each set of our own messages.
     #[must_use]
-    pub fn samples_per_yaw(&self) -> u8 {
+    pub(crate) fn samples_per_yaw(&self) -> u8 {
         // At most 1000 / 10.
         self.settings.yaw.map_or(1, |yaw| (yaw.period_ms / SAMPLE_MS) as u8)
     }

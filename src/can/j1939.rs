@@ -113,6 +113,7 @@ pub enum Validity {
 
 /// The yaw rate's rounding residual.
 #[derive(Debug, Clone, Copy)]
+#[doc(hidden)]
 pub struct Vdc2Encoder {
     yaw_rate: RoundingCarry,
 }

@@ -1,6 +1,8 @@
 //! SLCAN carries CAN over a serial line, the Lawicel way (CAN232 manual): one frame is one line of ASCII.
 
+#[doc(hidden)]
 pub mod assembler;
+#[doc(hidden)]
 pub mod host;
 pub mod port;
 

@@ -182,12 +182,14 @@ impl DetailMessage {
 
 /// Returns the nearest code of an accumulated yaw, without whole turns.
 #[must_use]
+#[doc(hidden)]
 pub const fn encode_angle(yaw: Yaw) -> i32 {
     ((yaw.0 as i128 * ANGLE_PER_YAW_Q56 + (1 << 55)) >> 56) as i32
 }
 
 /// Returns the code of an expected error, rounded up, so that it never promises too much.
 #[must_use]
+#[doc(hidden)]
 pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
     let Some(AngularRate(sigma)) = sigma else { return SIGMA_UNKNOWN };
     let code = (sigma.unsigned_abs() as u64 * SIGMA_PER_CODE_Q32).div_ceil(1 << 32);
@@ -196,6 +198,7 @@ pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
 
 /// Returns the code of a latency in microseconds, rounded up.
 #[must_use]
+#[doc(hidden)]
 pub const fn encode_latency(latency_us: Option<u32>) -> u8 {
     let Some(latency_us) = latency_us else { return LATENCY_UNKNOWN };
     let code = latency_us.div_ceil(500);

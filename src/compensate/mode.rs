@@ -134,6 +134,7 @@ impl Mode {
 
     /// Returns the outputs of a window that are used, oldest first.
     #[must_use]
+    #[doc(hidden)]
     pub const fn used(self) -> Range<usize> {
         match self {
             Self::Newest => WINDOW - 1..WINDOW,
@@ -146,6 +147,7 @@ impl Mode {
 
     /// Returns the number of samples after which no window changes an estimate any more.
     #[must_use]
+    #[doc(hidden)]
     pub const fn settled_after(self) -> usize {
         WINDOW - 1 - self.used().start + self.delay() as usize
     }

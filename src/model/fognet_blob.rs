@@ -1,6 +1,6 @@
 //! This module checks FoGNet's weight file before use, and reads it in place.
 //!
-//! The header of [`super::file`], then:
+//! The header of `model::file`, then:
 //!
 //! | offset | type | field |
 //! |---|---|---|

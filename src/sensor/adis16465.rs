@@ -1,9 +1,9 @@
 //! This driver reads Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
 //!
-//! One burst gives everything: the command 68 00, then the twenty bytes of [`burst`], at 1 MHz
-//! at most. This file fetches it; what it says is [`burst`]'s business, sans I/O.
+//! One burst gives everything: the command 68 00, then the twenty bytes of a [`Burst`], at 1 MHz
+//! at most. This file fetches it; what it says is parsed without I/O.
 
-pub mod burst;
+mod burst;
 
 pub use burst::{BURST, Burst, BurstError, DiagStat, Model};
 

@@ -8,8 +8,10 @@
 //! ([`crate::align`]).
 
 mod clock;
+#[doc(hidden)]
 pub mod command;
 mod config;
+#[doc(hidden)]
 pub mod dialogue;
 mod format;
 mod framing;

@@ -7,7 +7,9 @@
 
 mod clock;
 mod config;
+#[doc(hidden)]
 pub mod packet;
+#[doc(hidden)]
 pub mod registers;
 mod sample;
 

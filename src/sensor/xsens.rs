@@ -1,12 +1,15 @@
 //! This module reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
-//! Frames are in [`xbus`], the measurements in a frame in [`mtdata2`], the four forms of their
-//! numbers in [`precision`]; [`dialogue`] brings a part to send what the pipeline wants.
+//! Frames are in `xbus`, the measurements in a frame are [`MtData2`], the four forms of their
+//! numbers are in `precision`; `dialogue` brings a part to send what the pipeline wants.
 
+#[doc(hidden)]
 pub mod dialogue;
-pub mod mtdata2;
+mod mtdata2;
+#[doc(hidden)]
 pub mod precision;
 mod setup;
+#[doc(hidden)]
 pub mod xbus;
 
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};

@@ -51,7 +51,7 @@ pub enum State {
 
 /// A calibration under way.
 #[derive(Debug, Clone)]
-pub struct Calibrator {
+pub(crate) struct Calibrator {
     task: Task,
     still: StaticInit,
 }

@@ -118,7 +118,7 @@ pub struct LogPage {
 
 /// The newest events; the oldest one gives way.
 #[derive(Debug, Default)]
-pub struct EventLog {
+pub(crate) struct EventLog {
     events: Deque<Event, KEPT>,
     total: u32,
 }

@@ -16,7 +16,7 @@ const MAX_BIAS: f32 = 1.0;
 /// Temperatures that parts are made for, deg C.
 const TEMPERATURE: (f32, f32) = (-60.0, 150.0);
 /// Furthest from level that a mounting calibration may find, deg; more is a wrong rotation.
-pub const MAX_TILT_DEG: f32 = 45.0;
+pub(crate) const MAX_TILT_DEG: f32 = 45.0;
 
 /// The gyro's bias at a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

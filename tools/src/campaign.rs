@@ -64,7 +64,7 @@ const HEALTHY: usize = 101;
 const HEALTHY_AT_START: usize = 20;
 /// One run in so many starts at the beginning of its drive.
 const START_EVERY: u64 = 8;
-/// Of [`OF`] runs [`SINGLE`] have one fault, the others have two.
+/// [`SINGLE`] of so many runs have one fault, the others have two.
 const OF: usize = 5;
 const SINGLE: usize = 3;
 

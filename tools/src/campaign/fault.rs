@@ -20,7 +20,7 @@ pub enum Kind {
     Truncation,
     /// A message overtakes those before it.
     Reordering,
-    /// Nothing comes for a while; then everything at once, or nothing of it.
+    /// The line is silent for a while; then everything comes at once, or stays lost.
     Stall,
     /// The part's clock, and with it its sampling, is too fast or too slow.
     ClockDrift,

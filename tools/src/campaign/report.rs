@@ -36,7 +36,7 @@ pub struct Line {
     pub told: usize,
     /// Runs without a report in which yaw did not move by more than the limit.
     pub harmless: usize,
-    /// Those of them in which the board counted something.
+    /// Harmless runs in which the board counted something.
     pub counted: usize,
     /// Undetected, and on the named list.
     pub excepted: usize,

@@ -3,7 +3,7 @@
 //!
 //! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
 //! 32-bit microseconds begin half the drive before their end, packet counters and the counters
-//! of the messages go round, SLCAN's stamps begin anew each minute, the accumulated yaw passes a
+//! of the messages go round, SLCAN's stamps restart each minute, the accumulated yaw passes a
 //! turn again and again. What goes in is known to the sample, so what comes out is.
 
 use crate::client::monitor::{Counts, Monitor};

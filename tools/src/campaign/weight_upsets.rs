@@ -28,11 +28,11 @@ pub const PIECE: usize = 13;
 pub struct WeightUpsets {
     /// Bits of the header, provenance included.
     pub header_bits: usize,
-    /// Those of them that were refused when loaded.
+    /// Bits of the header that were refused when loaded.
     pub header_refused: usize,
     /// Bits of weights that were flipped, one at a time.
     pub weight_bits: usize,
-    /// Those of them that were refused when loaded.
+    /// Bits of weights that were refused when loaded.
     pub weight_refused: usize,
     /// The effects of bits that flip after that.
     pub effects: Effects,

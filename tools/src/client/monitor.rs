@@ -146,7 +146,7 @@ impl Monitor {
             *frames += 1;
             return;
         }
-        // SLCAN's stamps begin anew every minute.
+        // SLCAN's stamps restart every minute.
         if elapsed >= PACE_SECONDS {
             self.frames_per_second = Some(f64::from(*frames) / elapsed);
         }

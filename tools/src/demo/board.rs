@@ -62,7 +62,7 @@ pub enum BoardError {
 pub enum Outcome {
     /// Something that it needs is missing on this machine.
     NotRun {
-        /// What is missing.
+        /// The missing thing, as a sentence.
         why: String,
     },
     /// It ran.

@@ -166,7 +166,7 @@ fn methods(demo: &Demo<'_>) -> String {
         "{}<p class=\"note\">Mean error of the yaw change over 1 s, and error of the yaw at the end, over {:.1} s. The \
          network rows are settled estimates after static initialisation; the last two are what the board sends: with \
          the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
-        table("methods", &header, rows),
+        table("methods", "", &header, rows),
         errors.seconds
     )
 }
@@ -219,5 +219,5 @@ fn board(outcome: &Outcome) -> String {
 
 fn costs(costs: &[Cost]) -> String {
     let rows = costs.iter().map(|cost| vec![cost.what.to_owned(), cost.figure.clone(), cost.how.clone()]);
-    table("costs", &["what", "figure", "from where"], rows)
+    table("costs", "", &["what", "figure", "from where"], rows)
 }

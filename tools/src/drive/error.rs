@@ -11,7 +11,7 @@ pub struct DataError {
     pub line: Option<u64>,
     /// The name or the number of the column.
     pub column: Option<String>,
-    /// What is wrong.
+    /// The fault.
     pub fault: DataFault,
 }
 
@@ -63,7 +63,7 @@ impl fmt::Display for DataError {
     }
 }
 
-/// What is wrong with a file.
+/// A fault of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each fault names its fields")]
@@ -130,7 +130,7 @@ pub enum DataFault {
     Marker(#[from] serde_json::Error),
 }
 
-/// What is wrong with one field.
+/// A fault of one field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
@@ -143,7 +143,7 @@ pub enum ValueError {
     /// The field is NaN or an infinity.
     #[error("not finite")]
     NotFinite,
-    /// No part of this kind can measure so much, or the time is before zero.
+    /// The value is larger than any part of this kind can measure, or the time is before zero.
     #[error("out of range")]
     OutOfRange,
 }

@@ -100,24 +100,24 @@ impl Method {
 pub struct PerMethod<T>([T; Method::ON_A_DRIVE.len()]);
 
 impl<T> PerMethod<T> {
-    /// One for each.
+    /// Computes a value for each method.
     pub fn new(of: impl FnMut(Method) -> T) -> Self {
         Self(Method::ON_A_DRIVE.map(of))
     }
 
-    /// In the order of the table.
+    /// Returns the methods and their values in the order of the table.
     pub fn each(&self) -> impl Iterator<Item = (Method, &T)> {
         Method::ON_A_DRIVE.into_iter().zip(&self.0)
     }
 
-    /// The same of every method.
+    /// Converts every value.
     pub fn map<U>(&self, mut of: impl FnMut(&T) -> U) -> PerMethod<U> {
         PerMethod::new(|method| of(&self[method]))
     }
 }
 
 impl<T: Copy> PerMethod<Option<T>> {
-    /// All, or nothing where one is missing.
+    /// Returns all values, or `None` where one is missing.
     pub fn all(self) -> Option<PerMethod<T>> {
         let values: Option<Vec<T>> = self.0.into_iter().collect();
         values?.try_into().ok().map(PerMethod)
@@ -161,11 +161,11 @@ pub struct Rates {
     pub reference: Option<Vec<f64>>,
     /// The drive as the board would run it.
     pub drive: Replay,
-    /// What that run took on this machine.
+    /// The run time on this machine.
     pub run_time: Duration,
 }
 
-/// How often [`Rates::new`] goes through a recording.
+/// Number of times that [`Rates::new`] goes through a recording.
 pub const RUNS: usize = 4;
 
 impl Rates {

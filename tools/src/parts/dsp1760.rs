@@ -32,7 +32,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
         let steps = ((row.sample.time.0 - last + PERIOD_US / 2) / PERIOD_US).max(1);
         last = row.sample.time.0;
         if steps > u64::from(MAX_GAP) {
-            // The pipeline begins anew after such a gap, and so does the board's grid.
+            // The pipeline restarts after such a gap, and so does the board's grid.
             streams = Streams::new(BOTH);
         } else {
             // The board asks on while nothing comes.

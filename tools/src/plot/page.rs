@@ -7,7 +7,7 @@ use std::fmt::{Display, Write};
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/zoom.js");
 
-/// A whole page around its body.
+/// Returns a whole page around its body.
 #[must_use]
 pub fn document(title: &str, body: &str) -> String {
     format!(
@@ -19,10 +19,19 @@ pub fn document(title: &str, body: &str) -> String {
     )
 }
 
-/// Rows of cells below a heading each; the first column is text, the others are figures.
+/// Returns a table with a caption above it, which may be empty. Its first column is text, the others are figures.
 #[must_use]
-pub fn table<C: Display>(class: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<C>>) -> String {
-    let mut html = format!("<div class=\"scroll\"><table class=\"{class}\"><thead><tr>");
+pub fn table<C: Display>(
+    class: &str,
+    caption: &str,
+    header: &[&str],
+    rows: impl IntoIterator<Item = Vec<C>>,
+) -> String {
+    let mut html = format!("<div class=\"scroll\"><table class=\"{class}\">");
+    if !caption.is_empty() {
+        html += &format!("<caption>{}</caption>", escaped(caption));
+    }
+    html += "<thead><tr>";
     for column in header {
         html += &format!("<th>{}</th>", escaped(column));
     }
@@ -38,13 +47,13 @@ pub fn table<C: Display>(class: &str, header: &[&str], rows: impl IntoIterator<I
     html + "</tbody></table></div>\n"
 }
 
-/// Text as HTML has it.
+/// Returns text with the special characters of HTML escaped.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A count with its thousands apart: 1,162,256.
+/// Returns a count with its thousands apart: 1,162,256.
 #[must_use]
 pub fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -64,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_name_cannot_become_markup() {
-        let page = document("<b>", &table("t", &["a&b"], [vec!["<script>"]]));
+        let page = document("<b>", &table("t", "", &["a&b"], [vec!["<script>"]]));
         assert!(page.contains("<title>&lt;b&gt;</title>") && page.contains("a&amp;b"));
         assert_eq!(page.matches("<script>").count(), 1, "our own");
     }

@@ -26,25 +26,25 @@ use gyronet::sample::PERIOD_US;
 use gyronet::units::AngularRate;
 use std::time::Instant;
 
-/// What a method makes of a sequence.
+/// The estimate of a method on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// The method.
     pub method: Method,
     /// Turned in each step from the first that is compared, rad.
     pub turns: Vec<f64>,
-    /// What it took, s.
+    /// The run time, s.
     pub run_time: f64,
 }
 
-/// What all methods make of a sequence.
+/// The estimates of all methods on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {
     /// The first step that is compared: static initialisation is over.
     pub start: usize,
     /// One for each method that could be run.
     pub methods: Vec<Estimate>,
-    /// Why some methods could not be run.
+    /// The reason why some methods could not be run.
     pub refused: Option<String>,
 }
 

@@ -2,10 +2,10 @@
 
 use super::pictures::Picture;
 use super::table::{Row, Table};
-use crate::plot::page::{document, escaped};
+use crate::plot::page::{self, document, escaped};
 use std::fmt::Write;
 
-/// The page. Pictures come with the name of their sequence.
+/// Returns the page. Pictures come with the name of their sequence.
 #[must_use]
 pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
     let mut html = String::from("<h1>The paper's tables</h1>\n");
@@ -16,8 +16,8 @@ pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
         // Writing to a string does not fail.
         let _ = writeln!(html, "<h2>{}{simulated}</h2>", escaped(&table.title));
         let ours = if table.simulated { "here, simulated" } else { "here" };
-        block(&mut html, ours, &table.columns, &table.rows, table.decimals);
-        block(&mut html, "in the paper", &table.paper_columns, &table.paper_rows, table.decimals);
+        html += &block(ours, &table.columns, &table.rows, table.decimals);
+        html += &block("in the paper", &table.paper_columns, &table.paper_rows, table.decimals);
         for note in &table.notes {
             let _ = writeln!(html, "<p class=\"note\">{}</p>", escaped(note));
         }
@@ -34,21 +34,9 @@ pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
     document("gyronet: the paper's tables", &html)
 }
 
-fn block(html: &mut String, caption: &str, columns: &[String], rows: &[Row], decimals: usize) {
-    let _ = write!(html, "<div class=\"scroll\"><table><caption>{caption}</caption><tr><th></th>");
-    for column in columns {
-        let _ = write!(html, "<th>{}</th>", escaped(column));
-    }
-    *html += "</tr>\n";
-    for Row { name, figures } in rows {
-        let _ = write!(html, "<tr><td>{}</td>", escaped(name));
-        for figure in figures {
-            let _ = match figure {
-                Some(figure) => write!(html, "<td>{figure:.decimals$}</td>"),
-                None => write!(html, "<td>-</td>"),
-            };
-        }
-        *html += "</tr>\n";
-    }
-    *html += "</table></div>\n";
+fn block(caption: &str, columns: &[String], rows: &[Row], decimals: usize) -> String {
+    let header: Vec<&str> = [""].into_iter().chain(columns.iter().map(String::as_str)).collect();
+    let figure = |figure: &Option<f64>| figure.map_or("-".into(), |figure| format!("{figure:.decimals$}"));
+    let cells = |row: &Row| [row.name.clone()].into_iter().chain(row.figures.iter().map(figure)).collect();
+    page::table("figures", caption, &header, rows.iter().map(cells).collect::<Vec<Vec<String>>>())
 }

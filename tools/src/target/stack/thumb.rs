@@ -162,7 +162,7 @@ fn expand(first: u16, second: u16) -> u32 {
 mod tests {
     use super::*;
 
-    /// As llvm-objdump 14 prints them.
+    /// The instructions are those that llvm-objdump 14 prints.
     #[test]
     fn disassembled() {
         let wide = |first, second| effect(first, Some(second), 0x0801_0000);
