@@ -15,15 +15,16 @@ mod own_board;
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use crate::own_board::Board;
+    use crate::own_board::poll;
     use core::convert::Infallible;
     use cortex_m_semihosting::{debug, hprintln};
     use embedded_can::nb::Can;
     use embedded_io::{ErrorType, Read, ReadReady};
     use gyronet::can::DataFrame;
     use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
-    use gyronet::sensor::xsens::MtData2;
-    use gyronet::units::Micros;
+    use gyronet::sensor::serial::Serial;
+    use gyronet::sensor::xsens::{MtData2, Mti};
+    use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, TransmitQueue, weights};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
     use stm32f4::stm32f405 as _;
@@ -33,26 +34,32 @@ mod firmware {
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        // It has about 10 KiB: kept where it is made, and not moved from stack to stack.
-        let mut board = Board::new(Port::default(), Bus::default());
-        let passed = board.as_mut().is_ok_and(|board| {
-            for sample in 0..SAMPLES {
-                // The clock of your board.
-                board.poll(Micros(u64::from(sample) * 10_000));
-            }
-            let Bus { frames, last } = board.can;
-            let good = last.filter(|tx1| tx1.yaw_rate_status == SignalStatus::OK);
-            if let Some(tx1) = good {
-                let milli_deg = (1e3 * tx1.yaw_rate_deg_per_sec()) as i32;
-                hprintln!("{} frames; corrected yaw rate {}e-3 deg/s", frames, milli_deg);
-            }
-            let errors = board.coprocessor.input_counters().imu_errors + board.waiting.dropped();
-            frames == 6 * SAMPLES && good.is_some() && errors == 0
-        });
+        let passed = Blob::new_checked(&weights::DEFAULT.0).is_ok_and(run);
         debug::exit(if passed { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
         loop {
             cortex_m::asm::wfi();
         }
+    }
+
+    /// Corrects a parked car's samples. Returns whether every frame went out.
+    fn run(weights: Blob<'static>) -> bool {
+        let mut coprocessor = Coprocessor::new(Config::DEFAULT);
+        let mut network = GyroNet::new(weights);
+        let mut imu = Serial::new(Port::default(), Mti::new());
+        let (mut queue, mut can) = (TransmitQueue::new(), Bus::default());
+        for sample in 0..SAMPLES {
+            // The clock of your board.
+            let now = Micros(u64::from(sample) * 10_000);
+            poll(&mut coprocessor, &mut network, &mut imu, &mut queue, &mut can, now);
+        }
+        let Bus { frames, last } = can;
+        let good = last.filter(|tx1| tx1.yaw_rate_status == SignalStatus::OK);
+        if let Some(tx1) = good {
+            let milli_deg = (1e3 * tx1.yaw_rate_deg_per_sec()) as i32;
+            hprintln!("{} frames; corrected yaw rate {}e-3 deg/s", frames, milli_deg);
+        }
+        let errors = coprocessor.input_counters().imu_errors + queue.dropped();
+        frames == 6 * SAMPLES && good.is_some() && errors == 0
     }
 
     /// A serial port with an MTi at its end: at each poll a message has come.

@@ -5,7 +5,7 @@
 //! so that a clock which is slow or fast by some percent never runs out of step. A sample that
 //! is a duplicate, older than the last one or off the grid is an error and leaves the grid as
 //! it was. A jump of more than a second either way (a part that restarted, a cable that came
-//! back) is an error too, and the grid is laid anew from there: no wait without a bound.
+//! back) is an error too, and the grid begins again from there: no wait without a bound.
 //!
 //! That is for one stream that comes at 100 Hz by itself, by the part's own clock. Streams of
 //! other rates, and two or more parts with a clock each, go through [`streams`] first: it takes
@@ -22,12 +22,12 @@ pub mod streams;
 use crate::sample::{Frame, ImuSample, PERIOD_US};
 use crate::units::Micros;
 
-/// How far from its grid step a sample may be, microseconds.
+/// The largest distance of a sample from its grid step, microseconds.
 pub const TOLERANCE_US: u64 = 2_000;
 /// The longest run of missing steps that keeps the grid: one second.
 pub const MAX_GAP: u32 = 100;
 
-/// Why a sample found no place on the grid.
+/// The reason why a sample has no place on the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -46,7 +46,7 @@ pub enum AlignError {
         /// This one.
         at: Micros,
     },
-    /// Not within [`TOLERANCE_US`] of any grid step.
+    /// The time stamp is further than [`TOLERANCE_US`] from every grid step.
     #[error("time stamp {} us, {} us after the last one, fits no 100 Hz step", .at.0, .at.0 - .last.0)]
     OffGrid {
         /// The last time stamp.
@@ -64,7 +64,7 @@ pub enum AlignError {
     },
 }
 
-/// The last sample that has a place on the grid, or that the grid was laid anew from.
+/// The last sample that has a place on the grid, or from which the grid began again.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     tick: u32,
@@ -79,12 +79,12 @@ pub struct Aligner {
 }
 
 impl Aligner {
-    /// Places one sample.
+    /// Places a sample on the grid.
     ///
     /// # Errors
     /// [`AlignError`]; the sample is not used. After [`AlignError::Jump`] the grid continues
     /// from that sample's time stamp, at the following tick.
-    pub fn process(&mut self, sample: ImuSample) -> Result<Frame, AlignError> {
+    pub fn align(&mut self, sample: ImuSample) -> Result<Frame, AlignError> {
         let at = sample.time;
         let Some(placed) = &mut self.last else {
             self.last = Some(Placed { tick: 0, sample });

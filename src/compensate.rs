@@ -28,17 +28,17 @@ mod mode;
 pub use mode::{DELAY, Hop, Lag, Mode, OutOfRange};
 
 use crate::model::Corrections;
+use crate::model::window::WINDOW;
 use crate::sample::Validity;
 use crate::units::AngularRate;
-use crate::window::WINDOW;
 
-/// How estimates of the gyro's error become rates that go out.
+/// The way from estimates of the gyro's error to corrected rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CompensateConfig {
-    /// Which estimates.
+    /// The estimates that are used.
     pub mode: Mode,
-    /// How late the navigation rate goes out.
+    /// The delay of the navigation rate.
     pub lag: Lag,
     /// A window whose mean correction is larger is not believed (rad/s code). Vibration makes
     /// single corrections large; their mean is bias-like and small.
@@ -93,11 +93,11 @@ pub struct Compensated {
     pub tick: u32,
     /// The corrected rate.
     pub rate: AngularRate,
-    /// What was taken off the gyro less its static bias.
+    /// The correction that was subtracted from the gyro less its static bias.
     pub correction: AngularRate,
     /// A window has covered this very sample.
     pub covered: bool,
-    /// Whether the sample's reading could be used.
+    /// The validity of the sample's reading.
     pub validity: Validity,
 }
 
@@ -109,14 +109,14 @@ pub struct Settled {
     pub tick: u32,
     /// Gyro less static bias.
     pub rate: AngularRate,
-    /// What the network's estimates take off it.
+    /// The correction by the network's estimates.
     pub correction: AngularRate,
-    /// Whether it is good: a window has covered it, and the part was not saturated.
+    /// The sample is good: a window has covered it, and the part was not saturated.
     pub good: bool,
 }
 
 impl Settled {
-    /// The rate that is left when the correction is taken off; `None` where it is not good.
+    /// Returns the rate less the correction; `None` where it is not good.
     #[must_use]
     pub fn left(&self) -> Option<AngularRate> {
         self.good.then_some(AngularRate(self.rate.0.saturating_sub(self.correction.0)))
@@ -144,13 +144,13 @@ pub struct Compensator {
     /// Revisions not yet in the prompt rate, and in the navigation rate.
     prompt_carry: i64,
     navigation_carry: i64,
-    /// What standing took off the navigation rate beyond the estimates: in the second before
-    /// the last [`Compensator::confirm_standstill`], and since.
+    /// The part of the navigation rate that standstill set to zero, beyond the estimates: in the second before the
+    /// last [`Compensator::confirm_standstill`], and since.
     held: [i64; 2],
 }
 
 impl Compensator {
-    /// No estimate yet.
+    /// Begins without an estimate.
     #[must_use]
     pub fn new(config: CompensateConfig) -> Self {
         Self { config, kept: [None; KEPT], prior: 0, prompt_carry: 0, navigation_carry: 0, held: [0; 2] }
@@ -192,14 +192,14 @@ impl Compensator {
     }
 
     /// Takes in a sample: its gyro rate less static bias.
-    pub fn push(&mut self, tick: u32, rate: AngularRate, validity: Validity) {
+    pub fn add(&mut self, tick: u32, rate: AngularRate, validity: Validity) {
         self.kept.rotate_left(1);
         let estimate = self.prior;
         self.kept[KEPT - 1] =
             Some(Entry { tick, rate: rate.0, validity, held: false, sum: 0, count: 0, estimate });
     }
 
-    /// The rate of the newest sample, less a bias that is taken off beside the estimate.
+    /// Returns the rate of the newest sample, less a bias that is subtracted beside the estimate.
     ///
     /// What is owed is not paid in a rate that a receiver drops: a clipped one.
     pub fn prompt(&mut self, bias: AngularRate) -> Option<Compensated> {
@@ -208,8 +208,8 @@ impl Compensator {
         Some(emit(&entry, taken, &mut self.prompt_carry, self.config.max_carry))
     }
 
-    /// The rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before
-    /// there is one. Call it once for each sample.
+    /// Returns the rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before there is one.
+    /// Call it once for each sample.
     ///
     /// `stands`: the vehicle has stood since before that sample was taken, so its rate is zero.
     pub fn navigation(&mut self, bias: AngularRate, stands: bool) -> Option<Compensated> {
@@ -223,7 +223,7 @@ impl Compensator {
         Some(emit(entry, taken, &mut self.navigation_carry, self.config.max_carry))
     }
 
-    /// The newest sample that no window will change any more; each sample is it once.
+    /// Returns the newest sample that no window changes any more; each sample is returned once.
     #[must_use]
     pub fn settled(&self) -> Option<Settled> {
         let entry = self.kept.iter().nth_back(self.config.mode.settled_after())?.as_ref()?;
@@ -235,7 +235,7 @@ impl Compensator {
         })
     }
 
-    /// No estimate came: the last one is not held on to.
+    /// Drops the prior, because no estimate came.
     pub fn forget(&mut self) {
         self.prior = 0;
     }
@@ -252,23 +252,22 @@ impl Compensator {
         self.navigation_carry -= before + since;
     }
 
-    /// Whether the navigation rates have more to carry than a window revises, because the wheels stood while
-    /// the vehicle turned. The rates are off until it is carried.
+    /// Returns whether the navigation rates have more to carry than a window revises, because the wheels stood
+    /// while the vehicle turned. The rates are off until it is carried.
     #[must_use]
     pub fn carry_exceeds_limit(&self) -> bool {
         let much = LONG * u64::from(self.config.max_carry.0.unsigned_abs());
         self.navigation_carry.unsigned_abs() > much
     }
 
-    /// What the sum of the prompt rates has yet to get, codes x samples: revisions that are not
-    /// carried yet.
+    /// Returns what the sum of the prompt rates still lacks, codes x samples: revisions that are not carried yet.
     #[must_use]
     pub fn prompt_owed(&self) -> i64 {
         -self.prompt_carry
     }
 
-    /// What the sum of the navigation rates has yet to get: such revisions, and the samples that
-    /// wait for their turn.
+    /// Returns what the sum of the navigation rates still lacks: such revisions, and the samples that wait for
+    /// their turn.
     #[must_use]
     pub fn navigation_owed(&self, bias: AngularRate) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
@@ -295,7 +294,7 @@ fn emit(entry: &Entry, taken: i64, carry: &mut i64, max_carry: AngularRate) -> C
     }
 }
 
-/// Mean of some corrections, towards zero.
+/// Returns the mean of some corrections, rounded towards zero.
 fn mean(corrections: &[AngularRate]) -> i32 {
     let sum: i64 = corrections.iter().map(|c| i64::from(c.0)).sum();
     (sum / corrections.len().max(1) as i64) as i32

@@ -33,7 +33,7 @@ use crate::compensate::Settled;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::fog::seconds::SecondsWindow;
 use crate::fog::{FogCounters, FogPipeline};
-use crate::health::{BoardFaults, InputCounters, WatchCounters, count};
+use crate::health::{BoardFaults, InputCounters, MonitorCounters, count};
 use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
 use crate::monitor::{SensorMonitor, TIMEOUT_US};
@@ -63,7 +63,7 @@ pub struct Observation {
     pub sample: Option<ImuSample>,
     /// Everything that is sent for it.
     pub vehicle: VehicleSample,
-    /// Whether the vehicle stands by its wheels.
+    /// The vehicle's standstill by its wheels.
     pub wheels: Standstill,
     /// The sample whose estimate is final with this one.
     pub settled: Option<Settled>,
@@ -152,7 +152,7 @@ impl Coprocessor {
         }
         let sample = ImuSample { validity: self.monitor.judge(&sample), ..sample };
         self.report_board();
-        let output = self.pipeline.process(sample).map_err(InputError::Imu)?;
+        let output = self.pipeline.correct(sample).map_err(InputError::Imu)?;
         self.monitor.heard(sample.time, now);
         self.heard = now;
         self.send(&output.vehicle, sample.time);
@@ -177,7 +177,7 @@ impl Coprocessor {
     /// not used.
     pub fn fog(&mut self, sample: FogSample, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
-        self.fog.push(self.time(), sample).map_err(InputError::Fog)
+        self.fog.add(self.time(), sample).map_err(InputError::Fog)
     }
 
     /// Counts bytes of the fibre-optic gyro that were no sample.
@@ -193,7 +193,7 @@ impl Coprocessor {
     pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         let time = self.time();
-        match self.wheels.as_mut().and_then(|wheels| wheels.process(frame, time)) {
+        match self.wheels.as_mut().and_then(|wheels| wheels.decode(frame, time)) {
             Some(Err(error)) => {
                 count(&mut self.counters.wheel_errors, 1);
                 Err(InputError::Wheels(error))
@@ -216,8 +216,8 @@ impl Coprocessor {
         Ok(Some(Observation { sample: None, vehicle, wheels, settled: None, refused: None }))
     }
 
-    /// Whether the next sample of the inertial sensor can be taken at `now`. Where it cannot, it belongs to the turn of
-    /// an estimate that is still under way: leave it where it waits. It is late, and the sensor is not silent.
+    /// Returns whether the next sample of the inertial sensor can be taken at `now`. Where it cannot, it needs an
+    /// estimate that is still under way: leave it where it waits. It is then late, and the sensor is not silent.
     pub fn is_ready(&mut self, now: Micros) -> bool {
         let now = self.timeline.at(now);
         let waits = self.handover.must_wait(self.pipeline.tick(), now);
@@ -276,25 +276,25 @@ impl Coprocessor {
         self.bus = Bus { lost, is_off, ..self.bus };
     }
 
-    /// The pipeline, to read its state.
+    /// Returns the pipeline, to read its state.
     #[must_use]
     pub fn pipeline(&self) -> &Pipeline {
         &self.pipeline
     }
 
-    /// The rate of the fibre-optic gyro that the newest frames of [`Coprocessor::next_frame`] belong to.
+    /// Returns the rate of the fibre-optic gyro that the newest frames of [`Coprocessor::next_frame`] belong to.
     #[must_use]
     pub fn fog_estimate(&self) -> Option<&YawEstimate> {
         self.fog_estimate.as_ref()
     }
 
-    /// The numbers of faults that the sensor monitor has found.
+    /// Returns the numbers of faults that the sensor monitor has found.
     #[must_use]
-    pub fn monitor_counters(&self) -> &WatchCounters {
+    pub fn monitor_counters(&self) -> &MonitorCounters {
         self.monitor.counters()
     }
 
-    /// The numbers of events of the fibre-optic gyro.
+    /// Returns the numbers of events of the fibre-optic gyro.
     #[must_use]
     pub fn fog_counters(&self) -> &FogCounters {
         self.fog.counters()
@@ -311,7 +311,7 @@ impl Coprocessor {
         }
     }
 
-    /// The numbers of inputs that were refused or replaced.
+    /// Returns the numbers of inputs that were refused or replaced.
     #[must_use]
     pub fn input_counters(&self) -> &InputCounters {
         &self.counters
@@ -324,7 +324,7 @@ impl Coprocessor {
         })
     }
 
-    /// The time that wheels and the fibre-optic gyro are judged by.
+    /// Returns the time that wheels and the fibre-optic gyro are judged by.
     fn time(&self) -> Micros {
         match self.clock {
             Clock::Outside => self.timeline.now(),

@@ -33,10 +33,10 @@ use seconds::{FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, 
 /// Frames that a window's correction is spread over.
 const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;
 
-/// How FoGNet is used.
+/// The limits within which FoGNet is used.
 #[derive(Debug, Clone, Copy)]
 pub struct FogConfig {
-    /// What stands in a window before a minute is over.
+    /// The filling of a window before a minute is over.
     pub padding: Padding,
     /// A larger correction of a window is not believed.
     pub max_correction: Angle,
@@ -56,15 +56,15 @@ pub struct ImplausibleTurn {
     pub correction: Angle,
 }
 
-/// What one frame of 10 ms led to.
+/// The results of one frame of 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogOutput {
     /// The frame's turn less the correction; `None` where the gyro has a gap.
     pub turn: Option<Angle>,
-    /// What was taken off.
+    /// The correction that was subtracted.
     pub correction: Angle,
-    /// Whether an estimate was in use for this frame.
+    /// An estimate was in use for this frame.
     pub corrected: bool,
     /// A window is due: run [`FogCorrector::window`] through the network and
     /// [`FogCorrector::deliver`] the estimate under this number within a second.
@@ -88,13 +88,13 @@ pub struct FogCorrector {
     /// The window that is out, and its estimate when delivered.
     out: Option<(u32, Option<FogEstimate>)>,
     estimate: Option<FogEstimate>,
-    /// What the divisions have left: of the linear part, of the spread part.
+    /// The remainders of the divisions: of the linear part, of the spread part.
     linear_rest: i128,
     spread_rest: i64,
 }
 
 impl FogCorrector {
-    /// Before the first frame.
+    /// Begins before the first frame.
     #[must_use]
     pub const fn new(config: FogConfig) -> Self {
         Self {
@@ -122,10 +122,10 @@ impl FogCorrector {
             implausible: None,
             late: false,
         };
-        match self.sums.push(frame) {
+        match self.sums.add(frame) {
             Ok(None) => {}
             Ok(Some(second)) => {
-                self.minute.push(second);
+                self.minute.add(second);
                 (output.implausible, output.late) = self.use_estimate();
                 if self.window().is_some() {
                     output.due = Some(self.next);
@@ -141,7 +141,7 @@ impl FogCorrector {
         output
     }
 
-    /// The window that is due, until the next second is over.
+    /// Returns the window that is due, until the next second is over.
     #[must_use]
     pub fn window(&self) -> Option<SecondsWindow<'_>> {
         self.minute.window(self.config.padding)
@@ -159,7 +159,7 @@ impl FogCorrector {
         }
     }
 
-    /// A window must not reach across a gap, and an estimate is not used across one.
+    /// Drops the window and its estimate: neither may reach across a gap.
     pub fn break_window(&mut self) {
         self.sums = SecondSums::ZERO;
         self.minute.clear();
@@ -167,7 +167,7 @@ impl FogCorrector {
         self.estimate = None;
     }
 
-    /// What to take off one frame's increment.
+    /// Returns the correction of one frame's increment.
     fn correction_of(&mut self, turn: Angle) -> Angle {
         let Some(FogEstimate { correction, linear, gain, .. }) = self.estimate else { return Angle::ZERO };
         let linear_part = self.linear_rest + i128::from(turn.0) * i128::from(gain);

@@ -26,7 +26,7 @@ pub mod supervisor;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {
-    /// No bias yet: the rate is shown but not good.
+    /// The bias is not known yet: the rate is shown but not good.
     #[default]
     Init,
     /// Corrected by the network.
@@ -54,7 +54,7 @@ impl core::fmt::Display for Status {
     }
 }
 
-/// Where a rate comes from.
+/// The origin of a rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -70,29 +70,29 @@ pub enum Source {
     FogNet = 3,
 }
 
-/// What a rate is worth.
+/// The quality of a rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Quality {
-    /// As good as it gets.
+    /// The rate is as good as it gets.
     Good = 0,
     /// Usable, but less is behind it than there could be.
     Degraded = 1,
     /// Shown, not to be used yet.
     #[default]
     Initialising = 2,
-    /// Not to be used; the rate is not available.
+    /// The rate is not available.
     Unusable = 3,
 }
 
-/// What is wrong at present, one bit each.
+/// The present faults, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Faults(pub u8);
 
 impl Faults {
-    /// Nothing.
+    /// No fault is present.
     pub const NONE: Self = Self(0);
     /// Samples are missing.
     pub const GAP: Self = Self(1);
@@ -105,7 +105,7 @@ impl Faults {
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
-    /// What is stored is damaged: weights, configuration or calibration; the service line says what.
+    /// Stored data are damaged: weights, configuration or calibration; the service line reports which.
     pub const STORED: Self = Self(1 << 5);
     /// The wheels are silent, or say that the vehicle stands while the gyro says that it turns.
     pub const WHEELS: Self = Self(1 << 6);
@@ -129,20 +129,20 @@ impl Faults {
         if present { self } else { Self::NONE }
     }
 
-    /// Whether all of `other` is in this one.
+    /// Returns whether all faults of `other` are among these.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// Both together.
+    /// Returns the faults of both.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 }
 
-/// What the board reports beside the sensor.
+/// The faults that the board reports beside the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardFaults {
@@ -158,7 +158,7 @@ pub struct BoardFaults {
 }
 
 impl BoardFaults {
-    /// The bits that are sent.
+    /// Returns the bits that are sent.
     #[must_use]
     pub const fn faults(self) -> Faults {
         Faults::BUS
@@ -185,7 +185,7 @@ pub const fn judge(status: Status) -> (Source, Quality) {
     }
 }
 
-/// How often each kind of event happened since start. They saturate, they do not wrap.
+/// The numbers of events since the start. They saturate, they do not wrap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -216,11 +216,11 @@ pub struct Counters {
     pub contradicted: u32,
 }
 
-/// How often the sensor was found at fault ([`crate::monitor`]).
+/// The numbers of faults of the sensor ([`crate::monitor`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct WatchCounters {
+pub struct MonitorCounters {
     /// Times that it fell silent.
     pub silences: u32,
     /// Times that its readings stood still.

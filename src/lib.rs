@@ -5,21 +5,32 @@
 //! are bytes in flash that are checked once, state is a value that the caller owns. What runs here
 //! gives the same bits on a Cortex-M and on a desk; the README of the repository has the numbers.
 //!
-//! | stage | module | what it does |
-//! |---|---|---|
-//! | the product | [`coprocessor`] | [`Coprocessor`]: samples, CAN frames and time in; frames, windows, observations out |
-//! | bytes to samples | [`sensor`] | Xsens MTi, KVH DSP-1760 and DSP-3000, ICM-42688, ADIS16465 |
-//! | samples | [`sample`], [`units`] | fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds; the validity of each |
-//! | the sensor watched | [`monitor`] | silence, saturation, stuck and implausible readings |
-//! | one clock | [`align`] | the 100 Hz grid; gaps, duplicates, jumps |
-//! | the sensor in the car | [`mounting`], [`bias`] | rotation, levelling, static bias, zero-rate updates |
-//! | networks | [`window`], [`nn`], [`model`] | ten samples in, the gyro's error out |
-//! | rates | [`compensate`], [`uncertainty`], [`estimate`] | overlap, lag, carry; the expected error |
-//! | the order of these | [`pipeline`] | a sample in, [`estimate::VehicleSample`] out |
-//! | a fibre-optic gyro | [`fog`] | FoGNet: a minute in, a corrected turn out |
-//! | the bus | [`can`], [`wheels`] | Bosch MM5.10, own messages, J1939, E2E, SLCAN; wheel speeds in |
-//! | the way driven | [`odometry`] | dead reckoning with wheel speeds |
-//! | around it | [`health`], [`store`], [`service`] | states and counters, flash records, the service line |
+//! | part | what it does |
+//! |---|---|
+//! | [`Coprocessor`] | takes samples, CAN frames and time; returns frames, windows and observations ([`coprocessor`]) |
+//! | [`Config`] | configures it ([`config`]) |
+//! | [`sensor`] | makes samples of bytes: Xsens MTi, KVH DSP-1760 and DSP-3000, ICM-42688, ADIS16465 |
+//! | [`sample`], [`units`] | hold samples in fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds |
+//! | [`model`] | runs the networks: ten samples in, the gyro's error out |
+//! | [`can`] | encodes Bosch MM5.10, our own messages, J1939, E2E, SLCAN; decodes wheel speeds |
+//! | [`estimate`], [`health`] | describe a corrected rate, its state and the counters |
+//! | [`odometry`] | reckons the vehicle's way from wheel speeds and rate |
+//! | [`store`], [`service`] | keep configuration and weights in flash; answer on the service line |
+//!
+//! # Ten words
+//!
+//! | word | meaning |
+//! |---|---|
+//! | tick | number of a 10 ms step on the grid that all sensors share |
+//! | window | ten samples in a row (GyroNet), or sixty seconds (FoGNet), that a network sees at once |
+//! | hop | samples between two windows; with five, two windows cover each sample |
+//! | prompt | the rate of the newest sample, sent at once for a receiver that steers by it |
+//! | lag | samples by which the navigation rate is later than the prompt one |
+//! | navigation | the rate after its lag, for a receiver that sums it to a heading |
+//! | settled | said of a sample whose estimate no window changes any more |
+//! | carry | what later windows changed in rates already sent; it is spread over the rates that follow |
+//! | standstill | the vehicle stands, by its wheels or because its sensors are quiet |
+//! | zero-rate update | the correction of the gyro's bias by what it reads at a standstill |
 //!
 //! # On a board of your own
 //!
@@ -55,21 +66,26 @@
 //! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # use gyronet::sensor::xsens::MtData2;
+//! use gyronet::sensor::{serial::Serial, xsens::Mti};
+//! use gyronet::{Blob, Config, weights};
 //! # let messages = (0..400_u32).flat_map(|k| { let noise = 0.001 * (k % 2) as f32; MtData2 {
 //! #     packet_counter: Some(k as u16), sample_time_fine: Some(100 * k), temperature: None, status: Some(3),
 //! #     acceleration: Some([noise, noise, 9.81 + noise]), rate_of_turn: Some([noise, noise, 0.01 + noise]),
 //! # } .emit().to_vec() });
-//! let (uart, can) = (/* your port and your controller */
-//! #     Port(messages.collect()), Controller::default());
+//! # let (uart, mut can) = (Port(messages.collect()), Controller::default());
 //! # let frames = can.0.clone();
-//! let mut board = Board::new(uart, can)?;
-//! board.poll(Micros(0));
-//! # let errors = board.coprocessor.input_counters().imu_errors;
-//! # assert_eq!((frames.borrow().len(), errors), (6 * 400, 0));
+//! let mut coprocessor = Coprocessor::new(Config::DEFAULT);
+//! let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
+//! let mut imu = Serial::new(uart, Mti::new()); // an Xsens MTi on your serial port
+//! let mut queue = TransmitQueue::new(); // a CAN controller has fewer places than a sample has frames
+//! # for _ in 0..400 {
+//! poll(&mut coprocessor, &mut network, &mut imu, &mut queue, &mut can, Micros(0));
+//! # }
+//! # assert_eq!((frames.borrow().len(), coprocessor.input_counters().imu_errors), (6 * 400, 0));
 //! # let last = gyronet::can::bosch::Tx1::parse(frames.borrow()[6 * 399].data())?;
 //! # assert_eq!(last.yaw_rate_status, gyronet::can::bosch::SignalStatus::OK);
 //! # assert!(last.yaw_rate_deg_per_sec().abs() < 0.05, "the bias is off: {}", last.yaw_rate_deg_per_sec());
-//! # board.poll(Micros(1_000_000));
+//! # poll(&mut coprocessor, &mut network, &mut imu, &mut queue, &mut can, Micros(1_000_000));
 //! # assert_eq!(frames.borrow().len(), 6 * 401, "silence is reported");
 //! # Ok(())
 //! # }
@@ -98,32 +114,46 @@
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
-pub mod align;
-pub mod bias;
 pub mod can;
-pub mod compensate;
+pub mod config;
 pub mod coprocessor;
 pub mod estimate;
-pub mod fog;
 pub mod health;
 pub mod model;
-pub mod monitor;
-pub mod mounting;
-pub mod nn;
 pub mod odometry;
-pub mod pipeline;
 pub mod sample;
 pub mod sensor;
 #[cfg(feature = "service")]
 pub mod service;
 #[cfg(feature = "store")]
 pub mod store;
-pub mod uncertainty;
 pub mod units;
-pub mod wheels;
-pub mod window;
 
-pub use coprocessor::{Config, Coprocessor};
+// The stages behind `Coprocessor`. They are public for the repository's tools and tests, which look at each
+// alone; no promise is made for them.
+#[doc(hidden)]
+pub mod align;
+#[doc(hidden)]
+pub mod bias;
+#[doc(hidden)]
+pub mod compensate;
+#[doc(hidden)]
+pub mod fog;
+#[doc(hidden)]
+pub mod monitor;
+#[doc(hidden)]
+pub mod mounting;
+#[doc(hidden)]
+pub mod nn;
+#[doc(hidden)]
+pub mod pipeline;
+
+pub use can::{DataFrame, queue::TransmitQueue};
+pub use coprocessor::{Clock, Config, Coprocessor, InputError, Observation, TimedFrame};
+pub use estimate::{VehicleSample, YawEstimate};
+pub use model::{Blob, FogNet, GyroNet, WindowNetwork, weights};
+pub use sample::{FogSample, ImuSample};
+pub use units::{AngularRate, Micros};
 
 /// The README's examples run as tests, too.
 #[cfg(doctest)]

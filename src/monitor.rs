@@ -22,7 +22,7 @@ pub use jump::{JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE};
 pub use stuck::{AXIS_STUCK_AFTER, STUCK_AFTER};
 
 use crate::align::clock_ratio::{ClockRatio, ClockRatioConfig, RatioEstimator};
-use crate::health::{WatchCounters, count};
+use crate::health::{MonitorCounters, count};
 use crate::sample::{ImuSample, PERIOD_US, Validity};
 use crate::units::Micros;
 
@@ -44,11 +44,11 @@ pub struct SensorMonitor {
     recovering: u8,
     /// The time of the newest sample by the outside clock.
     heard: Option<Micros>,
-    /// When the next message set without a sample is due.
+    /// The time at which the next message set without a sample is due.
     due: Option<u64>,
     /// The sensor's clock against the outside one, where that is the better one.
     clock: Option<RatioEstimator>,
-    counters: WatchCounters,
+    counters: MonitorCounters,
 }
 
 impl SensorMonitor {
@@ -63,13 +63,13 @@ impl SensorMonitor {
             heard: None,
             due: None,
             clock: clock.map(RatioEstimator::new),
-            counters: WatchCounters::default(),
+            counters: MonitorCounters::default(),
         }
     }
 
-    /// The numbers of faults found.
+    /// Returns the numbers of faults found.
     #[must_use]
-    pub fn counters(&self) -> &WatchCounters {
+    pub fn counters(&self) -> &MonitorCounters {
         &self.counters
     }
 
@@ -105,13 +105,13 @@ impl SensorMonitor {
         }
     }
 
-    /// The length of the steps of the sensor's clock, by the samples heard so far.
+    /// Returns the length of the steps of the sensor's clock, by the samples heard so far.
     #[must_use]
     pub fn clock_ratio(&self) -> ClockRatio {
         self.clock.as_ref().map_or(ClockRatio::ONE, RatioEstimator::ratio)
     }
 
-    /// Whether the sensor's clock is at fault, by the samples heard so far.
+    /// Returns whether the sensor's clock is at fault, by the samples heard so far.
     #[must_use]
     pub fn is_clock_off(&self) -> bool {
         self.clock.as_ref().is_some_and(RatioEstimator::fault)

@@ -14,12 +14,12 @@ use crate::units::{AngularRate, STANDARD_GRAVITY, SpecificForce};
 /// Fraction bits of a matrix element.
 const Q: u32 = 30;
 const ONE: f32 = (1u32 << Q) as f32;
-/// How far from standard gravity a mean specific force may be to be gravity, m/s^2.
+/// The largest distance of a mean specific force from standard gravity, m/s^2.
 const GRAVITY_TOLERANCE: f32 = 1.0;
 /// Cosine of 150 degrees: beyond, which way to turn the board up is anyone's guess.
 const UPSIDE_DOWN: f32 = -0.866;
 
-/// When to take the accelerometer's tilt for the board's.
+/// The condition under which the accelerometer's tilt counts as the board's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Levelling {
@@ -27,7 +27,7 @@ pub enum Levelling {
     Off,
     /// Always: the vehicle starts on level ground.
     Always,
-    /// When it is larger than this, degrees.
+    /// The tilt counts when it is larger than this, degrees.
     Beyond(f32),
 }
 
@@ -35,7 +35,7 @@ impl Levelling {
     /// No street is as steep as 15 degrees (27 %).
     pub const DEFAULT: Self = Self::Beyond(15.0);
 
-    /// What to turn the sensor by that shows this mean specific force at rest.
+    /// Returns the rotation that levels a sensor with this mean specific force at rest.
     ///
     /// # Errors
     /// [`LevelError`], where the accelerometer is asked.
@@ -50,7 +50,7 @@ impl Levelling {
     }
 }
 
-/// Why the accelerometer shows no vertical.
+/// The reason why the accelerometer shows no vertical.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -69,12 +69,11 @@ pub enum LevelError {
 pub struct Rotation([[i32; 3]; 3]);
 
 impl Rotation {
-    /// None: every bit stays as it is.
+    /// The rotation that leaves every bit as it is.
     pub const IDENTITY: Self = Self([[1 << Q, 0, 0], [0, 1 << Q, 0], [0, 0, 1 << Q]]);
 
-    /// How a board sits in the vehicle: turned from the vehicle's axes by `yaw` about z, then by
-    /// `pitch` about its own y, then by `roll` about its own x, degrees. `None` when one is not
-    /// finite.
+    /// Makes the rotation of a board that is turned from the vehicle's axes by `yaw` about z, then by `pitch` about
+    /// its own y, then by `roll` about its own x, degrees. `None` when one is not finite.
     #[must_use]
     pub fn from_mounting(roll: f32, pitch: f32, yaw: f32) -> Option<Self> {
         if ![roll, pitch, yaw].iter().all(|angle| angle.is_finite()) {
@@ -89,8 +88,7 @@ impl Rotation {
         ]))
     }
 
-    /// The smallest rotation that turns a mean specific force at rest upright, and its angle in
-    /// degrees.
+    /// Returns the smallest rotation that turns a mean specific force at rest upright, and its angle in degrees.
     ///
     /// # Errors
     /// [`LevelError`].
@@ -115,7 +113,7 @@ impl Rotation {
         Ok((rotation, tilt))
     }
 
-    /// First `self`, then `next`.
+    /// Returns the rotation that turns first by `self`, then by `next`.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         let Self(first) = self;
@@ -124,19 +122,19 @@ impl Rotation {
         Self(core::array::from_fn(|row| core::array::from_fn(|column| columns[column][row])))
     }
 
-    /// An angular rate in the vehicle's axes.
+    /// Returns an angular rate in the vehicle's axes.
     #[must_use]
     pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {
         self.turn(rate.map(|axis| axis.0)).map(AngularRate)
     }
 
-    /// A specific force in the vehicle's axes.
+    /// Returns a specific force in the vehicle's axes.
     #[must_use]
     pub fn force(&self, force: [SpecificForce; 3]) -> [SpecificForce; 3] {
         self.turn(force.map(|axis| axis.0)).map(SpecificForce)
     }
 
-    /// A sample in the vehicle's axes: x forward, y left, z up.
+    /// Returns a sample in the vehicle's axes: x forward, y left, z up.
     #[must_use]
     pub fn sample(&self, sample: &ImuSample) -> ImuSample {
         ImuSample {
@@ -151,7 +149,7 @@ impl Rotation {
         Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)))
     }
 
-    /// Rounded to nearest and saturated.
+    /// Turns a vector, rounded to nearest and saturated.
     fn turn(&self, vector: [i32; 3]) -> [i32; 3] {
         let Self(rows) = self;
         rows.map(|row| {

@@ -24,7 +24,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// One step: way of the left and the right wheel, m, and what the vehicle has turned, rad.
+    /// Takes one step: the way of the left and the right wheel, m, and the turn of the vehicle, rad.
     pub fn step(&mut self, wheels: [f64; 2], turned: f64) {
         let [left, right] = wheels;
         let middle = self.yaw + turned / 2.0;
@@ -49,15 +49,15 @@ pub struct Odometry {
 const TURN: i64 = 110_534_964_875_444;
 
 impl Odometry {
-    /// Of the way, m: an f32 holds an angle within pi to 1.2e-7 rad and its sine to 6e-8, in each
-    /// of two axes; the heading adds 2e-7 in ten hours of 100 steps a second.
+    /// The error per metre of the way, m: an f32 holds an angle within pi to 1.2e-7 rad and its sine to 6e-8, in
+    /// each of two axes; the heading adds 2e-7 in ten hours of 100 steps a second.
     pub const ERROR_PER_METRE: f64 = 5e-7;
     /// Half a code of [`Length`], 1.2e-10 m: of the way, and in each axis.
     pub const ERROR_PER_STEP_M: f64 = 3e-10;
     /// Rounding of an angle: half a code of [`Angle`], and as much of half of it.
     pub const HEADING_ERROR_PER_STEP_RAD: f64 = 6e-14;
 
-    /// One step of `span` microseconds: speeds of the left and the right wheel, corrected yaw
+    /// Takes one step of `span` microseconds at these speeds of the left and the right wheel and this corrected yaw
     /// rate.
     pub fn step(&mut self, wheels: [WheelSpeed; 2], yaw_rate: AngularRate, span: u32) {
         let [left, right] = wheels.map(|speed| i128::from(speed.0));
@@ -70,7 +70,7 @@ impl Odometry {
         self.advance(Length(way), Angle(turned));
     }
 
-    /// One step: way of the vehicle, and what it has turned.
+    /// Takes one step: the way and the turn of the vehicle.
     pub fn advance(&mut self, way: Length, turned: Angle) {
         let middle = self.yaw.0.wrapping_add(turned.0 / 2);
         let wrapped = (middle.wrapping_add(TURN / 2)).rem_euclid(TURN) - TURN / 2;
@@ -82,14 +82,14 @@ impl Odometry {
     }
 }
 
-/// To the nearest code; what is longer than any step stays at the limit.
+/// Rounds to the nearest code; a value that is longer than any step stays at the limit.
 fn rounded(code_micros: i128) -> i64 {
     let half = 500_000 * code_micros.signum();
     let code = (code_micros + half) / 1_000_000;
     code.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64
 }
 
-/// A part of the way, as exact as the factor.
+/// Returns a part of the way, as exact as the factor.
 fn along(way: Length, part: f32) -> i64 {
     // Exact from 2^-6 on, and to 1e-9 below.
     const BITS: u32 = 30;

@@ -13,11 +13,13 @@ mod config;
 mod initialised;
 mod output;
 mod report;
+mod uncertainty;
 mod wheels;
 mod windows;
 
 pub use config::PipelineConfig;
 pub use output::{DueWindow, Output, Owed};
+pub use uncertainty::{Uncertainty, UncertaintyConfig};
 
 use crate::align::clock_ratio::ClockRatio;
 use crate::align::{AlignError, Aligner};
@@ -27,9 +29,9 @@ use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
 use crate::mounting::Rotation;
 use crate::sample::{Frame, ImuSample, Standstill, WheelSample};
-use crate::uncertainty::Uncertainty;
+
+use crate::model::window::{self, Features, WINDOW};
 use crate::units::{AngularRate, Yaw};
-use crate::window::{self, Features, WINDOW};
 use initialised::Initialised;
 use wheels::Wheels;
 use windows::Windows;
@@ -106,8 +108,8 @@ impl Pipeline {
     /// # Errors
     /// [`AlignError`] when its time stamp has no place on the grid; it is counted and not used. Unless it was
     /// a duplicate, the samples after it report [`Faults::GAP`] for as long as after a missing one.
-    pub fn process(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
-        let mut frame = self.state.aligner.process(sample).inspect_err(|error| self.refuse(*error))?;
+    pub fn correct(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
+        let mut frame = self.state.aligner.align(sample).inspect_err(|error| self.refuse(*error))?;
         frame.sample = self.config.mounting.sample(&sample);
         count(&mut self.state.counters.samples, 1);
         if frame.missing > 0 {
@@ -120,10 +122,10 @@ impl Pipeline {
         }
         let implausible = self.use_estimate(frame.tick);
         let initialised = self.state.initialised.as_mut();
-        let quiet = initialised.is_some_and(|known| known.quiet.process(&frame.sample));
+        let quiet = initialised.is_some_and(|known| known.quiet.observe(&frame.sample));
         let (rates, refused) = match self.level(&mut frame.sample) {
             None => (Rates::default(), self.initialise(&frame)),
-            Some(zero) => (self.correct(&frame, &zero, quiet), None),
+            Some(zero) => (self.estimate_rates(&frame, &zero, quiet), None),
         };
         let vehicle = self.report(&frame, &rates);
         let hop = self.config.compensate.mode.hop();
@@ -155,26 +157,26 @@ impl Pipeline {
         self.state.windows.deliver(end, estimate)
     }
 
-    /// The newest sample as the networks see it, for [`crate::fog`]; `None` before the bias is known
-    /// and while the reading cannot be used.
+    /// Returns the newest sample as the networks see it, for [`crate::fog`]; `None` before the bias is known and
+    /// while the reading cannot be used.
     #[must_use]
     pub fn inertial(&self) -> Option<Features> {
         self.state.inertial
     }
 
-    /// Grid step of the newest message set.
+    /// Returns the grid step of the newest message set.
     #[must_use]
     pub fn tick(&self) -> u32 {
         self.state.tick
     }
 
-    /// Event counters since the start.
+    /// Returns the event counters since the start.
     #[must_use]
     pub fn counters(&self) -> &Counters {
         &self.state.counters
     }
 
-    /// What the sums of the rates would lack if the drive were over now.
+    /// Returns what the sums of the rates would lack if the drive were over now.
     #[must_use]
     pub fn owed(&self) -> Owed {
         Owed {
@@ -183,19 +185,19 @@ impl Pipeline {
         }
     }
 
-    /// The gyro's static bias, once known.
+    /// Returns the gyro's static bias, once known.
     #[must_use]
     pub fn gyro_bias(&self) -> Option<[AngularRate; 3]> {
         self.state.initialised.as_ref().map(|known| known.zero.bias())
     }
 
-    /// The bias that the zero-rate updates take off beside it.
+    /// Returns the bias that the zero-rate updates take off beside it.
     #[must_use]
     pub fn bias(&self) -> AngularRate {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
     }
 
-    /// The tilt that levelling took out, once known.
+    /// Returns the tilt that levelling took out, once known.
     #[must_use]
     pub fn levelling(&self) -> Option<Rotation> {
         self.state.initialised.as_ref().map(|known| known.levelling)
@@ -227,7 +229,7 @@ impl Pipeline {
         }
     }
 
-    /// A window must not reach across a gap; neither must static initialisation.
+    /// Drops the window under way and static initialisation, because neither may reach across a gap.
     fn break_window(&mut self) {
         self.state.windows.break_off();
         self.state.compensator.forget();
@@ -262,15 +264,15 @@ impl Pipeline {
     }
 
     #[inline(never)]
-    fn correct(&mut self, frame: &Frame, zero: &ZeroPoint, quiet: bool) -> Rates {
+    fn estimate_rates(&mut self, frame: &Frame, zero: &ZeroPoint, quiet: bool) -> Rates {
         let sample = &frame.sample;
         let features = window::features(sample, &zero.reading());
         let [.., rate] = features.map(AngularRate);
         let good = sample.validity.is_good();
-        self.state.compensator.push(frame.tick, rate, sample.validity);
+        self.state.compensator.add(frame.tick, rate, sample.validity);
         self.state.inertial = good.then_some(features);
         if good {
-            self.state.windows.push(features);
+            self.state.windows.add(features);
         }
         let settled = self.state.compensator.settled();
         self.update_bias(settled.as_ref(), good.then_some(rate), quiet, sample);
@@ -298,7 +300,7 @@ impl Pipeline {
         let State { initialised, compensator, stood, counters, .. } = &mut self.state;
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(settled)) = (zero_rate, settled) else { return };
-        match zero_rate.process(settled.left(), source, sample.temperature) {
+        match zero_rate.observe(settled.left(), source, sample.temperature) {
             Some(ZeroRateOutcome::Used) => {
                 count(&mut counters.zero_rate_updates, 1);
                 compensator.confirm_standstill();

@@ -11,7 +11,7 @@ pub const PERIOD_US: u64 = 1_000_000 / RATE_HZ as u64;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImuSample {
-    /// When the part took it, by the part's own clock, unwrapped.
+    /// The time at which the part took it, by the part's own clock, unwrapped.
     pub time: Micros,
     /// Specific force x, y, z.
     pub specific_force: [SpecificForce; 3],
@@ -19,12 +19,12 @@ pub struct ImuSample {
     pub angular_rate: [AngularRate; 3],
     /// Temperature of the part, where it gives one.
     pub temperature: Option<CentiCelsius>,
-    /// Whether the reading can be used. A parser reports [`Validity::Saturated`] where the part does;
+    /// The validity of the reading. A parser reports [`Validity::Saturated`] where the part does;
     /// [`crate::monitor`] finds the rest.
     pub validity: Validity,
 }
 
-/// Whether a reading can be used, and why not.
+/// The validity of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {
@@ -48,20 +48,20 @@ impl Validity {
         if saturated { Self::Saturated } else { Self::Good }
     }
 
-    /// Whether the reading can be used.
+    /// Returns whether the reading can be used.
     #[must_use]
     pub const fn is_good(self) -> bool {
         matches!(self, Self::Good)
     }
 }
 
-/// What a fibre-optic gyro has turned since its message before: x forward, y left, z up (FLU).
+/// The turn of a fibre-optic gyro since its message before: x forward, y left, z up (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogSample {
-    /// When the increment ended, by the part's own clock, unwrapped.
+    /// The time at which the increment ended, by the part's own clock, unwrapped.
     pub time: Micros,
-    /// How long it lasted, microseconds.
+    /// The time that it lasted, microseconds.
     pub span: u32,
     /// Messages missing between the one before and this one; what was turned meanwhile is lost.
     pub lost: u32,
@@ -87,11 +87,11 @@ pub struct Frame {
 /// Wheels of a vehicle: front left, front right, rear left, rear right.
 pub const WHEELS: usize = 4;
 
-/// Whether the wheels stand still.
+/// The standstill of the vehicle as its wheels show it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Standstill {
-    /// Not known: wheels are silent, or have only just become slow.
+    /// Standstill is not known: wheels are silent, or have only just become slow.
     #[default]
     Unknown,
     /// They turn.
@@ -100,14 +100,14 @@ pub enum Standstill {
     Still,
 }
 
-/// What is known of the wheels: their speeds, and whether they stand.
+/// The newest speeds of the wheels, and whether they stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSample {
-    /// When, by the caller's clock.
+    /// The time by the caller's clock.
     pub time: Micros,
     /// Speed of each wheel, where one is known.
     pub speeds: [Option<WheelSpeed>; WHEELS],
-    /// Whether the vehicle stands.
+    /// The standstill of the vehicle.
     pub standstill: Standstill,
 }

@@ -7,7 +7,7 @@
 /// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
-/// Why a reading cannot be taken over into fixed point.
+/// The reason why a reading does not fit the fixed-point format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -31,10 +31,10 @@ impl AngularRate {
     pub const FRACTION_BITS: u32 = 27;
     /// Codes per rad/s.
     pub const PER_RAD_PER_SEC: f32 = (1u32 << Self::FRACTION_BITS) as f32;
-    /// No rotation.
+    /// The rate of no rotation.
     pub const ZERO: Self = Self(0);
 
-    /// Nearest code to a reading in rad/s.
+    /// Returns the nearest code to a reading in rad/s.
     ///
     /// # Errors
     /// [`RangeError`] when the reading is not finite or not inside +-16 rad/s.
@@ -42,7 +42,7 @@ impl AngularRate {
         to_code(value, Self::PER_RAD_PER_SEC).map(Self)
     }
 
-    /// The rate in rad/s, for display and evaluation.
+    /// Returns the rate in rad/s, for display and evaluation.
     #[must_use]
     pub fn rad_per_sec(self) -> f64 {
         f64::from(self.0) / f64::from(Self::PER_RAD_PER_SEC)
@@ -61,7 +61,7 @@ impl SpecificForce {
     /// Codes per m/s^2.
     pub const PER_METRE_PER_SEC2: f32 = (1u32 << Self::FRACTION_BITS) as f32;
 
-    /// Nearest code to a reading in m/s^2.
+    /// Returns the nearest code to a reading in m/s^2.
     ///
     /// # Errors
     /// [`RangeError`] when the reading is not finite or not inside +-2048 m/s^2.
@@ -69,7 +69,7 @@ impl SpecificForce {
         to_code(value, Self::PER_METRE_PER_SEC2).map(Self)
     }
 
-    /// The specific force in m/s^2, for display and evaluation.
+    /// Returns the specific force in m/s^2, for display and evaluation.
     #[must_use]
     pub fn metre_per_sec2(self) -> f64 {
         f64::from(self.0) / f64::from(Self::PER_METRE_PER_SEC2)
@@ -89,10 +89,10 @@ impl Angle {
     pub const FRACTION_BITS: u32 = 44;
     /// Codes per rad.
     pub const PER_RAD: f32 = (1u64 << Self::FRACTION_BITS) as f32;
-    /// No turn.
+    /// The angle of no turn.
     pub const ZERO: Self = Self(0);
 
-    /// Nearest code to an angle in rad; exact from 2^-20 rad on.
+    /// Returns the nearest code to an angle in rad; exact from 2^-20 rad on.
     ///
     /// # Errors
     /// [`RangeError`] when the angle is not finite or not inside +-524,288 rad.
@@ -108,7 +108,7 @@ impl Angle {
         Ok(Self(code as i64))
     }
 
-    /// The angle in rad, for display and evaluation.
+    /// Returns the angle in rad, for display and evaluation.
     #[must_use]
     pub fn rad(self) -> f64 {
         self.0 as f64 / f64::from(Self::PER_RAD)
@@ -122,7 +122,7 @@ impl Angle {
 pub struct Yaw(pub i64);
 
 impl Yaw {
-    /// The angle in rad, unwrapped.
+    /// Returns the angle in rad, unwrapped.
     #[must_use]
     pub fn rad(self) -> f64 {
         // Exact to 2^53 codes: 2^53 x 7.5e-11 rad is 671,000 rad.
@@ -141,7 +141,7 @@ impl Length {
     /// Fraction bits of the code.
     pub const FRACTION_BITS: u32 = 32;
 
-    /// The length in m, for display and evaluation.
+    /// Returns the length in m, for display and evaluation.
     #[must_use]
     pub fn metre(self) -> f64 {
         self.0 as f64 / (1u64 << Self::FRACTION_BITS) as f64
@@ -157,7 +157,7 @@ impl WheelSpeed {
     /// Fraction bits of the code.
     pub const FRACTION_BITS: u32 = 16;
 
-    /// The speed in m/s, for display and evaluation.
+    /// Returns the speed in m/s, for display and evaluation.
     #[must_use]
     pub fn metre_per_sec(self) -> f64 {
         f64::from(self.0) / f64::from(1u32 << Self::FRACTION_BITS)

@@ -3,9 +3,9 @@
 //! Compare with what others need for the same network on an x86 core: ONNX Runtime int8 50 us,
 //! RTNeural 54 us, ONNX Runtime f32 65 us, PyTorch 330 us.
 
+use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet::window::{FEATURES, Features, WINDOW};
 use gyronet_host_tests::noise::Noise;
 use std::hint::black_box;
 use std::time::Instant;

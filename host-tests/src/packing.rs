@@ -2,7 +2,7 @@
 //! says: written from there, not from the quantiser.
 
 use crate::noise::Noise;
-use gyronet::nn::lstm::{Direction, ROW_LIMIT};
+use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::{GATES, HIDDEN_MAX};
 
 /// One gate row of one unit.
@@ -125,8 +125,8 @@ impl Packed {
     /// # Panics
     /// When the kernel does not take records of this size.
     #[must_use]
-    pub fn direction(&self) -> Direction<'_> {
-        Direction::new(self.units, self.inputs, &self.input, &self.recurrent)
+    pub fn direction(&self) -> DirectionWeights<'_> {
+        DirectionWeights::new(self.units, self.inputs, &self.input, &self.recurrent)
             .expect("records of the stated size")
     }
 }

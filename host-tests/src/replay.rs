@@ -198,7 +198,7 @@ impl Board {
     /// Takes bytes of the inertial sensor.
     pub fn push(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            self.mti.push(*byte);
+            self.mti.receive(*byte);
             while let Some(sample) = self.mti.next_sample() {
                 let Ok(sample) = sample else { continue };
                 self.follow();
@@ -219,7 +219,7 @@ impl Board {
     /// Takes bytes of the fibre-optic gyro.
     pub fn push_fog(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            self.dsp1760.push(*byte);
+            self.dsp1760.receive(*byte);
             while let Some(sample) = self.dsp1760.next_sample() {
                 if let Ok(sample) = sample {
                     // What has no place in time is counted.

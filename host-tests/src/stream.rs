@@ -2,10 +2,10 @@
 
 use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};
+use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
-use gyronet::window::WINDOW;
 
 /// The first tick after static initialisation, where nothing disturbs it.
 pub const KNOWN: u64 = 300;
@@ -37,7 +37,7 @@ pub fn run(
 ) -> Vec<Output> {
     let mut outputs = Vec::new();
     for sample in samples {
-        let output = pipeline.process(sample).expect("a place on the grid");
+        let output = pipeline.correct(sample).expect("a place on the grid");
         if let Some(due) = &output.window
             && let Some(estimate) = network(due)
         {

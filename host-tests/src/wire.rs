@@ -48,7 +48,7 @@ pub fn message(time: u32) -> MtData2 {
 pub fn feed(mti: &mut Mti, bytes: impl IntoIterator<Item = u8>) -> Vec<Result<ImuSample, XsensError>> {
     let mut samples = Vec::new();
     for byte in bytes {
-        mti.push(byte);
+        mti.receive(byte);
         samples.extend(std::iter::from_fn(|| mti.next_sample()));
     }
     samples

@@ -12,7 +12,7 @@
 //! | never less late than [`JITTER_US`] for [`PATIENCE_US`] (a small jump) | as a clock jump |
 //! | time stamp equal to the last (duplicate) | refused, counted |
 //! | before the last, within [`JUMP_US`] (out of order) | refused, counted |
-//! | off by more than [`JUMP_US`] (clock jump, restart, lost messages that nothing counted) | new offset, counted, and the caller is told to connect nothing across it |
+//! | off by more than [`JUMP_US`] (clock jump, restart, lost messages that nothing counted) | new offset, counted, and the caller connects nothing across it |
 //!
 //! The board's time never goes back: where the offset has gone down, it stands still for a
 //! microsecond a sample until it is right again.
@@ -22,14 +22,14 @@ use crate::units::Micros;
 
 /// A time stamp that is off by more than this is another clock's.
 pub const JUMP_US: u64 = 100_000;
-/// How fast the offset may creep up: two poor crystals.
+/// The rate at which the offset may grow: that of two poor crystals.
 pub const CREEP_PPM: u64 = 200;
-/// How long arrivals may all be late before the clock is said to have jumped.
+/// The time for which arrivals may all be late before the clock counts as having jumped.
 pub const PATIENCE_US: u64 = 1_000_000;
 /// Arrivals later than this are counted.
 pub const JITTER_US: u64 = 2_000;
 
-/// Why a sample is not used: its time stamp has no place.
+/// The reason why a time stamp has no place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -50,7 +50,7 @@ pub enum ClockError {
     },
 }
 
-/// How often each kind of event happened. They saturate.
+/// The numbers of events. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockCounters {
@@ -67,7 +67,7 @@ pub struct ClockCounters {
 }
 
 impl ClockCounters {
-    /// What has happened since `before`.
+    /// Returns the events since `before`.
     #[must_use]
     pub const fn since(&self, before: &Self) -> Self {
         Self {
@@ -84,13 +84,13 @@ impl ClockCounters {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardTime {
-    /// When the sample was taken, plus the shortest delay of the line.
+    /// The time at which the sample was taken, plus the shortest delay of the line.
     pub time: Micros,
     /// The part's clock has jumped: what came before is not connected to this sample.
     pub jumped: bool,
 }
 
-/// Takes a part's clock to the board's; holds where it stands.
+/// The translation of a part's clock to the board's.
 #[derive(Debug, Clone, Default)]
 pub struct PartClock {
     /// Last time stamp, its board time, and board minus part time, all microseconds.
@@ -105,7 +105,7 @@ impl PartClock {
     ///
     /// # Errors
     /// [`ClockError`]: the sample is not to be used.
-    pub fn process(&mut self, stamp: Micros, arrival: Micros) -> Result<BoardTime, ClockError> {
+    pub fn translate(&mut self, stamp: Micros, arrival: Micros) -> Result<BoardTime, ClockError> {
         let measured = (arrival.0 as i64).wrapping_sub(stamp.0 as i64);
         let Some((last, board, offset)) = self.last else {
             return Ok(self.take(stamp, arrival, measured, false));
@@ -135,7 +135,7 @@ impl PartClock {
         Ok(self.take(stamp, time, offset, false))
     }
 
-    /// Event counters since start.
+    /// Returns the event counters since the start.
     #[must_use]
     pub fn counters(&self) -> &ClockCounters {
         &self.counters

@@ -179,7 +179,7 @@ impl RatioEstimator {
         self.ratio
     }
 
-    /// Tells whether the clocks depart from each other by more than [`ClockRatioConfig::limit_ppm`].
+    /// Returns whether the clocks depart from each other by more than [`ClockRatioConfig::limit_ppm`].
     #[must_use]
     pub fn fault(&self) -> bool {
         self.fault

@@ -20,20 +20,19 @@ use heapless::Deque;
 /// half as many again.
 pub const KEPT: usize = 32;
 
-/// What was turned between two grid steps.
+/// The turn between two grid steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Turn {
     /// About x, y, z; `None` where an axis was not good throughout, or nothing came.
     pub angle: [Option<Angle>; 3],
-    /// How much of the step the increments cover, microseconds; less than
-    /// [`PERIOD_US`] marks a gap.
+    /// The part of the step that the increments cover, microseconds; less than [`PERIOD_US`] marks a gap.
     pub covered: u32,
 }
 
 impl Turn {
-    /// The mean rate about an axis over the step, rounded to nearest; `None` where the axis was
-    /// not good throughout, or a part of the step is not covered: nothing is guessed.
+    /// Returns the mean rate about an axis over the step, rounded to nearest; `None` where the axis was not good
+    /// throughout, or a part of the step is not covered: nothing is guessed.
     #[must_use]
     pub fn rate(&self, axis: usize) -> Option<AngularRate> {
         let Angle(angle) = self.angle.get(axis).copied().flatten()?;
@@ -46,7 +45,7 @@ impl Turn {
     }
 }
 
-/// How often each kind of event happened. They saturate.
+/// The numbers of events. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct IncrementCounters {
@@ -61,7 +60,7 @@ pub struct IncrementCounters {
 }
 
 impl IncrementCounters {
-    /// What has happened since `before`.
+    /// Returns the events since `before`.
     #[must_use]
     pub const fn since(&self, before: &Self) -> Self {
         Self {
@@ -91,7 +90,7 @@ pub struct Increments {
 
 impl Increments {
     /// Takes a sample that ended at `time` by the board's clock, later than the last one.
-    pub fn push(&mut self, time: Micros, sample: &FogSample) {
+    pub fn add(&mut self, time: Micros, sample: &FogSample) {
         let (end, span) = (time.0, u64::from(sample.span));
         let own = end.saturating_sub(span);
         let begin = match self.last_end {
@@ -117,7 +116,7 @@ impl Increments {
         let _ = self.pieces.push_back(Piece { begin, end, angle: sample.increment });
     }
 
-    /// Nothing before is connected to what follows.
+    /// Forgets the end of the newest increment: a gap follows.
     pub fn disconnect(&mut self) {
         self.last_end = None;
     }
@@ -128,13 +127,13 @@ impl Increments {
         self.last_end = None;
     }
 
-    /// Whether the increments reach `time`: then [`Increments::take`] need not wait.
+    /// Returns whether the increments reach `time`, so that [`Increments::take`] need not wait.
     #[must_use]
     pub fn has_reached(&self, time: Micros) -> bool {
         self.last_end.is_some_and(|end| end >= time.0)
     }
 
-    /// What was turned in the step that ends at `time`; asked for in ascending order.
+    /// Returns the turn of the step that ends at `time`; steps are asked for in ascending order.
     #[inline(never)]
     pub fn take(&mut self, time: Micros) -> Turn {
         let begin = time.0.saturating_sub(PERIOD_US);
@@ -173,7 +172,7 @@ impl Increments {
         Turn { angle, covered: covered as u32 }
     }
 
-    /// Event counters since start.
+    /// Returns the event counters since the start.
     #[must_use]
     pub fn counters(&self) -> &IncrementCounters {
         &self.counters
@@ -181,7 +180,7 @@ impl Increments {
 }
 
 impl Piece {
-    /// The parts before and after `time`, which lies in the piece.
+    /// Returns the parts before and after `time`, which lies in the piece.
     fn split(self, time: u64) -> (Self, Self) {
         // One and a half grid steps at most, as `push` has seen to: products of the two fit 64 bits.
         let whole = ((self.end - self.begin) as i64).max(1);

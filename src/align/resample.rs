@@ -20,12 +20,12 @@ use heapless::Deque;
 
 /// Samples further apart than this have a gap between them: 47 Hz with its jitter fits in.
 pub const BRIDGE_US: u64 = 25_000;
-/// No value across a gap longer than this.
+/// The longest gap that a value bridges.
 pub const MAX_GAP_US: u64 = 100_000;
 /// Samples kept: what a 500 Hz part sends in the 20 ms that a step can be waited for.
 pub const KEPT: usize = 16;
 
-/// How a value on the grid came about.
+/// The origin of a value on the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Quality {
@@ -54,7 +54,7 @@ pub struct Resampler {
 
 impl Resampler {
     /// Takes a sample; its time is the board's and later than the last one's.
-    pub fn push(&mut self, sample: ImuSample) {
+    pub fn add(&mut self, sample: ImuSample) {
         if self.samples.is_full() {
             self.samples.pop_front();
             self.dropped = self.dropped.saturating_add(1);
@@ -63,24 +63,24 @@ impl Resampler {
         let _ = self.samples.push_back(sample);
     }
 
-    /// Nothing before is connected to what follows.
+    /// Forgets the end of the newest increment: a gap follows.
     pub fn clear(&mut self) {
         self.samples.clear();
     }
 
-    /// Whether a sample at or after `time` has come: then [`Resampler::at`] need not wait.
+    /// Returns whether a sample at or after `time` has come, so that [`Resampler::at`] need not wait.
     #[must_use]
     pub fn has_reached(&self, time: Micros) -> bool {
         self.samples.back().is_some_and(|sample| sample.time >= time)
     }
 
-    /// Samples that had to go before a step asked for them.
+    /// Returns the number of samples that were dropped before a step asked for them.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// The value at `time`; asked for in ascending order.
+    /// Returns the value at `time`; times are asked for in ascending order.
     pub fn at(&mut self, time: Micros) -> Option<(ImuSample, Quality)> {
         // The newest sample at or before `time` stays at the front.
         while self.samples.iter().nth(1).is_some_and(|second| second.time <= time) {
@@ -105,7 +105,7 @@ impl Resampler {
     }
 }
 
-/// On the straight line from one sample to the next, rounded to nearest; valid if both are.
+/// Interpolates linearly from one sample to the next, rounded to nearest; the result is valid if both are.
 fn between(before: &ImuSample, after: &ImuSample, time: Micros) -> ImuSample {
     let span = (after.time.0 - before.time.0) as i64;
     let part = (time.0 - before.time.0) as i64;

@@ -11,24 +11,24 @@ use super::resample::{Quality, Resampler};
 use crate::sample::{FogSample, ImuSample, PERIOD_US};
 use crate::units::Micros;
 
-/// How long a step is waited for.
+/// The longest time that a step waits for a stream.
 pub const MAX_DELAY_US: u64 = 10_000;
-/// After a silence of this length the grid starts anew, at the next step: one second.
+/// The silence after which the grid begins again, at the next step: one second.
 pub const MAX_SILENCE_US: u64 = 1_000_000;
 
-/// How often each kind of event happened.
+/// The numbers of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Events {
-    /// To the inertial sensor's clock.
+    /// The events of the inertial sensor's clock.
     pub imu: ClockCounters,
-    /// To the fibre-optic gyro's clock.
+    /// The events of the fibre-optic gyro's clock.
     pub fog: ClockCounters,
-    /// To its increments.
+    /// The events of its increments.
     pub increments: IncrementCounters,
 }
 
-/// What is known of one grid step.
+/// The values of one grid step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Step {
@@ -36,13 +36,13 @@ pub struct Step {
     pub time: Micros,
     /// The inertial sensor at that time.
     pub imu: Option<(ImuSample, Quality)>,
-    /// What the fibre-optic gyro has turned since the step before.
+    /// The turn of the fibre-optic gyro since the step before.
     pub fog: Turn,
-    /// What has happened since the step before; `samples` are those that have come.
+    /// The events since the step before; `samples` are those that have come.
     pub events: Events,
 }
 
-/// Which streams there are.
+/// The streams that are fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fitted {
@@ -52,7 +52,7 @@ pub struct Fitted {
     pub fog: bool,
 }
 
-/// Both streams, and where the grid stands.
+/// Both streams and the next step of the grid.
 #[derive(Debug, Clone)]
 pub struct Streams {
     fitted: Fitted,
@@ -63,12 +63,12 @@ pub struct Streams {
     /// The step that comes next; set by the first sample.
     next: Option<u64>,
     restarts: u32,
-    /// All events up to the last step.
-    told: Events,
+    /// The events up to the last step.
+    reported: Events,
 }
 
 impl Streams {
-    /// Nothing received yet.
+    /// Begins before the first sample.
     #[must_use]
     pub fn new(fitted: Fitted) -> Self {
         Self {
@@ -79,7 +79,7 @@ impl Streams {
             fog: Increments::default(),
             next: None,
             restarts: 0,
-            told: Events::default(),
+            reported: Events::default(),
         }
     }
 
@@ -87,13 +87,13 @@ impl Streams {
     ///
     /// # Errors
     /// [`ClockError`]: it is not used.
-    pub fn push_imu(&mut self, now: Micros, sample: ImuSample) -> Result<(), ClockError> {
-        let board = self.imu_clock.process(sample.time, now)?;
+    pub fn add_imu(&mut self, now: Micros, sample: ImuSample) -> Result<(), ClockError> {
+        let board = self.imu_clock.translate(sample.time, now)?;
         if board.jumped {
             self.imu.clear();
         }
         self.begin(board.time);
-        self.imu.push(ImuSample { time: board.time, ..sample });
+        self.imu.add(ImuSample { time: board.time, ..sample });
         Ok(())
     }
 
@@ -101,18 +101,18 @@ impl Streams {
     ///
     /// # Errors
     /// [`ClockError`]: it is not used.
-    pub fn push_fog(&mut self, now: Micros, sample: FogSample) -> Result<(), ClockError> {
-        let board = self.fog_clock.process(sample.time, now)?;
+    pub fn add_fog(&mut self, now: Micros, sample: FogSample) -> Result<(), ClockError> {
+        let board = self.fog_clock.translate(sample.time, now)?;
         if board.jumped {
             self.fog.disconnect();
         }
         self.begin(board.time);
-        self.fog.push(board.time, &sample);
+        self.fog.add(board.time, &sample);
         Ok(())
     }
 
-    /// The next step, if it is complete or due. Call it until `None` after every sample, and
-    /// at least every few milliseconds.
+    /// Returns the next step, if it is complete or due. Call it until `None` after every sample, and at least every
+    /// few milliseconds.
     #[inline(never)]
     pub fn next_step(&mut self, now: Micros) -> Option<Step> {
         let next = self.next?;
@@ -135,46 +135,46 @@ impl Streams {
         let (imu, fog) = (self.imu.at(time), self.fog.take(time));
         let all = self.events();
         let events = Events {
-            imu: all.imu.since(&self.told.imu),
-            fog: all.fog.since(&self.told.fog),
-            increments: all.increments.since(&self.told.increments),
+            imu: all.imu.since(&self.reported.imu),
+            fog: all.fog.since(&self.reported.fog),
+            increments: all.increments.since(&self.reported.increments),
         };
-        self.told = all;
+        self.reported = all;
         Some(Step { time, imu, fog, events })
     }
 
-    /// All events since the start.
+    /// Returns all events since the start.
     #[must_use]
     pub fn events(&self) -> Events {
         Events { imu: *self.imu_clock(), fog: *self.fog_clock(), increments: *self.increments() }
     }
 
-    /// Events of the inertial sensor's clock.
+    /// Returns the events of the inertial sensor's clock.
     #[must_use]
     pub fn imu_clock(&self) -> &ClockCounters {
         self.imu_clock.counters()
     }
 
-    /// Events of the fibre-optic gyro's clock.
+    /// Returns the events of the fibre-optic gyro's clock.
     #[must_use]
     pub fn fog_clock(&self) -> &ClockCounters {
         self.fog_clock.counters()
     }
 
-    /// Events of the increments.
+    /// Returns the events of the increments.
     #[must_use]
     pub fn increments(&self) -> &IncrementCounters {
         self.fog.counters()
     }
 
-    /// Times that the grid started anew.
+    /// Returns the number of times that the grid began again.
     #[must_use]
     pub fn restarts(&self) -> u32 {
         self.restarts
     }
 
-    /// The first step is the next one from there. The first sample does so by itself; whoever expects
-    /// one calls this before, and gets steps with nothing in them until it comes.
+    /// Begins the grid with the next step after `time`, unless it has begun. The first sample does so by itself; a
+    /// caller that expects one begins earlier, and gets empty steps until it comes.
     pub fn begin(&mut self, time: Micros) {
         self.next.get_or_insert(time.0.next_multiple_of(PERIOD_US));
     }

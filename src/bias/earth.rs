@@ -20,7 +20,7 @@ pub struct Latitude {
 }
 
 impl Latitude {
-    /// In degrees, north positive; `None` when not finite or beyond a pole.
+    /// Makes a latitude from degrees, north positive; `None` when it is not finite or beyond a pole.
     #[must_use]
     pub fn from_degrees(degrees: f32) -> Option<Self> {
         if !(-90.0..=90.0).contains(&degrees) {
@@ -31,14 +31,14 @@ impl Latitude {
         Some(Self { vertical_rate: AngularRate(libm::roundf(rate * AngularRate::PER_RAD_PER_SEC) as i32) })
     }
 
-    /// Earth rate about the upward vertical.
+    /// Returns the Earth's rate about the upward vertical.
     #[must_use]
     pub const fn vertical_rate(self) -> AngularRate {
         self.vertical_rate
     }
 }
 
-/// What becomes of the Earth's rotation.
+/// The treatment of the Earth's rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EarthRate {
@@ -59,7 +59,7 @@ impl EarthRate {
     }
 }
 
-/// What a gyro whose z axis is vertical reads at rest.
+/// The reading at rest of a gyro whose z axis is vertical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ZeroPoint {
@@ -68,21 +68,21 @@ pub struct ZeroPoint {
 }
 
 impl ZeroPoint {
-    /// From the mean at rest, which contains the Earth rate.
+    /// Makes the zero point from the mean at rest, which contains the Earth's rate.
     #[must_use]
     pub fn at_rest([x, y, z]: [AngularRate; 3], earth: EarthRate) -> Self {
         let earth = earth.vertical();
         Self { bias: [x, y, AngularRate(z.0.saturating_sub(earth.0))], earth }
     }
 
-    /// What the gyro reads when the vehicle stands, about x, y and z: to be taken off its readings.
+    /// Returns the readings of the gyro at rest about x, y and z, which are subtracted from its readings.
     #[must_use]
     pub fn reading(&self) -> [AngularRate; 3] {
         let [x, y, z] = self.bias;
         [x, y, AngularRate(z.0.saturating_add(self.earth.0))]
     }
 
-    /// The part's bias; with [`EarthRate::LeftInBias`] the Earth rate is in it.
+    /// Returns the part's bias; with [`EarthRate::LeftInBias`] it contains the Earth's rate.
     #[must_use]
     pub fn bias(&self) -> [AngularRate; 3] {
         self.bias

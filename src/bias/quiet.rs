@@ -13,7 +13,7 @@ use super::static_init::{Rest, StaticConfig};
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
-/// How much tighter than static initialisation.
+/// Limits that are tighter than those of static initialisation.
 #[derive(Debug, Clone, Copy)]
 pub struct QuietConfig {
     /// Largest standard deviation over that of static initialisation.
@@ -27,7 +27,7 @@ pub struct QuietConfig {
 }
 
 impl QuietConfig {
-    /// For a car whose engine may run. The test `quiet_stretches` holds it against eight real
+    /// These limits suit a car whose engine may run. The test `quiet_stretches` holds them against eight real
     /// drives.
     pub const DEFAULT: Self = Self { std_ratio: 1.5, gyro_drift: 7e-4, accel_drift: 0.06, seconds: 3 };
 }
@@ -48,7 +48,8 @@ pub struct QuietDetector {
 }
 
 impl QuietDetector {
-    /// Limits for a vehicle that showed `rest` at the start; never above static initialisation's.
+    /// Sets limits for a vehicle that showed `rest` at the start; they are never above those of static
+    /// initialisation.
     #[must_use]
     pub fn new(config: QuietConfig, limits: &StaticConfig, rest: &Rest) -> Self {
         let gyro = |axis: usize| (config.std_ratio * rest.gyro_std[axis]).min(limits.gyro_std);
@@ -66,15 +67,15 @@ impl QuietDetector {
     }
 
     /// Takes a sample; says whether all is quiet, as far as the last whole second tells.
-    pub fn process(&mut self, sample: &ImuSample) -> bool {
+    pub fn observe(&mut self, sample: &ImuSample) -> bool {
         let [block_x, ..] = &self.block;
         let count = block_x.count() + 1;
         let (gyro, accel) = self.block.split_at_mut(3);
         for (spread, rate) in gyro.iter_mut().zip(sample.angular_rate) {
-            spread.push(rate.0, rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
+            spread.add(rate.0, rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
         }
         for (spread, force) in accel.iter_mut().zip(sample.specific_force) {
-            spread.push(force.0, force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
+            spread.add(force.0, force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
         if !sample.validity.is_good() {
             self.restart();
@@ -84,7 +85,7 @@ impl QuietDetector {
         self.run >= self.seconds
     }
 
-    /// After a gap: what was quiet before it says nothing.
+    /// Begins again after a gap: readings before it say nothing about those after it.
     pub fn restart(&mut self) {
         self.block = [Spread::default(); 6];
         self.first = None;

@@ -11,7 +11,7 @@ pub(super) struct Spread {
 
 impl Spread {
     /// Takes a reading as code and as value.
-    pub fn push(&mut self, code: i32, value: f32) {
+    pub fn add(&mut self, code: i32, value: f32) {
         self.count += 1;
         self.sum += i64::from(code);
         let delta = value - self.mean;
@@ -19,23 +19,23 @@ impl Spread {
         self.squares += delta * (value - self.mean);
     }
 
-    /// How many readings.
+    /// Returns the number of readings.
     pub fn count(&self) -> u32 {
         self.count
     }
 
-    /// Mean of the codes, rounded to nearest; zero of none.
+    /// Returns the mean of the codes, rounded to nearest; zero without readings.
     pub fn mean_code(&self) -> i32 {
         let count = i64::from(self.count.max(1));
         (self.sum + count / 2).div_euclid(count) as i32
     }
 
-    /// Variance of the values.
+    /// Returns the variance of the values.
     pub fn variance(&self) -> f32 {
         self.squares / self.count.max(1) as f32
     }
 
-    /// Standard deviation of the values.
+    /// Returns the standard deviation of the values.
     pub fn std(&self) -> f32 {
         libm::sqrtf(self.variance())
     }

@@ -39,7 +39,7 @@ impl StaticConfig {
         Self { gyro_std: 0.05, accel_std: 1.5, gyro_drift: 0.004, accel_drift: 0.12, gyro_bias: 0.0873 };
 }
 
-/// What gave the vehicle's motion away; `axis` is 0, 1, 2 for x, y, z.
+/// The sign of motion that was found; `axis` is 0, 1, 2 for x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -112,12 +112,12 @@ struct Axis {
 }
 
 impl Axis {
-    fn push(&mut self, code: i32, value: f32) {
+    fn add(&mut self, code: i32, value: f32) {
         self.seconds[(self.all.count() / RATE_HZ) as usize % SECONDS] += i64::from(code);
-        self.all.push(code, value);
+        self.all.add(code, value);
     }
 
-    /// Largest less smallest one-second mean, in units.
+    /// Returns the largest less the smallest one-second mean, in units.
     fn drift(&self, per_unit: f32) -> f32 {
         let largest = self.seconds.iter().max().copied().unwrap_or(0);
         let smallest = self.seconds.iter().min().copied().unwrap_or(0);
@@ -125,7 +125,7 @@ impl Axis {
     }
 }
 
-/// What the sensor reads at rest.
+/// The mean readings of the sensor at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rest {
@@ -157,14 +157,14 @@ impl StaticInit {
     }
 
     /// Takes a sample; after [`STATIC_SAMPLES`] of them returns what it reads at rest, or why there
-    /// is none, and starts anew.
-    pub fn process(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
+    /// is none, and begins again.
+    pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {
             let rate = sample.angular_rate[axis].0;
             let force = sample.specific_force[axis].0;
-            self.gyro[axis].push(rate, rate as f32 / AngularRate::PER_RAD_PER_SEC);
-            self.accel[axis].push(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
+            self.gyro[axis].add(rate, rate as f32 / AngularRate::PER_RAD_PER_SEC);
+            self.accel[axis].add(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
         let [first, ..] = &self.gyro;
         if first.all.count() < STATIC_SAMPLES {
@@ -175,8 +175,8 @@ impl StaticInit {
         Some(result)
     }
 
-    /// The wheels turn, whatever the sample looks like: forgets what was collected. Says so once,
-    /// not with every sample of a drive.
+    /// Drops the collected samples because the wheels turn. Returns the error once, not with every sample of a
+    /// drive.
     pub fn refuse_wheels(&mut self) -> Option<StaticError> {
         let refused = self.wheels_refused;
         self.restart();

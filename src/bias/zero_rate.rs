@@ -6,7 +6,7 @@
 //!
 //! - the **bias** b that matters when driving: it walks, faster when the temperature changes;
 //! - the **offset** s of this one standstill: an idling engine shakes the sensor otherwise than
-//!   a road does, and gyro and network answer with a mean of their own. It is drawn anew at each
+//!   a road does, and gyro and network answer with a mean of their own. It is another one at each
 //!   stop, and does not average out while that lasts: without it, a minute at a traffic light
 //!   would make the filter sure of something that does not hold on the road.
 //!
@@ -17,7 +17,7 @@ use super::spread::Spread;
 use crate::sample::RATE_HZ;
 use crate::units::{AngularRate, CentiCelsius};
 
-/// What is known of part and vehicle. All are 1 sigma.
+/// The noise model of part and vehicle. All values are 1 sigma.
 #[derive(Debug, Clone, Copy)]
 pub struct ZeroRateConfig {
     /// Bias left by static initialisation, rad/s.
@@ -58,11 +58,11 @@ impl ZeroRateConfig {
 /// Bits of a rate that the watch over a standing vehicle leaves out.
 const TURNED_SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
 
-/// What says that the vehicle stands.
+/// The evidence that the vehicle stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StandstillSource {
-    /// Nothing does.
+    /// There is no evidence.
     #[default]
     None,
     /// All wheels stand. That is enough by itself: a gate on the gyro would lock a true bias out.
@@ -118,7 +118,7 @@ pub struct ZeroRate {
 }
 
 impl ZeroRate {
-    /// After static initialisation.
+    /// Begins after static initialisation.
     #[must_use]
     pub fn new(config: ZeroRateConfig) -> Self {
         let square = |sigma: f32| sigma * sigma;
@@ -143,7 +143,7 @@ impl ZeroRate {
     /// Takes the rate that is left of a settled sample (gyro less static bias less the network's estimate;
     /// `None` where that is not good) and the source that says that the vehicle stands. Returns what a second
     /// of standing led to when one is over.
-    pub fn process(
+    pub fn observe(
         &mut self,
         left: Option<AngularRate>,
         source: StandstillSource,
@@ -165,7 +165,7 @@ impl ZeroRate {
             self.restart();
             return None;
         };
-        self.block.push(left, left as f32 / AngularRate::PER_RAD_PER_SEC);
+        self.block.add(left, left as f32 / AngularRate::PER_RAD_PER_SEC);
         if self.block.count() < RATE_HZ {
             return None;
         }
@@ -206,24 +206,24 @@ impl ZeroRate {
         true
     }
 
-    /// Whether the wheels stand while the gyro shows a turn.
+    /// Returns whether the wheels stand while the gyro shows a turn.
     #[must_use]
     pub fn contradicted(&self) -> bool {
         self.source == StandstillSource::Wheels && self.refused
     }
 
-    /// The most that a second of standing may turn, rad.
+    /// Returns the largest turn of a second at standstill, rad.
     fn wheels_gate(&self) -> f32 {
         self.config.max_step.max(10.0 * self.sigma())
     }
 
-    /// What a gap leaves is no whole second.
+    /// Drops the second under way, which a gap has cut short.
     pub fn restart(&mut self) {
         self.block = Spread::default();
         self.waiting = None;
     }
 
-    /// The bias to take off; while the vehicle stands, the offset of this standstill with it.
+    /// Returns the bias to subtract; while the vehicle stands, it contains the offset of this standstill.
     #[must_use]
     pub fn bias(&self) -> AngularRate {
         let stands = self.source != StandstillSource::None && !self.refused;
@@ -232,13 +232,13 @@ impl ZeroRate {
         AngularRate(libm::roundf(bias * AngularRate::PER_RAD_PER_SEC) as i32)
     }
 
-    /// Uncertainty of the bias when driving, 1 sigma, rad/s.
+    /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s.
     #[must_use]
     pub fn sigma(&self) -> f32 {
         libm::sqrtf(self.covariance.bias)
     }
 
-    /// Whether the wheels stand and the gyro does not contradict them.
+    /// Returns whether the wheels stand and the gyro does not contradict them.
     #[must_use]
     pub fn stands(&self) -> bool {
         self.source == StandstillSource::Wheels && !self.refused
@@ -253,7 +253,7 @@ impl ZeroRate {
         self.covariance = Covariance { both: 0.0, offset, ..self.covariance };
     }
 
-    /// A second of the bias' random walk.
+    /// Adds a second of the bias' random walk to its variance.
     fn walk(&mut self, temperature: Option<CentiCelsius>) {
         let ZeroRateConfig { walk, per_kelvin, max_bias, .. } = self.config;
         let change = match (self.temperature, temperature) {
@@ -290,7 +290,7 @@ impl ZeroRate {
         ZeroRateOutcome::Used
     }
 
-    /// The Kalman filter's measurement update.
+    /// Applies the Kalman filter's measurement update.
     fn update(&mut self, measured: Measurement) {
         let Covariance { bias, both, offset } = self.covariance;
         let (with_bias, with_offset) = (bias + both, both + offset);
@@ -308,7 +308,7 @@ impl ZeroRate {
     }
 }
 
-/// Bounded to +-`largest`. (`clamp` would panic on bounds that a configuration has made NaN.)
+/// Bounds a value to +-`largest`. (`clamp` would panic on bounds that a configuration has made NaN.)
 fn within(value: f32, largest: f32) -> f32 {
     value.max(-largest).min(largest)
 }

@@ -34,13 +34,13 @@ mod firmware {
     use core::hint::black_box;
     use cortex_m_semihosting::{debug, hprintln};
     use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::window::{FEATURES, Features, WINDOW};
     use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};
     use gyronet::nn::dense::Dense;
-    use gyronet::nn::lstm::{self, Direction, Scratch};
+    use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
     use gyronet::pipeline::{Pipeline, PipelineConfig};
     use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
     use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
-    use gyronet::window::{FEATURES, Features, WINDOW};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
     use stm32f4::stm32f405 as _;
@@ -134,7 +134,7 @@ mod firmware {
                     temperature: None,
                     validity: Validity::Good,
                 };
-                if let Ok(output) = black_box(pipeline.process(black_box(sample)))
+                if let Ok(output) = black_box(pipeline.correct(black_box(sample)))
                     && let Some(due) = output.window
                 {
                     let estimate = Estimate {
@@ -154,7 +154,7 @@ mod firmware {
     fn kernels(meter: &mut Meter) {
         // Too large for the stack.
         let scratch = cortex_m::singleton!(: Scratch<60, 30, 5> = Scratch::ZERO);
-        let room = cortex_m::singleton!(: [u32; Direction::recurrent_words(60)] = [0; _]);
+        let room = cortex_m::singleton!(: [u32; DirectionWeights::recurrent_words(60)] = [0; _]);
         let Some((scratch, room)) = scratch.zip(room) else { return };
         let x = [0x0123_4567; 5 * 120];
         let (narrow, wide) = (GYRO_1.direction(60, 6), FOG_2_2.direction(60, 120));

@@ -68,7 +68,7 @@ mod firmware {
                     second.features.iter_mut().for_each(|value| *value = numbers.within(1 << 24));
                     second.turn = Angle(i64::from(numbers.within(1 << 29)) << 12);
                 }
-                minute.push(second);
+                minute.add(second);
             }
             let Some(window) = minute.window(Padding::None) else { return };
             meter.run(name, || {

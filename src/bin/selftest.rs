@@ -22,10 +22,10 @@ mod firmware {
     use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
     use gyronet::model::fognet::{FogNetState, MinuteNetwork};
     use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::window::{FEATURES, Features, WINDOW};
     use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
-    use gyronet::nn::lstm::{self, Direction, Scratch};
+    use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
     use gyronet::units::Angle;
-    use gyronet::window::{FEATURES, Features, WINDOW};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
     use stm32f4::stm32f405 as _;
@@ -73,7 +73,11 @@ mod firmware {
     }
 
     /// Kernel against portable code, over inputs up to +-`limit` and at the ends of the range.
-    fn compare<const U: usize, const W: usize>(name: &str, direction: &Direction<'_>, limit: i32) -> u32 {
+    fn compare<const U: usize, const W: usize>(
+        name: &str,
+        direction: &DirectionWeights<'_>,
+        limit: i32,
+    ) -> u32 {
         let mut numbers = Numbers::new(U as u32 + direction.inputs() as u32);
         let mut differences = 0u32;
         let mut fast = Scratch::<U, W, 2>::ZERO;
@@ -159,7 +163,7 @@ mod firmware {
                     numbers.within(if (3..=5).contains(&k) { 1 << 25 } else { 10 << 20 })
                 });
                 let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
-                minute.push(Second { features, turn });
+                minute.add(Second { features, turn });
             }
             let estimate = network.estimate(&minute.window(Padding::None)?);
             for angle in [estimate.correction, estimate.linear] {

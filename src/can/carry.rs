@@ -8,7 +8,7 @@
 
 use crate::units::AngularRate;
 
-/// How a signal's code follows from a rate code (LSB 2^-27 rad/s).
+/// The rule that makes a signal's code of a rate code (LSB 2^-27 rad/s).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scale {
     /// Signal LSBs per rate code, times 2^32. At most 2^31: a signal finer than twice the rate
@@ -25,7 +25,7 @@ impl Scale {
     pub const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325, zero_q32: 0 };
 }
 
-/// What rounding has left over of one signal, owed to its next code.
+/// The rounding residual of one signal, which is added to its next code.
 #[derive(Debug, Clone, Copy)]
 pub struct RoundingCarry {
     scale: Scale,
@@ -34,13 +34,13 @@ pub struct RoundingCarry {
 }
 
 impl RoundingCarry {
-    /// Nothing owed.
+    /// Begins without a residual.
     #[must_use]
     pub const fn new(scale: Scale) -> Self {
         Self { scale, residual: 0 }
     }
 
-    /// Nearest code to the rate and what is owed from earlier ones.
+    /// Returns the nearest code to the rate plus the residual of earlier ones.
     pub fn encode(&mut self, rate: AngularRate) -> i32 {
         // At most 2^62 + 2^60 + 2^31.
         let wanted = i64::from(rate.0) * self.scale.factor_q32 + self.scale.zero_q32 + self.residual;

@@ -34,7 +34,7 @@ impl CanEncoder {
         }
     }
 
-    /// Messages that reported "failed" because a value does not fit its signal.
+    /// Returns the number of messages that reported "failed" because a value does not fit its signal.
     #[must_use]
     pub fn out_of_range(&self) -> u32 {
         self.out_of_range
@@ -78,7 +78,8 @@ impl CanEncoder {
     }
 }
 
-/// The grid step is the counter, so that a receiver sees what is missing.
+/// Collects what the Bosch set carries. The grid step is its counter, so that a receiver sees which samples are
+/// missing.
 fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
     Motion {
         angular_rate: [sample.roll_rate, sample.pitch_rate, sample.prompt.rate],

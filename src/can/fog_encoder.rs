@@ -25,13 +25,13 @@ impl FogEncoder {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }
 
-    /// The protection of each message.
+    /// Returns the protection of each message.
     #[must_use]
     pub fn profiles(ids: [u16; 3]) -> [Profile; 3] {
         ids.map(|data_id| Profile::P01(P01 { data_id, mode: DataIdMode::Both }))
     }
 
-    /// Every message of the gyro; none for identifiers of over 11 bits.
+    /// Returns every message of the gyro; none for identifiers of over 11 bits.
     #[must_use]
     pub fn messages(ids: [u16; 3]) -> Vec<Periodic, 3> {
         let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS };

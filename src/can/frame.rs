@@ -25,7 +25,7 @@ impl Frame for DataFrame {
         Some(Self { id: id.into(), data: bytes, len: data.len() as u8 })
     }
 
-    /// Remote frames carry no data and are not supported: always `None`.
+    /// Returns `None`: remote frames carry no data and are not supported.
     fn new_remote(_id: impl Into<Id>, _dlc: usize) -> Option<Self> {
         None
     }

@@ -31,7 +31,8 @@ const YAW_RATE: Scale = Scale { factor_q32: 1 << 18, zero_q32: 137_922_738_588_2
 /// 15.687 * 2048, times 2^9; 1/2048 m/s^2 is 2^9 acceleration codes.
 const LATERAL_ZERO_Q9: i64 = 16_449_012;
 
-/// The 29-bit identifier of a broadcast parameter group: priority 0 to 7, sender's address.
+/// Returns the 29-bit identifier of a broadcast parameter group, made of a priority of 0 to 7 and the sender's
+/// address.
 #[must_use]
 pub const fn broadcast_id(pgn: u32, priority: u8, source: u8) -> Option<ExtendedId> {
     if priority > 7 || pgn > 0x3_FFFF {
@@ -52,14 +53,14 @@ pub struct Vdc2 {
     pub longitudinal: u8,
 }
 
-/// Not eight bytes.
+/// The frame does not have eight bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("VDC2 has {} bytes instead of 8", .0)]
 pub struct Vdc2Length(pub usize);
 
 impl Vdc2 {
-    /// The eight bytes.
+    /// Returns the eight bytes.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [yaw0, yaw1] = self.yaw_rate.to_le_bytes();
@@ -79,34 +80,34 @@ impl Vdc2 {
         Ok(Self { yaw_rate, lateral: u16::from_le_bytes([lateral0, lateral1]), longitudinal })
     }
 
-    /// The frame, in a driver's own type; `None` only if that type cannot hold it.
+    /// Returns the frame in a driver's own type; `None` only if that type cannot hold it.
     #[must_use]
     pub fn frame<F: Frame>(&self, source: u8) -> Option<F> {
         F::new(broadcast_id(VDC2_PGN, VDC2_PRIORITY, source)?, &self.emit())
     }
 
-    /// Whether a signal says "error".
+    /// Returns whether a signal reports an error.
     #[must_use]
     pub const fn has_error(&self) -> bool {
         self.yaw_rate == ERROR || self.lateral == ERROR || self.longitudinal == LONGITUDINAL_ERROR
     }
 
-    /// The yaw rate in rad/s, where the code is one.
+    /// Returns the yaw rate in rad/s, where the code stands for one.
     #[must_use]
     pub fn yaw_rate_rad_per_sec(&self) -> Option<f64> {
         (i64::from(self.yaw_rate) <= MAX_CODE).then(|| f64::from(self.yaw_rate) / 8192.0 - 3.92)
     }
 }
 
-/// What may be said of the rate.
+/// The validity of the rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {
     /// A value.
     Valid,
-    /// Not available: before the sensor is ready.
+    /// The rate is not available, because the sensor is not ready.
     NotAvailable,
-    /// In error.
+    /// The rate is in error.
     Error,
 }
 
@@ -123,7 +124,7 @@ impl Default for Vdc2Encoder {
 }
 
 impl Vdc2Encoder {
-    /// One sample: specific force forward, left, up. J1939 has no status beside a value, so a
+    /// Encodes one sample; the specific force points forward, left, up. J1939 has no status beside a value, so a
     /// value that is not valid, or does not fit, is not sent at all.
     pub fn encode(&mut self, rate: AngularRate, validity: Validity, force: &[SpecificForce; 3]) -> Vdc2 {
         let [forward, left, _] = force;
@@ -149,7 +150,7 @@ impl Vdc2Encoder {
     }
 }
 
-/// A code that is a value, or the error code.
+/// Returns a code if it stands for a value, else the error code.
 const fn value(code: i64) -> u16 {
     if code >= 0 && code <= MAX_CODE { code as u16 } else { ERROR }
 }

@@ -17,7 +17,7 @@ const DATA_BITS: u32 = 64;
 const BITS_PER_CHARACTER: u32 = 10;
 
 impl Periodic {
-    /// Bits of one frame with as many stuff bits as there can be, interframe space included.
+    /// Returns the bits of one frame with the most stuff bits possible, interframe space included.
     ///
     /// 13 bits are never stuffed (CRC delimiter, acknowledgement, end of frame, space); in the
     /// others, of which 34 or 54 are no data, there is at most one stuff bit for every four
@@ -32,7 +32,7 @@ impl Periodic {
         stuffed + 13 + (stuffed - 1) / 4
     }
 
-    /// Bits of the same frame as an SLCAN line, with a time stamp or without.
+    /// Returns the bits of the same frame as an SLCAN line, with a time stamp or without.
     #[must_use]
     pub const fn slcan_bits(&self, stamped: bool) -> u32 {
         let identifier = match self.id {
@@ -45,7 +45,7 @@ impl Periodic {
     }
 }
 
-/// How much of a bus or line the messages take, in 1/1000, rounded up.
+/// Returns the share of a bus or line that the messages take, in 1/1000, rounded up.
 #[must_use]
 pub fn per_mille(messages: &[Periodic], bits: impl Fn(&Periodic) -> u32, bits_per_second: u32) -> u32 {
     // Bits in 1000 s, exact for every period that divides 1,000,000 ms, rounded up for others.

@@ -8,7 +8,7 @@
 use embedded_can::nb::Can;
 use heapless::Deque;
 
-/// At most `N` frames.
+/// The frames that wait, `N` at most.
 #[derive(Debug, Clone)]
 pub struct TransmitQueue<F, const N: usize> {
     frames: Deque<F, N>,
@@ -23,7 +23,7 @@ impl<F, const N: usize> Default for TransmitQueue<F, N> {
 }
 
 impl<F, const N: usize> TransmitQueue<F, N> {
-    /// Empty.
+    /// Makes an empty queue.
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(N > 0, "a queue holds at least one frame") };
@@ -31,7 +31,7 @@ impl<F, const N: usize> TransmitQueue<F, N> {
     }
 
     /// Puts a frame at the end; the oldest one gives way.
-    pub fn push(&mut self, frame: F) {
+    pub fn enqueue(&mut self, frame: F) {
         if self.frames.is_full() {
             let _ = self.frames.pop_front();
             self.dropped = self.dropped.saturating_add(1);
@@ -40,7 +40,7 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         let _ = self.frames.push_back(frame);
     }
 
-    /// The oldest frame.
+    /// Returns the oldest frame.
     #[must_use]
     pub fn front(&self) -> Option<&F> {
         self.frames.front()
@@ -89,25 +89,25 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         taken
     }
 
-    /// Frames that wait.
+    /// Returns the number of frames that wait.
     #[must_use]
     pub fn len(&self) -> usize {
         self.frames.len()
     }
 
-    /// Whether none waits.
+    /// Returns whether no frame waits.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
 
-    /// Frames that gave way to newer ones.
+    /// Returns the number of frames that gave way to newer ones.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// Turns that ended with an error of the controller.
+    /// Returns the number of turns that ended with an error of the controller.
     #[must_use]
     pub fn errors(&self) -> u32 {
         self.errors

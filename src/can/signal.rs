@@ -35,7 +35,7 @@ pub struct BitField {
 }
 
 impl BitField {
-    /// Start bit and length as in a DBC file.
+    /// Makes a field from start bit and length, as a DBC file gives them.
     ///
     /// # Errors
     /// [`OutsideFrame`].
@@ -60,13 +60,13 @@ impl BitField {
         Ok(Self { shift, len, order, signed, bytes: end.div_ceil(8) })
     }
 
-    /// Bits of the value, 1 to 32.
+    /// Returns the number of bits of the value, 1 to 32.
     #[must_use]
     pub const fn bits(&self) -> u8 {
         self.len
     }
 
-    /// The bits as they are; `None` when the frame is too short.
+    /// Returns the bits as they are; `None` when the frame is too short.
     #[must_use]
     pub fn raw(&self, data: &[u8]) -> Option<u32> {
         if data.len() < usize::from(self.bytes) {
@@ -83,7 +83,7 @@ impl BitField {
         Some((word >> self.shift & ((1 << self.len) - 1)) as u32)
     }
 
-    /// The value, sign included.
+    /// Returns the value with its sign.
     #[must_use]
     pub fn value(&self, data: &[u8]) -> Option<i64> {
         let raw = i64::from(self.raw(data)?);

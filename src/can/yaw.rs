@@ -41,12 +41,12 @@ const ANGLE_PER_YAW_Q56: i128 = 3_669_863_129_102_502;
 /// Codes of 1e-5 deg/s per rate code, times 2^32.
 const SIGMA_PER_CODE_Q32: u64 = 183_346_494;
 
-/// Why bytes are no yaw message. The E2E check comes before.
+/// The reason why bytes are no yaw message. The E2E check comes before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum YawError {
-    /// Not eight bytes.
+    /// The frame does not have eight bytes.
     #[error("yaw message has {0} bytes instead of 8")]
     Length(usize),
     /// A source that this version does not know.
@@ -60,14 +60,14 @@ pub enum YawError {
 pub struct RateMessage {
     /// Code of the rate.
     pub rate: i32,
-    /// Where it comes from.
+    /// The origin of the rate.
     pub source: Source,
-    /// What it is worth.
+    /// The quality of the rate.
     pub quality: Quality,
 }
 
 impl RateMessage {
-    /// Eight bytes, the header still empty.
+    /// Returns the eight bytes with the header still empty.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b, c, d] = self.rate.to_le_bytes();
@@ -98,7 +98,7 @@ impl RateMessage {
         Ok(Self { rate: i32::from_le_bytes([a, b, c, d]), source, quality })
     }
 
-    /// The rate in deg/s; `None` when not available.
+    /// Returns the rate in deg/s; `None` when it is not available.
     #[must_use]
     pub fn deg_per_sec(&self) -> Option<f64> {
         (self.rate != RATE_NOT_AVAILABLE).then(|| f64::from(self.rate) * 1e-6)
@@ -111,12 +111,12 @@ impl RateMessage {
 pub struct AngleMessage {
     /// Code of the accumulated yaw.
     pub yaw: i32,
-    /// What is wrong at present.
+    /// The present faults.
     pub faults: Faults,
 }
 
 impl AngleMessage {
-    /// Eight bytes, the header still empty.
+    /// Returns the eight bytes with the header still empty.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b, c, d] = self.yaw.to_le_bytes();
@@ -134,7 +134,7 @@ impl AngleMessage {
         Ok(Self { yaw: i32::from_le_bytes([a, b, c, d]), faults: Faults(faults) })
     }
 
-    /// The angle in deg, -180 to below 180.
+    /// Returns the angle in deg, -180 to below 180.
     #[must_use]
     pub fn deg(&self) -> f64 {
         f64::from(self.yaw) * (360.0 / 4_294_967_296.0)
@@ -154,7 +154,7 @@ pub struct DetailMessage {
 }
 
 impl DetailMessage {
-    /// Eight bytes, the header still empty.
+    /// Returns the eight bytes with the header still empty.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b] = self.correction.to_le_bytes();
@@ -173,20 +173,20 @@ impl DetailMessage {
         Ok(Self { correction: i16::from_le_bytes([a, b]), sigma: u16::from_le_bytes([c, d]), latency })
     }
 
-    /// The latency in ms; `None` when unknown.
+    /// Returns the latency in ms; `None` when it is not known.
     #[must_use]
     pub fn latency_ms(&self) -> Option<f64> {
         (self.latency != LATENCY_UNKNOWN).then(|| f64::from(self.latency) * 0.5)
     }
 }
 
-/// Code of an accumulated yaw: nearest, turns left out.
+/// Returns the nearest code of an accumulated yaw, without whole turns.
 #[must_use]
 pub const fn encode_angle(yaw: Yaw) -> i32 {
     ((yaw.0 as i128 * ANGLE_PER_YAW_Q56 + (1 << 55)) >> 56) as i32
 }
 
-/// Code of an expected error; rounded up, so that it never claims more than is known.
+/// Returns the code of an expected error, rounded up, so that it never promises too much.
 #[must_use]
 pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
     let Some(AngularRate(sigma)) = sigma else { return SIGMA_UNKNOWN };
@@ -194,7 +194,7 @@ pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
     if code < SIGMA_UNKNOWN as u64 { code as u16 } else { SIGMA_UNKNOWN - 1 }
 }
 
-/// Code of a latency in microseconds; rounded up.
+/// Returns the code of a latency in microseconds, rounded up.
 #[must_use]
 pub const fn encode_latency(latency_us: Option<u32>) -> u8 {
     let Some(latency_us) = latency_us else { return LATENCY_UNKNOWN };

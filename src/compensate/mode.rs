@@ -1,6 +1,6 @@
 //! Which of a window's outputs are used, how often a window runs, and how late the rate goes out.
 
-use crate::window::WINDOW;
+use crate::model::window::WINDOW;
 use core::ops::Range;
 
 /// An estimate is used this many samples after its window's newest one, whatever the time the
@@ -19,13 +19,13 @@ impl Hop {
     /// Half a window: every sample is seen by two.
     pub const HALF: Self = Self(WINDOW as u8 / 2);
 
-    /// `None` outside the range: samples would be left without an estimate.
+    /// Returns `None` outside the range, where samples would be left without an estimate.
     #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples >= 1 && samples as usize <= WINDOW { Some(Self(samples)) } else { None }
     }
 
-    /// In samples.
+    /// Returns the number of samples.
     #[must_use]
     pub const fn samples(self) -> u32 {
         self.0 as u32
@@ -54,18 +54,18 @@ impl From<Hop> for u8 {
 pub struct Lag(u8);
 
 impl Lag {
-    /// At once.
+    /// The rate goes out at once.
     pub const NONE: Self = Self(0);
-    /// From here on no window changes a sample's estimate any more.
+    /// The lag from which on no window changes a sample's estimate.
     pub const MAX: Self = Self((WINDOW + DELAY as usize - 1) as u8);
 
-    /// `None` beyond [`Lag::MAX`]: waiting longer gains nothing.
+    /// Returns `None` beyond [`Lag::MAX`], where waiting longer gains nothing.
     #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples <= Self::MAX.0 { Some(Self(samples)) } else { None }
     }
 
-    /// In samples.
+    /// Returns the number of samples.
     #[must_use]
     pub const fn samples(self) -> usize {
         self.0 as usize
@@ -96,7 +96,7 @@ pub struct OutOfRange {
     high: u8,
 }
 
-/// How the estimate of a sample is chosen from the windows that cover it.
+/// The rule that chooses the estimate of a sample from the windows that cover it.
 ///
 /// The newest output of a window knows only the past and is the worst, those in the middle know
 /// both sides. `cargo gyronet evaluate --ablation` compares the modes.
@@ -116,7 +116,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Samples between two windows.
+    /// Returns the number of samples between two windows.
     #[must_use]
     pub const fn hop(self) -> u32 {
         match self {
@@ -126,13 +126,13 @@ impl Mode {
         }
     }
 
-    /// Samples from a window's newest one to the use of its estimate.
+    /// Returns the number of samples from a window's newest one to the use of its estimate.
     #[must_use]
     pub const fn delay(self) -> u32 {
         if self.hop() < DELAY { self.hop() } else { DELAY }
     }
 
-    /// The outputs of a window that are used, oldest first.
+    /// Returns the outputs of a window that are used, oldest first.
     #[must_use]
     pub const fn used(self) -> Range<usize> {
         match self {
@@ -144,7 +144,7 @@ impl Mode {
         }
     }
 
-    /// Samples after which no window changes an estimate any more.
+    /// Returns the number of samples after which no window changes an estimate any more.
     #[must_use]
     pub const fn settled_after(self) -> usize {
         WINDOW - 1 - self.used().start + self.delay() as usize

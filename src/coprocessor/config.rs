@@ -45,12 +45,12 @@ pub struct Config {
     pub fog: FogConfig,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
-    /// Whether a fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
+    /// A fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
     /// Otherwise they are sent from its first sample on.
     pub fog_expected: bool,
-    /// Whether somebody runs GyroNet. Without it no window is due, and the messages report damaged data.
+    /// The caller runs GyroNet. Without it no window is due, and the messages report damaged data.
     pub has_gyronet: bool,
-    /// Whether somebody runs FoGNet, likewise.
+    /// The caller runs FoGNet; without it, likewise.
     pub has_fognet: bool,
     /// The clock that `now` comes from.
     pub clock: Clock,

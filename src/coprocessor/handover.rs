@@ -25,7 +25,7 @@ impl Handover {
         Self { has_network, delay, due: None, out: None }
     }
 
-    /// Whether there is a network with good weights.
+    /// Returns whether there is a network with good weights.
     pub const fn has_network(&self) -> bool {
         self.has_network
     }
@@ -50,7 +50,7 @@ impl Handover {
         self.has_network
     }
 
-    /// Whether the sample after `tick` is the one that wants the estimate, which is not late yet.
+    /// Returns whether the sample after `tick` needs the estimate, which is not late yet.
     pub fn must_wait(&self, tick: u32, now: Micros) -> bool {
         self.out.is_some_and(|(end, until)| tick.wrapping_sub(end) + 1 >= self.delay && now.0 < until)
     }

@@ -30,12 +30,12 @@ impl Timeline {
         Ok(self.now)
     }
 
-    /// The shifted time of the clock, never before the newest one.
+    /// Returns the shifted time of the clock, never before the newest one.
     pub fn at(&self, clock: Micros) -> Micros {
         Micros(clock.0.saturating_add(self.shift_us)).min(END).max(self.now)
     }
 
-    /// The newest time.
+    /// Returns the newest time.
     pub const fn now(&self) -> Micros {
         self.now
     }

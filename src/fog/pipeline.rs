@@ -22,9 +22,9 @@ use crate::align::streams::{Fitted, Streams};
 use crate::estimate::YawEstimate;
 use crate::health::{Faults, Quality, Source, Status, count};
 use crate::model::fognet::FogEstimate;
+use crate::model::window::Features;
 use crate::sample::{FogSample, PERIOD_US, WheelSample};
 use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};
-use crate::window::Features;
 
 /// Increments in a row, equal to the one before, after which the gyro is stuck, if they last [`STUCK_US`]. A
 /// DSP-3000's noise in 10 ms is a hundred of its units, which repeats an increment once in four hundred, and four
@@ -106,14 +106,14 @@ impl FogPipeline {
     ///
     /// # Errors
     /// [`ClockError`]: the sample is a duplicate or out of order. It is counted and not used.
-    pub fn push(&mut self, now: Micros, mut sample: FogSample) -> Result<(), ClockError> {
+    pub fn add(&mut self, now: Micros, mut sample: FogSample) -> Result<(), ClockError> {
         let repeats = self.repeats.after(&sample);
         let stuck = repeats.are_stuck();
         if stuck {
             let [.., up] = &mut sample.increment;
             *up = None;
         }
-        self.streams.push_fog(now, sample).inspect_err(|_| count(&mut self.counters.misplaced, 1))?;
+        self.streams.add_fog(now, sample).inspect_err(|_| count(&mut self.counters.misplaced, 1))?;
         count(&mut self.counters.samples, 1);
         count(&mut self.counters.stuck, u32::from(stuck && !self.repeats.are_stuck()));
         self.repeats = repeats;
@@ -183,7 +183,7 @@ impl FogPipeline {
         self.corrector.deliver(number, estimate)
     }
 
-    /// Event counters since start.
+    /// Returns the event counters since the start.
     #[must_use]
     pub fn counters(&self) -> &FogCounters {
         &self.counters
@@ -226,7 +226,7 @@ struct Repeats {
 }
 
 impl Repeats {
-    /// The state after a further sample.
+    /// Returns the state after a further sample.
     fn after(self, sample: &FogSample) -> Self {
         let [.., newest] = sample.increment;
         if newest.is_none() || newest != self.newest {
@@ -244,7 +244,8 @@ impl Repeats {
     }
 }
 
-/// Left and right wheel of the rear axle, which is not steered; of the front one where it has none.
+/// Returns the left and right wheel of the rear axle, which is not steered, or of the front one where there is no
+/// other.
 fn rear(wheels: &WheelSample) -> Option<[WheelSpeed; 2]> {
     let [front_left, front_right, rear_left, rear_right] = wheels.speeds;
     Some([rear_left.or(front_left)?, rear_right.or(front_right)?])

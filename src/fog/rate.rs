@@ -15,7 +15,7 @@ pub struct IncrementRate {
 }
 
 impl IncrementRate {
-    /// Rate of a frame that turned by this much; saturates at the limits of [`AngularRate`].
+    /// Returns the rate of a frame that turned by this much, saturated at the limits of [`AngularRate`].
     pub fn rate(&mut self, turn: Angle) -> AngularRate {
         let codes = turn.0.saturating_mul(FRAMES).saturating_add(self.rest);
         let rate = codes.div_euclid(CODES).clamp(i32::MIN.into(), i32::MAX.into());
@@ -32,7 +32,7 @@ pub struct PseudoFog {
 }
 
 impl PseudoFog {
-    /// Turn of one frame at this rate; the sum of the turns is exact.
+    /// Returns the turn of one frame at this rate; the sum of the turns is exact.
     pub fn turn(&mut self, rate: AngularRate) -> Angle {
         let codes = i64::from(rate.0) * CODES + self.rest;
         self.rest = codes.rem_euclid(FRAMES);

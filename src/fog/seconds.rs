@@ -5,9 +5,9 @@
 //! angle that was turned in it is in no sum; so does a second that has inertial samples or wheel
 //! speeds in less than half of its frames.
 
+use crate::model::window;
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, WheelSpeed};
-use crate::window;
 
 /// Steps of a FoGNet window: a minute (section III-C of the paper).
 pub const STEPS: usize = 60;
@@ -17,7 +17,7 @@ pub const FEATURES: usize = 8;
 /// Frames in a step.
 pub const FRAMES: u32 = RATE_HZ;
 
-/// What one 10 ms frame adds to a second.
+/// The part of a second that one 10 ms frame adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogFrame {
@@ -39,7 +39,7 @@ pub struct Second {
     pub turn: Angle,
 }
 
-/// Why the window ended.
+/// The reason why the window ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -77,7 +77,8 @@ impl<const N: usize> Mean<N> {
         self.count += u32::from(codes.is_some());
     }
 
-    /// Means to the nearest code; `None` when they are of less than half a second's frames.
+    /// Returns the means to the nearest code and begins again; `None` when they are of less than half a second's
+    /// frames.
     fn take(&self) -> Option<[i32; N]> {
         let count = i64::from(self.count.max(1));
         // A mean of int32s fits an int32.
@@ -86,7 +87,7 @@ impl<const N: usize> Mean<N> {
 }
 
 impl SecondSums {
-    /// Before the first frame of a second.
+    /// The sums are empty.
     pub const ZERO: Self = Self { frames: 0, turn: 0, inertial: Mean::ZERO, wheels: Mean::ZERO };
 
     /// Takes a frame; returns the second that it completes.
@@ -94,7 +95,7 @@ impl SecondSums {
     /// # Errors
     /// [`Incomplete`] when the frame, or the second that it ends, is of no use; the next frame
     /// begins a new second.
-    pub fn push(&mut self, frame: &FogFrame) -> Result<Option<Second>, Incomplete> {
+    pub fn add(&mut self, frame: &FogFrame) -> Result<Option<Second>, Incomplete> {
         let Some(turn) = frame.turn else {
             *self = Self::ZERO;
             return Err(Incomplete::Gyro);
@@ -113,8 +114,8 @@ impl SecondSums {
     }
 }
 
-/// What stands in a window before there are [`STEPS`] seconds (Fig. 8 of the paper, which shows
-/// that there is a padding but not which).
+/// The filling of a window before there are [`STEPS`] seconds (Fig. 8 of the paper, which shows that there is a
+/// padding but not which).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Padding {
@@ -123,7 +124,7 @@ pub enum Padding {
     Repeat,
     /// The oldest second.
     Edge,
-    /// Nothing: no window before the first minute is over.
+    /// There is no padding, and no window before the first minute is over.
     None,
 }
 
@@ -136,7 +137,7 @@ pub struct Minute {
 }
 
 impl Minute {
-    /// No second yet.
+    /// The ring has no second yet.
     pub const EMPTY: Self =
         Self { ring: [Second { features: [0; FEATURES], turn: Angle::ZERO }; STEPS], next: 0, filled: 0 };
 
@@ -147,7 +148,7 @@ impl Minute {
     }
 
     /// Adds the newest second.
-    pub fn push(&mut self, second: Second) {
+    pub fn add(&mut self, second: Second) {
         if let Some(place) = self.ring.get_mut(self.next) {
             *place = second;
         }
@@ -155,19 +156,19 @@ impl Minute {
         self.filled = (self.filled + 1).min(STEPS);
     }
 
-    /// Seconds in it.
+    /// Returns the number of seconds.
     #[must_use]
     pub fn len(&self) -> usize {
         self.filled
     }
 
-    /// Whether there is none.
+    /// Returns whether there is no second.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.filled == 0
     }
 
-    /// The window, oldest second first, padded to [`STEPS`]; `None` where the padding gives none.
+    /// Returns the window, oldest second first, padded to [`STEPS`]; `None` where the padding gives none.
     #[must_use]
     pub fn window(&self, padding: Padding) -> Option<SecondsWindow<'_>> {
         let enough = self.filled == STEPS || self.filled > 0 && padding != Padding::None;
@@ -183,7 +184,7 @@ pub struct SecondsWindow<'m> {
 }
 
 impl<'m> SecondsWindow<'m> {
-    /// The seconds, oldest first: [`STEPS`] of them.
+    /// Returns the seconds, oldest first: [`STEPS`] of them.
     pub fn iter(&self) -> impl Iterator<Item = &'m Second> + use<'m> {
         let Self { minute: &Minute { ref ring, next, filled }, padding } = *self;
         let missing = STEPS - filled;

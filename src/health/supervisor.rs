@@ -21,18 +21,18 @@ pub struct Supervisor(AtomicU8);
 impl Supervisor {
     const ALL: u8 = Task::Tick as u8 | Task::Window as u8 | Task::Idle as u8;
 
-    /// No task has run.
+    /// Begins before any task has run.
     #[must_use]
     pub const fn new() -> Self {
         Self(AtomicU8::new(0))
     }
 
-    /// A task has done a whole turn.
+    /// Notes that a task has done a whole turn.
     pub fn report(&self, task: Task) {
         self.0.fetch_or(task as u8, Ordering::Relaxed);
     }
 
-    /// Whether every task has reported since this last said so; a new cycle begins then.
+    /// Returns true once every task has reported since it last did so; a new cycle begins then.
     pub fn complete(&self) -> bool {
         self.0.compare_exchange(Self::ALL, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok()
     }

@@ -11,19 +11,19 @@ pub struct BackgroundCheck<'w> {
 }
 
 impl<'w> BackgroundCheck<'w> {
-    /// At the first byte.
+    /// Begins at the first byte.
     #[must_use]
     pub fn new(blob: &Blob<'w>) -> Self {
         Self { content: blob.content, stored: blob.crc, digest: CRC.digest(), at: 0 }
     }
 
-    /// Bytes of one round.
+    /// Returns the number of bytes of one round.
     #[must_use]
     pub fn len(&self) -> usize {
         self.content.len()
     }
 
-    /// Whether there is nothing to check; weights are never empty.
+    /// Returns whether there is nothing to check; weights are never empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.content.is_empty()

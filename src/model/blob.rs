@@ -13,20 +13,20 @@
 pub use super::file::{BlobError, CRC, GYRONET, MAGIC, Normalisation, Topology, VERSION};
 
 use super::file::{Header, Reader, check_dense, check_rows, dense_len, header_len, layers_len};
+use crate::model::window::{FEATURES, WINDOW};
 use crate::nn::{bilstm::Layer, dense::Dense};
-use crate::window::{FEATURES, WINDOW};
 
 /// Units of GyroNet a direction (section III-B of the paper).
 pub const HIDDEN: usize = 60;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(FEATURES);
-/// What the header must say.
+/// The content that the header must have.
 pub const TOPOLOGY: Topology = [GYRONET, WINDOW as u16, FEATURES as u16, HIDDEN as u16, 2];
 
 /// A weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct Blob<'w> {
-    /// Where the weights come from: JSON.
+    /// The provenance of the weights: JSON.
     pub provenance: &'w str,
     /// One for each feature.
     pub normalisation: [Normalisation; FEATURES],
@@ -46,7 +46,7 @@ pub struct Blob<'w> {
     pub content: &'w [u8],
 }
 
-/// Bytes of a GyroNet file with `provenance` bytes of padded text.
+/// Returns the number of bytes of a GyroNet file with `provenance` bytes of padded text.
 #[must_use]
 pub const fn file_len(provenance: usize) -> usize {
     HEADER_LEN + provenance + layers_len(HIDDEN, FEATURES) + 2 * dense_len(2 * HIDDEN) + 4 + 4

@@ -18,7 +18,7 @@
 //! A direction is its input records, then its recurrent records, as [`crate::nn::lstm`] lays
 //! them out; a row of an output layer is its int16 weights, then bias and multiplier.
 
-use crate::nn::lstm::{Direction, ROW_LIMIT, row_bound};
+use crate::nn::lstm::{DirectionWeights, ROW_LIMIT, row_bound};
 use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
 
 /// First bytes of a weight file.
@@ -35,10 +35,10 @@ pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 #[cfg(target_endian = "big")]
 compile_error!("weights are read in place as little-endian words");
 
-/// What a file says that it is: network number, window, inputs, hidden units, layers.
+/// The shape that a file states: network number, window, inputs, hidden units, layers.
 pub type Topology = [u16; 5];
 
-/// Why a weight file is refused.
+/// The reason why a weight file is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -50,16 +50,16 @@ pub enum BlobError {
     /// A format version that this code does not read.
     #[error("weight file: format version {0}, this reads {VERSION}")]
     Version(u16),
-    /// Not the network that was asked for, or not its shape.
+    /// The file holds another network, or one of another shape.
     #[error(
         "weight file: network {} with window {}, {} inputs, {} units, {} layers is not {} ({}: {}, {}, {}, {})",
         .found[0], .found[1], .found[2], .found[3], .found[4],
         network_name(.expected), .expected[0], .expected[1], .expected[2], .expected[3], .expected[4]
     )]
     Topology {
-        /// As found.
+        /// The shape in the file.
         found: Topology,
-        /// As asked for.
+        /// The expected shape.
         expected: Topology,
     },
     /// Shorter or longer than its header and shape say.
@@ -104,31 +104,31 @@ fn network_name([network, ..]: &Topology) -> &'static str {
     if *network == FOGNET { "FoGNet" } else { "GyroNet" }
 }
 
-/// How a feature becomes a network input: `(code - offset) * multiplier / 2^31`, rounded.
+/// The scaling of a feature to a network input: `(code - offset) * multiplier / 2^31`, rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Normalisation {
-    /// In the feature's code.
+    /// The offset in the feature's code.
     pub offset: i32,
     /// Normalised Q10 per code, times 2^31.
     pub multiplier: i32,
 }
 
-/// Bytes before what a network of so many inputs adds.
+/// Returns the number of bytes before those that a network of so many inputs adds.
 pub(super) const fn header_len(inputs: usize) -> usize {
     28 + 8 * inputs
 }
 
-/// Bytes of one direction.
+/// Returns the number of bytes of one direction.
 pub(super) const fn direction_len(units: usize, inputs: usize) -> usize {
-    4 * (Direction::input_words(units, inputs) + Direction::recurrent_words(units))
+    4 * (DirectionWeights::input_words(units, inputs) + DirectionWeights::recurrent_words(units))
 }
 
-/// Bytes of two bidirectional layers.
+/// Returns the number of bytes of two bidirectional layers.
 pub(super) const fn layers_len(units: usize, inputs: usize) -> usize {
     2 * (direction_len(units, inputs) + direction_len(units, 2 * units))
 }
 
-/// Bytes of a row of an output layer.
+/// Returns the number of bytes of a row of an output layer.
 pub(super) const fn dense_len(columns: usize) -> usize {
     2 * columns + 8
 }
@@ -189,7 +189,7 @@ impl<const INPUTS: usize> Header<INPUTS> {
     }
 }
 
-/// Proves that no input up to `input_max` can overflow a gate's accumulator.
+/// Checks that no input up to `input_max` can overflow a gate's accumulator.
 pub(super) fn check_rows(layers: &[Layer<'_>; 2], input_max: i32, first: u8) -> Result<(), BlobError> {
     for ((l, layer), input_max) in (first..).zip(layers).zip([input_max, HIDDEN_MAX]) {
         for (d, direction) in (0..).zip([&layer.forward, &layer.backward]) {
@@ -204,13 +204,13 @@ pub(super) fn check_rows(layers: &[Layer<'_>; 2], input_max: i32, first: u8) -> 
     Ok(())
 }
 
-/// Proves that no hidden state can overflow the sum of an output's row.
+/// Checks that no hidden state can overflow the sum of an output's row.
 pub(super) fn check_dense(row: &Dense<'_>) -> Result<(), BlobError> {
     let sum: i64 = row.weights.iter().map(|w| i64::from(*w).abs() * i64::from(HIDDEN_MAX)).sum();
     if sum + i64::from(row.bias).abs() >= 1 << 31 { Err(BlobError::Scale) } else { Ok(()) }
 }
 
-/// Takes typed slices off the front of the file.
+/// A reader that takes typed slices off the front of the file.
 pub(super) struct Reader<'w> {
     bytes: &'w [u8],
     len: usize,
@@ -243,7 +243,7 @@ impl<'w> Reader<'w> {
         self.array().map(|bytes| i32::from_le_bytes(*bytes))
     }
 
-    /// `len` elements of T, in place.
+    /// Takes `len` elements of `T`, in place.
     pub fn slice<T: bytemuck::AnyBitPattern>(&mut self, len: usize) -> Result<&'w [T], BlobError> {
         let bytes = self.take(len * size_of::<T>())?;
         if !bytes.as_ptr().addr().is_multiple_of(4) {
@@ -257,7 +257,7 @@ impl<'w> Reader<'w> {
         Ok(text.trim_end_matches(' '))
     }
 
-    /// Two bidirectional layers.
+    /// Takes two bidirectional layers.
     pub fn layers(&mut self, units: usize, inputs: usize) -> Result<[Layer<'w>; 2], BlobError> {
         let mut layer = |inputs| {
             Ok(Layer { forward: self.direction(units, inputs)?, backward: self.direction(units, inputs)? })
@@ -265,13 +265,13 @@ impl<'w> Reader<'w> {
         Ok([layer(inputs)?, layer(2 * units)?])
     }
 
-    fn direction(&mut self, units: usize, inputs: usize) -> Result<Direction<'w>, BlobError> {
-        let input = self.slice(Direction::input_words(units, inputs))?;
-        let recurrent = self.slice(Direction::recurrent_words(units))?;
-        Direction::new(units, inputs, input, recurrent).ok_or(BlobError::Misaligned)
+    fn direction(&mut self, units: usize, inputs: usize) -> Result<DirectionWeights<'w>, BlobError> {
+        let input = self.slice(DirectionWeights::input_words(units, inputs))?;
+        let recurrent = self.slice(DirectionWeights::recurrent_words(units))?;
+        DirectionWeights::new(units, inputs, input, recurrent).ok_or(BlobError::Misaligned)
     }
 
-    /// A row of an output layer.
+    /// Takes a row of an output layer.
     pub fn dense(&mut self, columns: usize) -> Result<Dense<'w>, BlobError> {
         Ok(Dense { weights: self.slice(columns)?, bias: self.i32()?, multiplier: self.i32()? })
     }

@@ -18,7 +18,7 @@
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
 use super::input::load_step;
 use crate::fog::seconds::{STEPS, SecondsWindow};
-use crate::nn::bilstm::{self, Layer, Pass, Run, Way};
+use crate::nn::bilstm::{self, Direction, Layer, Pass, Run};
 use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};
 use crate::units::{Angle, AngularRate};
@@ -30,11 +30,11 @@ const ANGLE_TO_RATE: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
 /// Fraction bits of [`FogBlob::gains`].
 pub const GAIN_FRACTION_BITS: u32 = 31;
 
-/// What FoGNet made of a window.
+/// The result of a FoGNet window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogEstimate {
-    /// What the gyro turned too much in the window.
+    /// The error of the gyro's turn in the window.
     pub correction: Angle,
     /// The part of it that is linear in the gyro's increments.
     pub linear: Angle,
@@ -50,8 +50,8 @@ pub trait MinuteNetwork {
     fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
 }
 
-/// What is under way. FC2 takes the last step, and the way back of LSTM2's second layer begins with
-/// it: that is [`Stage::Last`]. `Idle` is zero, so that a state at rest needs no place in flash.
+/// The piece of the window that is next. FC2 takes the last step, and the way back of LSTM2's second layer begins
+/// with it: that is [`Stage::Last`]. `Idle` is zero, so that a state at rest needs no place in flash.
 #[derive(Debug, Clone)]
 #[repr(u8)]
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; they share its place")]
@@ -77,7 +77,7 @@ pub struct FogNetState {
 }
 
 impl FogNetState {
-    /// Nothing in it yet; a window leaves nothing for the next one either.
+    /// A fresh state; a window leaves nothing in it for the next one.
     pub const ZERO: Self = Self {
         input: [0; _],
         between: [0; _],
@@ -98,14 +98,14 @@ pub struct FogNet<'w, 's> {
 }
 
 impl<'w, 's> FogNet<'w, 's> {
-    /// A network over checked weights. A window that the state was at work on is dropped.
+    /// Makes a network over checked weights. A window that the state was working on is dropped.
     #[must_use]
     pub fn new(blob: FogBlob<'w>, state: &'s mut FogNetState) -> Self {
         state.stage = Stage::Idle;
         Self { blob, state }
     }
 
-    /// The weights that it runs on.
+    /// Returns the weights that it runs on.
     #[must_use]
     pub fn blob(&self) -> &FogBlob<'w> {
         &self.blob
@@ -132,8 +132,8 @@ impl<'w, 's> FogNet<'w, 's> {
         state.stage = Stage::First(Run::new(), Scratch::ZERO);
     }
 
-    /// Does a bounded piece of the window (two steps of one direction of one layer); returns the
-    /// estimate with the last one, `None` before that and when none is under way.
+    /// Runs a bounded piece of the window (two steps of one direction of one layer); returns the estimate with the
+    /// last one, `None` before that and when none is under way.
     pub fn advance(&mut self) -> Option<FogEstimate> {
         let Self { blob, state } = self;
         let FogNetState { input, between, f1, f2, stage, .. } = state;
@@ -167,8 +167,8 @@ impl<'w, 's> FogNet<'w, 's> {
             Stage::Last(second) => {
                 let [_, Layer { backward, .. }] = &blob.lstm2;
                 let between = &between[..STEPS * HIDDEN2];
-                Pass::first(Way::Backward, backward, between, second, |_, hidden| {
-                    *f2 = f2.wrapping_add(half(blob.fc2.weights, Way::Backward, hidden));
+                Pass::first(Direction::Backward, backward, between, second, |_, hidden| {
+                    *f2 = f2.wrapping_add(half(blob.fc2.weights, Direction::Backward, hidden));
                 });
                 state.stage = Stage::Idle;
                 Some(state.estimate(blob))
@@ -177,14 +177,14 @@ impl<'w, 's> FogNet<'w, 's> {
     }
 }
 
-/// What one direction's hidden state adds to a row over both.
-fn half(weights: &[i16], way: Way, hidden: &[u32]) -> i32 {
+/// Returns the part of a row's sum that one direction's hidden state makes.
+fn half(weights: &[i16], way: Direction, hidden: &[u32]) -> i32 {
     let (forward, backward) = weights.split_at_checked(weights.len() / 2).unwrap_or_default();
-    Dense::partial(if way == Way::Forward { forward } else { backward }, hidden)
+    Dense::partial(if way == Direction::Forward { forward } else { backward }, hidden)
 }
 
 impl FogNetState {
-    /// LSTM2's input, in the place of LSTM1's: f1 and the gyro.
+    /// Writes LSTM2's input, f1 and the gyro, over LSTM1's.
     fn load_second(&mut self, blob: &FogBlob<'_>) {
         let clamp = i32::from(blob.input_clamp);
         for step in 0..STEPS {

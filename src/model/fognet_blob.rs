@@ -31,19 +31,19 @@ pub const COLUMNS: usize = INPUTS + 1;
 pub const CORRECTION_SHIFT: u32 = 16;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8;
-/// What the header must say.
+/// The content that the header must have.
 pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2];
 
 /// A weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct FogBlob<'w> {
-    /// Where the weights come from: JSON.
+    /// The provenance of the weights: JSON.
     pub provenance: &'w str,
     /// One for each feature.
     pub normalisation: [Normalisation; INPUTS],
     /// Network inputs are clamped to +- this, Q10.
     pub input_clamp: i16,
-    /// What FC3, FC4 and all scales make of an increment: correction over increment, Q31.
+    /// The gain that FC3, FC4 and all scales give an increment: correction over increment, Q31.
     pub gains: &'w [i32],
     /// The correction that is there whatever the inputs: all biases of FC2, FC3 and FC4.
     pub offset: Angle,
@@ -59,7 +59,7 @@ pub struct FogBlob<'w> {
     pub crc: u32,
 }
 
-/// Bytes of a FoGNet file with `provenance` bytes of padded text.
+/// Returns the number of bytes of a FoGNet file with `provenance` bytes of padded text.
 #[must_use]
 pub const fn file_len(provenance: usize) -> usize {
     HEADER_LEN
@@ -93,14 +93,14 @@ impl<'w> FogBlob<'w> {
         Ok(Self { provenance, normalisation, input_clamp, gains, offset, lstm1, fc1, lstm2, fc2, crc })
     }
 
-    /// The correction that a whole sum of [`FogBlob::fc2`] makes, without the linear part.
+    /// Returns the correction that a whole sum of [`FogBlob::fc2`] makes, without the linear part.
     #[must_use]
     pub fn spread(&self, sum: i32) -> Angle {
         let product = i64::from(sum) * i64::from(self.fc2.multiplier) + (1 << (CORRECTION_SHIFT - 1));
         Angle(self.offset.0.saturating_add(product >> CORRECTION_SHIFT))
     }
 
-    /// Mean of [`FogBlob::gains`].
+    /// Returns the mean of [`FogBlob::gains`].
     #[must_use]
     pub fn mean_gain(&self) -> i32 {
         let sum: i64 = self.gains.iter().map(|gain| i64::from(*gain)).sum();

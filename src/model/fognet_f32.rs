@@ -42,13 +42,13 @@ pub struct FogLayerOutputs {
     pub f2: f32,
     /// FC3 of the gyro's normalised increments.
     pub f3: f32,
-    /// What the gyro turned too much, rad.
+    /// The error of the gyro's turn, rad.
     pub correction: f32,
-    /// What the vehicle turned, rad.
+    /// The turn of the vehicle, rad.
     pub prediction: f32,
 }
 
-/// Two bidirectional layers over a sequence.
+/// Runs two bidirectional layers over a sequence.
 fn two_layers<const I: usize, const H: usize, const W: usize>(
     weights: &[[LstmWeights<'_>; 2]; 2],
     x: &[[f32; I]; STEPS],
@@ -83,7 +83,7 @@ impl FogNetF32<'_> {
         FogLayerOutputs { normalised, f1, layer2_last, f2, f3, correction, prediction: turn - correction }
     }
 
-    /// What FC3, FC4 and the scales make of a step's increment: rad of correction per rad.
+    /// Returns the gain that FC3, FC4 and the scales give a step's increment: rad of correction per rad.
     fn gain(&self, step: usize) -> f32 {
         self.correction_scale * self.fc4.0[1] * self.fc3.0[step] / self.input_std[INPUTS - 1]
     }

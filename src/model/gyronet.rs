@@ -4,29 +4,29 @@
 use super::blob::{Blob, HIDDEN};
 use super::input::load_step;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
-use crate::nn::bilstm::{self, Pass, Run, Way};
-use crate::nn::lstm::{Direction, Scratch};
+use crate::model::window::{FEATURES, Features, WINDOW};
+use crate::nn::bilstm::{self, Direction, Pass, Run};
+use crate::nn::lstm::{DirectionWeights, Scratch};
 use crate::nn::{dense::Dense, exp2::times_exp2};
 use crate::units::AngularRate;
-use crate::window::{FEATURES, Features, WINDOW};
 use core::borrow::BorrowMut;
 
 /// Words of the hidden state of one direction.
 const HIDDEN_WORDS: usize = HIDDEN / 2;
 
 /// Words of the recurrent weights of one direction.
-const RECURRENT_WORDS: usize = Direction::recurrent_words(HIDDEN);
+const RECURRENT_WORDS: usize = DirectionWeights::recurrent_words(HIDDEN);
 
 /// Working memory of one window.
 #[derive(Debug, Clone)]
 pub struct GyroNetState {
     input: [u32; WINDOW * FEATURES / 2],
     layer1: [u32; WINDOW * HIDDEN],
-    /// All steps of a direction at once, so that each weight of its input is read once a window.
+    /// The projections of all steps of a direction, so that each weight of its input is read once a window.
     scratch: Scratch<HIDDEN, HIDDEN_WORDS, { WINDOW / 2 }>,
     /// The recurrent weights of the direction at work, which each step reads.
     recurrent: [u32; RECURRENT_WORDS],
-    /// Of the gyro error's row, then of the log scale's row.
+    /// The biases of the gyro error's row, then of the log scale's row.
     sums: [[i32; 2]; WINDOW],
     clamped_inputs: u16,
     /// A window that is not done.
@@ -35,8 +35,8 @@ pub struct GyroNetState {
 }
 
 impl GyroNetState {
-    /// Nothing in it yet; a window leaves nothing for the next one either. All of it is zero, so that it
-    /// needs no place in flash.
+    /// A fresh state; a window leaves nothing in it for the next one. All of it is zero, so that it needs no place
+    /// in flash.
     pub const ZERO: Self = Self {
         input: [0; _],
         layer1: [0; _],
@@ -58,7 +58,7 @@ pub struct GyroNet<'w, S = GyroNetState> {
 }
 
 impl<'w> GyroNet<'w> {
-    /// A network over checked weights.
+    /// Makes a network over checked weights.
     #[must_use]
     pub fn new(blob: Blob<'w>) -> Self {
         Self::with_state(blob, GyroNetState::ZERO)
@@ -66,7 +66,7 @@ impl<'w> GyroNet<'w> {
 }
 
 impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
-    /// A network over checked weights, in a state of the caller's. A window that it was at work on is
+    /// Makes a network over checked weights, in a state of the caller's. A window that it was working on is
     /// dropped.
     #[must_use]
     pub fn with_state(blob: Blob<'w>, mut state: S) -> Self {
@@ -74,7 +74,7 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
         Self { blob, state }
     }
 
-    /// The weights that it runs on.
+    /// Returns the weights that it runs on.
     #[must_use]
     pub fn blob(&self) -> &Blob<'w> {
         &self.blob
@@ -91,8 +91,8 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
         state.under_way = true;
     }
 
-    /// Does a bounded piece of the window (one direction of one layer, a third of it or less); returns
-    /// the estimate with the last one, `None` before that and when none is under way.
+    /// Runs a bounded piece of the window (one direction of one layer, a third of it or less); returns the estimate
+    /// with the last one, `None` before that and when none is under way.
     pub fn advance(&mut self) -> Option<Estimate> {
         let Self { blob, state } = self;
         let GyroNetState { input, layer1, scratch, recurrent, sums, clamped_inputs, run, under_way } =
@@ -104,7 +104,7 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
             let Some(sums) = sums.get_mut(step) else { return };
             for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
                 let (forward, backward) = row.weights.split_at_checked(HIDDEN).unwrap_or_default();
-                let weights = if way == Way::Forward { forward } else { backward };
+                let weights = if way == Direction::Forward { forward } else { backward };
                 *sum = sum.wrapping_add(Dense::partial(weights, hidden));
             }
         });
@@ -119,15 +119,15 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
         Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs })
     }
 
-    /// The newest sample's correction only, without a scale, and the clamped inputs. The backward half of layer 2
-    /// needs just its first step for that, which saves a third of the work; the result is the
-    /// last of [`WindowNetwork::estimate`]'s, bit for bit.
+    /// Returns the newest sample's correction without a scale, and the clamped inputs. The backward half of layer 2
+    /// needs just its first step for that, which saves a third of the work; the result is the last of
+    /// [`WindowNetwork::estimate`]'s, bit for bit.
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
         let clamped_inputs = self.load(window);
         let Self { blob: Blob { layers: [first, second], gyro_error: dense, .. }, state } = self;
         let GyroNetState { input, layer1, scratch, recurrent, .. } = state.borrow_mut();
         for (direction, way, offset) in
-            [(&first.forward, Way::Forward, 0), (&first.backward, Way::Backward, HIDDEN)]
+            [(&first.forward, Direction::Forward, 0), (&first.backward, Direction::Backward, HIDDEN)]
         {
             Pass::new(way).finish(direction, input, scratch, recurrent, |step, hidden| {
                 bilstm::store(layer1, step, offset, 2 * HIDDEN, HIDDEN, hidden);
@@ -140,9 +140,9 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
                 sum = sum.wrapping_add(Dense::partial(weights, hidden));
             }
         };
-        Pass::new(Way::Forward)
+        Pass::new(Direction::Forward)
             .finish(&second.forward, layer1, scratch, recurrent, |step, hidden| add(forward, step, hidden));
-        Pass::first(Way::Backward, &second.backward, layer1, scratch, |step, hidden| {
+        Pass::first(Direction::Backward, &second.backward, layer1, scratch, |step, hidden| {
             add(backward, step, hidden);
         });
         (AngularRate(dense.scale(sum)), clamped_inputs)

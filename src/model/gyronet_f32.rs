@@ -2,9 +2,9 @@
 
 use super::blob::HIDDEN;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
+use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::reference::{LstmWeights, dense, lstm};
 use crate::units::{AngularRate, SpecificForce};
-use crate::window::{FEATURES, Features, WINDOW};
 
 /// GyroNet's tensors, with the names and layouts of the checkpoint.
 #[derive(Debug, Clone, Copy)]

@@ -29,7 +29,7 @@ pub(super) fn load_step<const INPUTS: usize, const COLUMNS: usize>(
     clamped
 }
 
-/// (code - offset) * multiplier / 2^31 to nearest, saturated to 32 bits.
+/// Returns (code - offset) * multiplier / 2^31 to nearest, saturated to 32 bits.
 fn normalise(code: i32, n: Normalisation) -> i32 {
     let product = i64::from(code.saturating_sub(n.offset)) * i64::from(n.multiplier);
     ((product + (1 << 30)) >> 31).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32

@@ -44,7 +44,7 @@ pub fn saturate(x: i32) -> i32 {
     x.clamp(INPUT_MIN, INPUT_MAX)
 }
 
-/// Sigmoid of a saturated Q14 input. The upper half of the result is Q15.
+/// Returns the sigmoid of a saturated Q14 input. The upper half of the result is Q15.
 #[inline]
 #[must_use]
 pub fn sigmoid(x: i32) -> i32 {
@@ -53,7 +53,7 @@ pub fn sigmoid(x: i32) -> i32 {
     entry + i32::from(entry as i16) * fraction
 }
 
-/// Hyperbolic tangent of a saturated Q14 input. The upper half of the result is Q15.
+/// Returns the hyperbolic tangent of a saturated Q14 input. The upper half of the result is Q15.
 #[inline]
 #[must_use]
 pub fn tanh(x: i32) -> i32 {
@@ -87,13 +87,13 @@ const fn table<const LEN: usize>(is_tanh: bool, shift: u32, fraction_scale: u32)
     lines
 }
 
-/// Towards minus infinity, for values that fit 64 bits.
+/// Divides towards minus infinity, for values that fit 64 bits.
 const fn floor(x: f64) -> f64 {
     let whole = x as i64 as f64;
     if whole > x { whole - 1.0 } else { whole }
 }
 
-/// e^x at compile time: the series on x / 2^10, squared ten times; good to 1e-12 for |x| <= 16.
+/// Computes e^x at compile time: the series on x / 2^10, squared ten times; good to 1e-12 for |x| <= 16.
 const fn exp(x: f64) -> f64 {
     let small = x / 1024.0;
     let (mut term, mut sum, mut n) = (1.0, 1.0, 1.0);

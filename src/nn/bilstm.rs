@@ -7,21 +7,21 @@
 //! A sequence of an even number of steps with K values each lies in `K / 2` words a step; the
 //! two steps of a pair alternate word by word.
 
-use super::lstm::{self, Direction, Scratch};
+use super::lstm::{self, DirectionWeights, Scratch};
 
 /// A layer: forward and backward direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Layer<'w> {
     /// Forward in time.
-    pub forward: Direction<'w>,
+    pub forward: DirectionWeights<'w>,
     /// Backward in time.
-    pub backward: Direction<'w>,
+    pub backward: DirectionWeights<'w>,
 }
 
-/// Which way a direction goes.
+/// The order in which a direction takes its steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Way {
+pub enum Direction {
     /// First step first.
     Forward,
     /// Last step first.
@@ -31,14 +31,14 @@ pub enum Way {
 /// One direction's way through a sequence; [`Pass::advance`] takes it some pairs of steps further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pass {
-    way: Way,
+    way: Direction,
     done: usize,
 }
 
 impl Pass {
-    /// Before the first step.
+    /// Begins before the first step.
     #[must_use]
-    pub const fn new(way: Way) -> Self {
+    pub const fn new(way: Direction) -> Self {
         Self { way, done: 0 }
     }
 
@@ -46,10 +46,10 @@ impl Pass {
     /// number and hidden state (Q10) to `emit`; returns whether there are more.
     ///
     /// `input` is the whole sequence. `room` takes the direction's recurrent records for the length of
-    /// the pass, if it has their size ([`Direction::through`]).
+    /// the pass, if it has their size ([`DirectionWeights::through`]).
     pub fn advance<const U: usize, const W: usize, const P: usize>(
         &mut self,
-        direction: &Direction<'_>,
+        direction: &DirectionWeights<'_>,
         input: &[u32],
         scratch: &mut Scratch<U, W, P>,
         room: &mut [u32],
@@ -65,8 +65,8 @@ impl Pass {
         let Scratch { cell_state, hidden: [even, odd], projection } = scratch;
         let count = (pairs - self.done).min(P);
         let from = match self.way {
-            Way::Forward => self.done,
-            Way::Backward => pairs - self.done - count,
+            Direction::Forward => self.done,
+            Direction::Backward => pairs - self.done - count,
         };
         let columns = input.get(from * words..(from + count) * words);
         let Some((columns, projection)) = columns.zip(projection.get_mut(..count)) else { return false };
@@ -76,8 +76,8 @@ impl Pass {
         }
         for k in 0..count {
             let (pair, [first, second]) = match self.way {
-                Way::Forward => (k, [0, 1]),
-                Way::Backward => (count - 1 - k, [1, 0]),
+                Direction::Forward => (k, [0, 1]),
+                Direction::Backward => (count - 1 - k, [1, 0]),
             };
             let Some(projection) = projection.get(pair) else { break };
             let pair = from + pair;
@@ -91,19 +91,19 @@ impl Pass {
         self.done < pairs
     }
 
-    /// The first step of a pass alone, for whoever needs no other: half a pair. Hands its number
-    /// and hidden state to `emit`.
+    /// Runs the first step of a pass alone, for callers that need no other: half a pair. Passes its number and
+    /// hidden state to `emit`.
     pub fn first<const U: usize, const W: usize, const P: usize>(
-        way: Way,
-        direction: &Direction<'_>,
+        way: Direction,
+        direction: &DirectionWeights<'_>,
         input: &[u32],
         scratch: &mut Scratch<U, W, P>,
         emit: impl FnOnce(usize, &[u32; W]),
     ) {
         let words = direction.inputs();
         let (pair, first) = match way {
-            Way::Forward => (0, 0),
-            Way::Backward => (input.len().checked_div(words).unwrap_or(0).saturating_sub(1), 1),
+            Direction::Forward => (0, 0),
+            Direction::Backward => (input.len().checked_div(words).unwrap_or(0).saturating_sub(1), 1),
         };
         let Scratch { cell_state, hidden: [hidden, _], projection } = scratch;
         let columns = input.get(pair * words..(pair + 1) * words);
@@ -114,10 +114,10 @@ impl Pass {
         emit(2 * pair + first, hidden);
     }
 
-    /// All steps that are left.
+    /// Runs all steps that are left.
     pub fn finish<const U: usize, const W: usize, const P: usize>(
         mut self,
-        direction: &Direction<'_>,
+        direction: &DirectionWeights<'_>,
         input: &[u32],
         scratch: &mut Scratch<U, W, P>,
         room: &mut [u32],
@@ -127,7 +127,7 @@ impl Pass {
     }
 }
 
-/// Where word `column / 2` of `step` stands in a sequence of `columns` values a step.
+/// Returns the place of word `column / 2` of `step` in a sequence of `columns` values a step.
 #[inline]
 #[must_use]
 pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
@@ -153,13 +153,13 @@ pub struct Run {
 }
 
 impl Run {
-    /// Before the first step.
+    /// Begins before the first step.
     #[must_use]
     pub const fn new() -> Self {
-        Self { stage: 0, pass: Pass::new(Way::Forward) }
+        Self { stage: 0, pass: Pass::new(Direction::Forward) }
     }
 
-    /// Does the next piece; returns whether there are more.
+    /// Runs the next piece; returns whether there are more.
     ///
     /// `input` is the first layer's sequence, `between` takes the second one's; `room` is as in
     /// [`Pass::advance`]. `emit` gets layer 2's hidden states: which way, step, state.
@@ -170,12 +170,13 @@ impl Run {
         between: &mut [u32],
         scratch: &mut Scratch<U, W, P>,
         room: &mut [u32],
-        mut emit: impl FnMut(Way, usize, &[u32; W]),
+        mut emit: impl FnMut(Direction, usize, &[u32; W]),
     ) -> bool {
-        let (way, offset) = if self.stage.is_multiple_of(2) { (Way::Forward, 0) } else { (Way::Backward, U) };
+        let (way, offset) =
+            if self.stage.is_multiple_of(2) { (Direction::Forward, 0) } else { (Direction::Backward, U) };
         let [first, second] = layers.each_ref().map(|layer| match way {
-            Way::Forward => &layer.forward,
-            Way::Backward => &layer.backward,
+            Direction::Forward => &layer.forward,
+            Direction::Backward => &layer.backward,
         });
         let more = match self.stage {
             0 | 1 => self.pass.advance(first, input, scratch, room, |step, hidden| {
@@ -188,7 +189,11 @@ impl Run {
         };
         if !more {
             self.stage += 1;
-            self.pass = Pass::new(if self.stage.is_multiple_of(2) { Way::Forward } else { Way::Backward });
+            self.pass = Pass::new(if self.stage.is_multiple_of(2) {
+                Direction::Forward
+            } else {
+                Direction::Backward
+            });
         }
         self.stage < 4
     }

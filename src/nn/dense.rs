@@ -5,7 +5,7 @@
 pub struct Dense<'w> {
     /// Forward half, then backward half.
     pub weights: &'w [i16],
-    /// In accumulator units.
+    /// The bias in accumulator units.
     pub bias: i32,
     /// Output code = (accumulator * multiplier + half) / 2^[`Dense::SHIFT`].
     pub multiplier: i32,
@@ -15,7 +15,7 @@ impl Dense<'_> {
     /// Fraction bits of the multiplier.
     pub const SHIFT: u32 = 24;
 
-    /// Part of the sum that one direction's hidden state gives; add both and the bias.
+    /// Returns the part of the sum that one direction's hidden state gives; add both and the bias.
     ///
     /// `hidden` holds two units a word. The sum stays inside 32 bits: [`crate::model::Blob`]
     /// proves it for the weights at hand.
@@ -26,7 +26,7 @@ impl Dense<'_> {
         weights.iter().zip(hidden).fold(0, |sum: i32, (w, h)| sum.wrapping_add(i32::from(*w) * i32::from(*h)))
     }
 
-    /// The scaled output of a whole sum (bias included), rounded to nearest, saturated.
+    /// Returns the scaled output of a whole sum (bias included), rounded to nearest, saturated.
     #[must_use]
     pub fn scale(&self, sum: i32) -> i32 {
         let product = i64::from(sum) * i64::from(self.multiplier) + (1 << (Self::SHIFT - 1));

@@ -27,27 +27,27 @@ const MULTIPLIER_WORDS: usize = GATES / 2;
 /// Weights of one direction, in place. The lengths are checked once, here; the kernels rely on
 /// them.
 #[derive(Debug, Clone, Copy)]
-pub struct Direction<'w> {
+pub struct DirectionWeights<'w> {
     units: usize,
     inputs: usize,
     input: &'w [u32],
     recurrent: &'w [u32],
 }
 
-impl<'w> Direction<'w> {
-    /// Words of the input records.
+impl<'w> DirectionWeights<'w> {
+    /// Returns the number of words of the input records.
     #[must_use]
     pub const fn input_words(units: usize, inputs: usize) -> usize {
         units * (BIAS_WORDS + inputs)
     }
 
-    /// Words of the recurrent records.
+    /// Returns the number of words of the recurrent records.
     #[must_use]
     pub const fn recurrent_words(units: usize) -> usize {
         units * (Self::padded(units) + MULTIPLIER_WORDS)
     }
 
-    /// Columns of a recurrent record: the units, rounded up to a multiple of four.
+    /// Returns the number of columns of a recurrent record: the units, rounded up to a multiple of four.
     #[must_use]
     pub const fn padded(units: usize) -> usize {
         units.next_multiple_of(4)
@@ -69,36 +69,36 @@ impl<'w> Direction<'w> {
         }
     }
 
-    /// Hidden units.
+    /// Returns the number of hidden units.
     #[must_use]
     pub const fn units(&self) -> usize {
         self.units
     }
 
-    /// Input columns.
+    /// Returns the number of input columns.
     #[must_use]
     pub const fn inputs(&self) -> usize {
         self.inputs
     }
 
-    /// All input records.
+    /// Returns all input records.
     #[must_use]
     pub const fn input(&self) -> &'w [u32] {
         self.input
     }
 
-    /// All recurrent records.
+    /// Returns all recurrent records.
     #[must_use]
     pub const fn recurrent(&self) -> &'w [u32] {
         self.recurrent
     }
 
-    /// The same direction with its recurrent records in `room`: copied there if `load`, else there since
-    /// an earlier call. Where they do not fit exactly, they are read where they lie.
+    /// Returns the same direction with its recurrent records in `room`, where it copies them if `load`, else an
+    /// earlier call has. Where they do not fit exactly, they are read in place.
     ///
     /// A step reads every record once. Memory without wait states pays for the copy in two or three steps.
     #[must_use]
-    pub fn through<'a>(&self, room: &'a mut [u32], load: bool) -> Direction<'a>
+    pub fn through<'a>(&self, room: &'a mut [u32], load: bool) -> DirectionWeights<'a>
     where
         'w: 'a,
     {
@@ -108,7 +108,7 @@ impl<'w> Direction<'w> {
         if load {
             simd::copy(self.recurrent, room);
         }
-        Direction { recurrent: room, ..*self }
+        DirectionWeights { recurrent: room, ..*self }
     }
 
     fn input_records(&self) -> impl Iterator<Item = (&'w [u32], &'w [u32])> {
@@ -139,21 +139,25 @@ pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
 pub type Projection<const U: usize> = [[Accumulators; U]; 2];
 
 impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
-    /// All zero.
+    /// The state before the first step: all zero.
     pub const ZERO: Self = {
-        assert!(2 * W == Direction::padded(U), "W is half of U, U rounded up to a multiple of four");
+        assert!(2 * W == DirectionWeights::padded(U), "W is half of U, U rounded up to a multiple of four");
         Self { cell_state: [0; U], hidden: [[0; W]; 2], projection: [[[[0; GATES]; U]; 2]; P] }
     };
 }
 
-/// Bias and input products of all units, for a pair of consecutive steps each.
+/// Computes bias and input products of all units, for a pair of consecutive steps each.
 ///
 /// `x`: the inputs of all pairs, the two steps of a pair word by word in turn, as many words a pair as the
 /// direction has inputs.
 ///
 /// Does nothing when `x` or `U` does not fit the direction: a defect of the caller, which debug builds
 /// stop at.
-pub fn project<const U: usize>(direction: &Direction<'_>, x: &[u32], projection: &mut [Projection<U>]) {
+pub fn project<const U: usize>(
+    direction: &DirectionWeights<'_>,
+    x: &[u32],
+    projection: &mut [Projection<U>],
+) {
     let fits = x.len() == direction.inputs * projection.len() && U == direction.units;
     debug_assert!(fits);
     if fits {
@@ -161,20 +165,20 @@ pub fn project<const U: usize>(direction: &Direction<'_>, x: &[u32], projection:
     }
 }
 
-/// One recurrent step of all units: gates, cell state, hidden state.
+/// Computes one recurrent step of all units: gates, cell state, hidden state.
 ///
 /// `projection` belongs to this step. `previous` is the hidden state before it; `None` for the
 /// zero state that a sequence starts from.
 ///
 /// Does nothing when `U` or `W` does not fit the direction, as [`project`].
 pub fn step<const U: usize, const W: usize>(
-    direction: &Direction<'_>,
+    direction: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
-    let fits = U == direction.units && 2 * W == Direction::padded(U);
+    let fits = U == direction.units && 2 * W == DirectionWeights::padded(U);
     debug_assert!(fits);
     if fits {
         simd::step(direction, projection, previous, cell_state, hidden);
@@ -196,9 +200,9 @@ fn accumulate(acc: &mut Accumulators, rows: &[u32], x: impl Iterator<Item = u32>
     }
 }
 
-/// [`project`] as it is defined.
+/// Computes [`project`] as it is defined.
 pub fn project_portable<const U: usize>(
-    direction: &Direction<'_>,
+    direction: &DirectionWeights<'_>,
     x: &[u32],
     projection: &mut [Projection<U>],
 ) {
@@ -212,9 +216,9 @@ pub fn project_portable<const U: usize>(
     }
 }
 
-/// [`step`] as it is defined.
+/// Computes [`step`] as it is defined.
 pub fn step_portable<const U: usize, const W: usize>(
-    direction: &Direction<'_>,
+    direction: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],
@@ -243,8 +247,8 @@ fn set_hidden(hidden: &mut [u32], unit: usize, h: i16) {
     };
 }
 
-/// Equations 7 to 12 of the paper for one unit: accumulators and cell state to new cell state
-/// and hidden state.
+/// Computes equations 7 to 12 of the paper for one unit: accumulators and cell state to new cell state and hidden
+/// state.
 #[inline]
 pub(super) fn update(acc: &Accumulators, multipliers: &[u32; 2], cell_state: i32) -> (i32, i16) {
     let low = |pair: usize| scale(acc[2 * pair], unpack(multipliers[pair]).0);
@@ -265,22 +269,22 @@ pub(super) fn update(acc: &Accumulators, multipliers: &[u32; 2], cell_state: i32
     (cell_state, hidden as i16)
 }
 
-/// 32 x 16 bit product without its lower 16 bits.
+/// Returns the product of 32 x 16 bits without its lower 16 bits.
 #[inline]
 fn scale(value: i32, factor: i32) -> i32 {
     ((i64::from(value) * i64::from(factor)) >> 16) as i32
 }
 
-/// The upper half of a word.
+/// Returns the upper half of a word.
 #[inline]
 fn upper(word: i32) -> i32 {
     word >> 16
 }
 
-/// Largest magnitude that the accumulators of one unit can reach, for inputs up to `input_max`
-/// and any hidden state: rows i, f, g, o.
+/// Returns the largest magnitude that the accumulators of one unit can reach, for inputs up to `input_max` and any
+/// hidden state: rows i, f, g, o.
 #[must_use]
-pub fn row_bound(direction: &Direction<'_>, unit: usize, input_max: i32) -> [i64; GATES] {
+pub fn row_bound(direction: &DirectionWeights<'_>, unit: usize, input_max: i32) -> [i64; GATES] {
     let mut bound = [0i64; GATES];
     let records = direction.input_records().nth(unit).zip(direction.recurrent_records().nth(unit));
     let Some(((bias, input), (recurrent, _))) = records else { return bound };
@@ -303,5 +307,5 @@ pub fn row_bound(direction: &Direction<'_>, unit: usize, input_max: i32) -> [i64
     bound
 }
 
-/// What [`row_bound`] must stay below: low rows fill an int32, 256 times a high row does.
+/// The limit of [`row_bound`]: low rows fill an int32, 256 times a high row does.
 pub const ROW_LIMIT: [i64; GATES] = [1 << 31, 1 << 23, 1 << 31, 1 << 23];

@@ -52,13 +52,13 @@ pub fn lstm<const I: usize, const H: usize, const W: usize>(
     }
 }
 
-/// A fully-connected layer of one output: `weight` (I) and `bias` over `x` (I).
+/// Computes a fully-connected layer of one output: `weight` (I) and `bias` over `x` (I).
 #[must_use]
 pub fn dense(weight: &[f32], bias: f32, x: &[f32]) -> f32 {
     weight.iter().zip(x).fold(bias, |sum, (w, x)| sum + w * x)
 }
 
-/// The logistic function, 1 / (1 + e^-x).
+/// Returns the logistic function, 1 / (1 + e^-x).
 #[must_use]
 pub fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-x))

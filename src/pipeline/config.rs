@@ -3,31 +3,31 @@
 use crate::bias::{EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
 use crate::mounting::{Levelling, Rotation};
-use crate::uncertainty::UncertaintyConfig;
+use crate::pipeline::uncertainty::UncertaintyConfig;
 
 /// Everything that can be set about the way from sample to rate.
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineConfig {
-    /// How the board sits in the vehicle.
+    /// The rotation of the board in the vehicle.
     pub mounting: Rotation,
-    /// When the accelerometer corrects that.
+    /// The condition under which the accelerometer corrects that.
     pub levelling: Levelling,
     /// Limits of static initialisation.
     pub static_init: StaticConfig,
-    /// What becomes of the Earth's rotation.
+    /// The treatment of the Earth's rotation.
     pub earth_rate: EarthRate,
     /// Zero-rate updates; without them static initialisation is all.
     pub zero_rate: Option<ZeroRateConfig>,
     /// Standing still without wheels.
     pub quiet: QuietConfig,
-    /// From estimates to rates.
+    /// The way from estimates to rates.
     pub compensate: CompensateConfig,
-    /// What a rate is said to be worth.
+    /// The model of a rate's expected error.
     pub uncertainty: UncertaintyConfig,
 }
 
 impl PipelineConfig {
-    /// For a MEMS part on a car, x forward, y left, z up.
+    /// The configuration of a MEMS part on a car, x forward, y left, z up.
     pub const DEFAULT: Self = Self {
         mounting: Rotation::IDENTITY,
         levelling: Levelling::DEFAULT,

@@ -30,7 +30,7 @@ impl Pipeline {
         let judged = if self.state.wheels.standstill() == Some(Standstill::Moving) {
             self.state.static_init.refuse_wheels().map(Err)
         } else if frame.sample.validity.is_good() {
-            self.state.static_init.process(&frame.sample)
+            self.state.static_init.add(&frame.sample)
         } else {
             // The reading says nothing about the bias; the gap it leaves has restarted the initialisation.
             None

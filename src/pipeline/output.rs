@@ -3,16 +3,16 @@
 use crate::bias::StaticError;
 use crate::compensate::{Implausible, Settled};
 use crate::estimate::VehicleSample;
+use crate::model::window::{Features, WINDOW};
 use crate::units::Yaw;
-use crate::window::{Features, WINDOW};
 
-/// What [`crate::estimate::YawEstimate::yaw`] lacks to be the sum of the best estimates.
+/// The part that [`crate::estimate::YawEstimate::yaw`] lacks to be the sum of the best estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Owed {
-    /// What the prompt rates lack: revisions that are not carried yet.
+    /// The part that the prompt rates lack: revisions that are not carried yet.
     pub prompt: Yaw,
-    /// What the navigation rates lack: those, and the samples that wait for their turn.
+    /// The part that the navigation rates lack: those, and the samples that wait for their turn.
     pub navigation: Yaw,
 }
 
@@ -28,7 +28,7 @@ pub struct DueWindow {
 /// The results of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Output {
-    /// Both rates, with all that is sent beside them, for [`crate::can::encoder::CanEncoder`].
+    /// Both rates, and all else that is sent, for [`crate::can::encoder::CanEncoder`].
     pub vehicle: VehicleSample,
     /// The sample whose estimate is final with this one.
     pub settled: Option<Settled>,

@@ -60,7 +60,7 @@ impl Pipeline {
         }
     }
 
-    /// Everything that is wrong with this sample.
+    /// Returns everything that is wrong with this sample.
     fn faults(&self, sample: &ImuSample) -> Faults {
         let contradicted = self.zero_rate().is_some_and(ZeroRate::contradicted);
         self.state

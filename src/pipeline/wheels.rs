@@ -19,12 +19,12 @@ impl Wheels {
         self.newest = Some(wheels);
     }
 
-    /// Whether the vehicle stands; `None` where there are no wheels.
+    /// Returns whether the vehicle stands; `None` where there are no wheels.
     pub fn standstill(&self) -> Option<Standstill> {
         self.newest.map(|wheels| wheels.standstill)
     }
 
-    /// Whether a wheel that has had a speed has none now, or none has ever had one.
+    /// Returns whether a wheel that has had a speed has none now, or none has ever had one.
     pub fn are_silent(&self) -> bool {
         let Some(WheelSample { speeds, .. }) = self.newest else { return false };
         let lost = |(speed, seen): (&Option<_>, bool)| seen && speed.is_none();

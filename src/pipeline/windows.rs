@@ -3,7 +3,7 @@
 use super::DueWindow;
 use crate::health::Faults;
 use crate::model::Estimate;
-use crate::window::{Features, Window};
+use crate::model::window::{Features, Window};
 
 /// The samples of the next window and the state of the last one.
 #[derive(Debug, Clone, Default)]
@@ -19,8 +19,8 @@ pub(super) struct Windows {
 
 impl Windows {
     /// Adds a good sample.
-    pub fn push(&mut self, features: Features) {
-        self.window.push(features);
+    pub fn add(&mut self, features: Features) {
+        self.window.add(features);
         self.since += 1;
     }
 
@@ -69,12 +69,12 @@ impl Windows {
         (self.accepted, self.faults) = (false, fault);
     }
 
-    /// Whether an estimate is in use.
+    /// Returns whether an estimate is in use.
     pub fn is_accepted(&self) -> bool {
         self.accepted
     }
 
-    /// The fault of the newest estimate.
+    /// Returns the fault of the newest estimate.
     pub fn faults(&self) -> Faults {
         self.faults
     }

@@ -7,12 +7,12 @@
 
 use heapless::Vec;
 
-/// What a framed protocol must say of itself.
+/// The properties of a framed protocol.
 pub trait Protocol {
     /// Bytes that tell whether a frame begins with them, and how long it is.
     const HEADER: usize;
-    /// Length of the frame that begins with these [`Protocol::HEADER`] bytes, no less than they
-    /// are themselves; `None`: none does.
+    /// Returns the length of the frame that begins with these [`Protocol::HEADER`] bytes, at least their own;
+    /// `None` when none does.
     fn length(header: &[u8]) -> Option<usize>;
     /// Checks a whole frame's checksum.
     fn check(frame: &[u8]) -> bool;
@@ -24,8 +24,8 @@ pub struct Framer<P, const N: usize> {
     buffer: Vec<u8, N>,
     /// Bytes of `buffer` that belonged to the frame handed out last.
     used: usize,
-    /// With fewer bytes than this there is nothing new to be seen in `buffer`: a header is
-    /// looked at once, not at every byte. 0 while a frame is out.
+    /// The number of bytes in `buffer` below which there is nothing new to see: a header is looked at once, not at
+    /// every byte. 0 while a frame is out.
     needed: usize,
     bad_checksums: u32,
     skipped: u32,
@@ -33,7 +33,7 @@ pub struct Framer<P, const N: usize> {
 }
 
 impl<P: Protocol, const N: usize> Framer<P, N> {
-    /// Nothing received yet.
+    /// Begins before the first sample.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -48,7 +48,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
 
     /// Takes one byte. Call [`Framer::next_frame`] until `None` before the next one.
     #[inline]
-    pub fn push(&mut self, byte: u8) {
+    pub fn receive(&mut self, byte: u8) {
         if self.used > 0 {
             self.release();
         }
@@ -60,26 +60,26 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         }
     }
 
-    /// The next intact frame, if one is complete.
+    /// Returns the next intact frame, if one is complete.
     pub fn next_frame(&mut self) -> Option<&[u8]> {
         if self.is_waiting() { None } else { self.search() }
     }
 
-    /// Whether [`Framer::next_frame`] has nothing to give before more bytes come: a caller that
-    /// asks this first spends a few instructions on most bytes.
+    /// Returns whether [`Framer::next_frame`] has nothing to return before more bytes come. A caller that asks this
+    /// first spends a few instructions on most bytes.
     #[inline]
     #[must_use]
     pub fn is_waiting(&self) -> bool {
         self.buffer.len() < self.needed
     }
 
-    /// Candidates whose checksum did not fit.
+    /// Returns the number of candidates whose checksum did not fit.
     #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.bad_checksums
     }
 
-    /// Bytes that belonged to no intact frame.
+    /// Returns the number of bytes that belonged to no intact frame.
     #[must_use]
     pub fn skipped(&self) -> u32 {
         self.skipped

@@ -23,12 +23,12 @@ const CHUNK: usize = 128;
 /// Bytes that one call of [`Serial::next_sample`] reads at most.
 const MAX_READ: usize = 1024;
 
-/// What a dialogue wants done.
+/// The action that a dialogue asks for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Action {
     /// Send these bytes.
     Send(Vec<u8, MAX_SENT>),
-    /// Nothing; poll again when bytes have come or time has passed.
+    /// There is nothing to do; poll again when bytes have come or time has passed.
     Wait,
     /// The part sends what it should.
     Done,
@@ -37,32 +37,32 @@ pub enum Action {
 /// A dialogue with a part: bytes and the time in, messages to send out. It ends after a bounded
 /// time, whatever the part does.
 pub trait Dialogue {
-    /// Why it has ended without a part that does as it should.
+    /// The reason why it has ended without a part that is set up.
     type Error: core::error::Error;
 
     /// Takes one byte from the part.
-    fn push(&mut self, byte: u8);
+    fn receive(&mut self, byte: u8);
 
-    /// What is to be done at `now`.
+    /// Returns the next action at `now`.
     ///
     /// # Errors
     /// Why the dialogue is over; again at each call.
     fn poll(&mut self, now: Micros) -> Result<Action, Self::Error>;
 }
 
-/// What can go wrong on a line: the port or the part.
+/// The error of a line: of the port or of the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SerialError<P, E> {
     /// The port failed: an overrun, a framing error.
     #[error("the serial port failed: {0:?}")]
     Port(P),
-    /// What came over it, or did not, is wrong.
+    /// The part's data, or their absence, are wrong.
     #[error(transparent)]
     Part(E),
 }
 
-/// Leads a dialogue to its end. Time is counted by `delay`.
+/// Runs a dialogue to its end. `delay` counts the time.
 ///
 /// # Errors
 /// [`SerialError::Port`] at once, [`SerialError::Part`] when the dialogue gives up.
@@ -81,7 +81,7 @@ pub fn configure<PORT: Read + Write + ReadReady, D: Dialogue>(
             Action::Wait => {
                 let mut chunk = [0; CHUNK];
                 for byte in receive(port, &mut chunk).map_err(SerialError::Port)? {
-                    dialogue.push(*byte);
+                    dialogue.receive(*byte);
                 }
                 delay.delay_ms(POLL_MS);
                 now.0 += u64::from(POLL_MS) * 1_000;
@@ -98,18 +98,18 @@ pub struct Serial<PORT, PART> {
 }
 
 impl<PORT, PART> Serial<PORT, PART> {
-    /// A part that sends what it should, and its port.
+    /// Makes a source of a part that sends what it should, and its port.
     #[must_use]
     pub const fn new(port: PORT, part: PART) -> Self {
         Self { port, part }
     }
 
-    /// The part, for its counters.
+    /// Returns the part, for its counters.
     pub const fn part(&self) -> &PART {
         &self.part
     }
 
-    /// Port and part back.
+    /// Returns port and part.
     pub fn destroy(self) -> (PORT, PART) {
         (self.port, self.part)
     }
@@ -126,7 +126,7 @@ impl<PORT: Read + ReadReady, PART: ByteSource> Source for Serial<PORT, PART> {
                 return Some(sample.map_err(SerialError::Part));
             }
             match receive(&mut self.port, &mut [0]) {
-                Ok(&[byte]) => self.part.push(byte),
+                Ok(&[byte]) => self.part.receive(byte),
                 Ok(_) => return None,
                 Err(error) => return Some(Err(SerialError::Port(error))),
             }
@@ -135,7 +135,7 @@ impl<PORT: Read + ReadReady, PART: ByteSource> Source for Serial<PORT, PART> {
     }
 }
 
-/// What waits at the port, as much of it as there is room for.
+/// Reads the bytes that wait at the port, as many as there is room for.
 fn receive<'a, PORT: Read + ReadReady>(port: &mut PORT, to: &'a mut [u8]) -> Result<&'a [u8], PORT::Error> {
     let count = if port.read_ready()? { port.read(to)? } else { 0 };
     Ok(to.get(..count).unwrap_or_default())

@@ -8,7 +8,7 @@ use crate::store::{Calibration, Level, Mounting};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};
 
-/// What is to be found.
+/// The result that a calibration looks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Task {
@@ -18,7 +18,7 @@ pub enum Task {
     Mounting,
 }
 
-/// Why a calibration has found nothing.
+/// The reason why a calibration has found nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -34,11 +34,11 @@ pub enum CalibrationFault {
     NotGravity(f32),
 }
 
-/// How a calibration goes.
+/// The progress of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
-    /// None was asked for.
+    /// No calibration was requested.
     #[default]
     Idle,
     /// Collecting samples.
@@ -63,14 +63,14 @@ impl Calibrator {
         Self { task, still: StaticInit::new(limits) }
     }
 
-    /// What it looks for.
+    /// Returns the calibration that is under way.
     #[must_use]
     pub const fn task(&self) -> Task {
         self.task
     }
 
     /// Takes a sample; with the last one enters what was found into `calibration`.
-    pub fn process(
+    pub fn add(
         &mut self,
         sample: &ImuSample,
         mounting: &Mounting,
@@ -79,7 +79,7 @@ impl Calibrator {
         if !sample.validity.is_good() {
             return Some(Err(CalibrationFault::Clipped));
         }
-        let judged = self.still.process(sample)?;
+        let judged = self.still.add(sample)?;
         Some(judged.map_err(fault).and_then(|rest| {
             match self.task {
                 Task::Static => calibration.add_bias(rest.angular_rate, sample.temperature),
@@ -102,7 +102,7 @@ fn fault(error: StaticError) -> CalibrationFault {
     })
 }
 
-/// Roll and pitch that gravity shows, after the configured rotation.
+/// Returns the roll and pitch that gravity shows, after the configured rotation.
 fn level(force: [SpecificForce; 3], mounting: &Mounting) -> Result<Level, CalibrationFault> {
     // The angles have been checked to be finite.
     let rotation = mounting.rotation().unwrap_or(Rotation::IDENTITY);

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Bytes of a source file's path that are kept: its end.
 pub const FILE: usize = 24;
 
-/// Why the image stopped.
+/// The reason why the image stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -27,7 +27,7 @@ pub enum CrashKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Crash {
-    /// Why the image stopped.
+    /// The reason why the image stopped.
     pub kind: CrashKind,
     /// The program counter at a fault, or the line of a panic; 0 where neither is known.
     pub place: u32,
@@ -44,7 +44,7 @@ pub struct Crash {
 }
 
 impl Crash {
-    /// The end of the source file's path.
+    /// Returns the end of the source file's path.
     #[must_use]
     pub fn file(&self) -> &str {
         let text = core::str::from_utf8(&self.file).unwrap_or_default();

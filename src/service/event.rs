@@ -13,7 +13,7 @@ pub const KEPT: usize = 32;
 /// Events of one page.
 pub const PAGE: usize = 8;
 
-/// Why the processor has started, as its reset flags say (RM0090 7.3.21).
+/// The cause of the processor's start, as its reset flags report it (RM0090 7.3.21).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -34,7 +34,7 @@ pub enum ResetCause {
     LowPower,
 }
 
-/// Why a part on SPI gives no samples.
+/// The reason why a part on SPI gives no samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -47,16 +47,16 @@ pub enum SensorFault {
     Identity(u8),
     /// A register does not hold what was written.
     Setting {
-        /// Of the register.
+        /// The address of the register.
         bank: u8,
-        /// In the bank.
+        /// The address in the bank.
         address: u8,
-        /// What it holds.
+        /// The bits that it holds.
         got: u8,
     },
 }
 
-/// What can happen.
+/// The kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -101,18 +101,18 @@ pub struct Event {
     pub number: u32,
     /// 10 ms steps of the sensor's time.
     pub tick: u32,
-    /// What.
+    /// The event.
     pub kind: EventKind,
 }
 
 /// A part of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LogPage {
-    /// In order.
+    /// The events in order.
     pub events: Vec<Event, PAGE>,
     /// Events since the start.
     pub total: u32,
-    /// Of those asked for, how many were overwritten before.
+    /// The number of requested events that were overwritten before.
     pub lost: u32,
 }
 
@@ -124,14 +124,14 @@ pub struct EventLog {
 }
 
 impl EventLog {
-    /// Nothing has happened.
+    /// Makes an empty log.
     #[must_use]
     pub const fn new() -> Self {
         Self { events: Deque::new(), total: 0 }
     }
 
     /// Notes an event, and with feature `defmt` logs it.
-    pub fn push(&mut self, tick: u32, kind: EventKind) {
+    pub fn record(&mut self, tick: u32, kind: EventKind) {
         self.total = self.total.saturating_add(1);
         if self.events.is_full() {
             self.events.pop_front();
@@ -143,7 +143,7 @@ impl EventLog {
         let _ = self.events.push_back(event);
     }
 
-    /// The events after number `after`, a page of them.
+    /// Returns a page of the events after number `after`.
     #[must_use]
     pub fn page(&self, after: u32) -> LogPage {
         let oldest = self.events.front().map_or(1, |event| event.number);

@@ -7,15 +7,15 @@ use serde::{Serialize, de::DeserializeOwned};
 
 /// Most bytes of a message.
 pub const MAX_MESSAGE: usize = 320;
-/// With its number and checksum.
+/// The longest content, with its number and checksum.
 const MAX_CONTENT: usize = MAX_MESSAGE + 5;
-/// With what COBS adds (a byte for each 254 begun) and the zeros around it.
+/// The longest frame, with the bytes that COBS adds (one for each 254 begun) and the zeros around it.
 pub const MAX_FRAME: usize = MAX_CONTENT + MAX_CONTENT / 254 + 1 + 2;
 
 /// A frame, ready for the line.
 pub type Frame = Vec<u8, MAX_FRAME>;
 
-/// Why what stood between two zeros is no message.
+/// The reason why the bytes between two zeros are no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -23,7 +23,7 @@ pub enum FrameError {
     /// Longer than any frame.
     #[error("service frame: too long")]
     TooLong,
-    /// Not COBS.
+    /// The bytes are not COBS.
     #[error("service frame: not COBS")]
     Encoding,
     /// The checksum does not fit.
@@ -46,7 +46,7 @@ pub struct Deframer {
 }
 
 impl Deframer {
-    /// Nothing received yet.
+    /// Begins before the first sample.
     #[must_use]
     pub const fn new() -> Self {
         Self { content: Vec::new(), state: DecoderState::Idle, failed: None }
@@ -54,7 +54,7 @@ impl Deframer {
 
     /// Takes one byte. With the last one of a frame returns its number and message, or why it
     /// has none.
-    pub fn push<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<(u8, M), FrameError>> {
+    pub fn receive<M: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<(u8, M), FrameError>> {
         if byte == 0 {
             let idle = matches!(self.state, DecoderState::Idle) && self.failed.is_none();
             let finished = (!idle).then(|| self.finish(byte));
@@ -105,7 +105,7 @@ impl Default for Deframer {
     }
 }
 
-/// A message as a frame; `None` when it is longer than [`MAX_MESSAGE`].
+/// Encodes a message as a frame; `None` when it is longer than [`MAX_MESSAGE`].
 #[inline(never)]
 pub fn emit<M: Serialize>(number: u8, message: &M) -> Option<Frame> {
     let mut content = [0; MAX_CONTENT];

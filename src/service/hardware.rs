@@ -3,7 +3,7 @@
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// Why the board runs on its internal oscillator of 16 MHz, which is too inexact for CAN.
+/// The reason why the board runs on its internal oscillator of 16 MHz, which is too inexact for CAN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -23,7 +23,7 @@ pub enum ClockFault {
     Pll,
 }
 
-/// Why the CAN controller does not take part in the bus.
+/// The reason why the CAN controller does not take part in the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -3,33 +3,33 @@
 use super::calibrate::{State, Task};
 use super::event::{CanFault, ClockFault, Crash, LogPage, ResetCause, SensorFault};
 use crate::fog::FogCounters;
-use crate::health::{Counters, InputCounters, Status, WatchCounters};
+use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Calibration, Configuration, Slot, StoreError};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Of the messages; raised when one changes.
+/// The version of the messages; it is raised when one changes.
 pub const PROTOCOL: u8 = 5;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
-/// What is asked.
+/// The requests.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large ones on; one exists at a time")]
 pub enum Request {
-    /// What the board is and how it is.
+    /// The board's identity and state.
     Info,
     /// The configuration.
     GetConfiguration,
     /// A new configuration.
     SetConfiguration {
-        /// Of its layout.
+        /// The version of its layout.
         version: u8,
         /// Whole.
         configuration: Configuration,
     },
-    /// What is known of the sensor.
+    /// The calibration.
     GetCalibration,
     /// Something to do about it.
     Calibrate(Calibrate),
@@ -38,11 +38,11 @@ pub enum Request {
         /// 0 for all.
         after: u32,
     },
-    /// All counters.
+    /// The counters.
     Counters,
     /// A weight file will come.
     WeightsBegin {
-        /// Of the whole file.
+        /// The CRC-32 of the whole file.
         length: u32,
     },
     /// A part of it.
@@ -52,7 +52,7 @@ pub enum Request {
         /// A whole number of words.
         bytes: Vec<u8, BLOCK>,
     },
-    /// All of it has come.
+    /// The file is complete.
     WeightsVerify,
     /// Use it.
     WeightsActivate,
@@ -61,7 +61,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// Whether it interrupts the output: it writes the flash, or restarts the board.
+    /// Returns whether the request interrupts the output, because it writes the flash or restarts the board.
     #[must_use]
     pub const fn interrupts(&self) -> bool {
         match self {
@@ -81,14 +81,14 @@ impl Request {
         }
     }
 
-    /// Whether it brings a weight file, and is answered by how much of it is there.
+    /// Returns whether the request is part of an upload, and is answered by its progress.
     #[must_use]
     pub const fn uploads(&self) -> bool {
         matches!(self, Self::WeightsBegin { .. } | Self::WeightsBlock { .. } | Self::WeightsVerify)
     }
 }
 
-/// What to do about the calibration.
+/// The action on the calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Calibrate {
     /// Begin.
@@ -99,37 +99,37 @@ pub enum Calibrate {
     Store,
 }
 
-/// What is answered.
+/// The answers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large ones on; one exists at a time")]
 pub enum Reply {
-    /// To `Info`.
+    /// The answer to `Info`.
     Info(Info),
-    /// To `GetConfiguration`.
+    /// The answer to `GetConfiguration`.
     Configuration {
-        /// Of its layout.
+        /// The version of its layout.
         version: u8,
-        /// Where it comes from.
+        /// The origin of the rate.
         origin: Origin,
-        /// What the board was started with.
+        /// The configuration that the board was started with.
         configuration: Configuration,
     },
-    /// To `GetCalibration`.
+    /// The answer to `GetCalibration`.
     Calibration {
-        /// Of its layout.
+        /// The version of its layout.
         version: u8,
-        /// Where it comes from.
+        /// The origin of the rate.
         origin: Origin,
-        /// How a calibration goes.
+        /// The progress of a calibration.
         state: State,
-        /// What is known.
+        /// The calibration.
         calibration: Calibration,
     },
-    /// To `Log`.
+    /// The answer to `Log`.
     Log(LogPage),
-    /// To `Counters`.
+    /// The answer to `Counters`.
     Counters(AllCounters),
-    /// To the requests for weights.
+    /// The answer to the requests for weights.
     Weights {
         /// The slot that takes the file.
         slot: Slot,
@@ -144,28 +144,28 @@ pub enum Reply {
     Refused(Refusal),
 }
 
-/// Why a request is refused.
+/// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// Not a request of this protocol version.
+    /// This protocol version has no such request.
     #[error("not a request of protocol {PROTOCOL}")]
     Unknown,
     /// Another layout of the configuration.
     #[error("configuration layout {found}, the board has {expected}")]
     Version {
-        /// Of the request.
+        /// The version in the request.
         found: u8,
-        /// Of this firmware.
+        /// The version of this firmware.
         expected: u8,
     },
-    /// From the store, or a value of the configuration.
+    /// The store refuses, or a value of the configuration is out of its range.
     #[error(transparent)]
     Store(StoreError),
-    /// From the weight slots.
+    /// The weight slots refuse.
     #[error(transparent)]
     Slot(SlotError),
-    /// Nothing has been found that could be stored.
+    /// There is no result that could be stored.
     #[error("no calibration has been found that could be stored")]
     NothingFound,
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
@@ -185,38 +185,38 @@ impl From<SlotError> for Refusal {
     }
 }
 
-/// Where a record comes from.
+/// The origin of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Origin {
     /// Built in: nothing is stored.
     BuiltIn,
-    /// From flash.
+    /// The record was read from flash.
     Stored,
     /// Built in: what is stored is refused.
     Refused(StoreError),
 }
 
-/// What the board knows of itself when it starts.
+/// The board's identity when it starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
-    /// Of the firmware.
+    /// The version of the firmware.
     pub firmware: [u8; 3],
     /// DBGMCU_IDCODE; `None` where it reads as zero, as in the emulator.
     pub device_id: Option<u32>,
-    /// Of the processor, Hz.
+    /// The frequency of the processor, Hz.
     pub clock_hz: u32,
-    /// Why the clock is not the crystal's; `None`: it is.
+    /// The reason why the clock is not the crystal's; `None` where it is.
     pub clock_fault: Option<ClockFault>,
-    /// Why frames go out as SLCAN alone; `None`: they go out on CAN too.
+    /// The reason why frames go out as SLCAN alone; `None` where they go out on CAN too.
     pub can_fault: Option<CanFault>,
-    /// Why it has started.
+    /// The cause of its start.
     pub reset: ResetCause,
     /// Its last crash since power came on.
     pub crash: Option<Crash>,
 }
 
 impl Identity {
-    /// Before anything is known.
+    /// The state before anything is known.
     pub const UNKNOWN: Self = Self {
         firmware: [0; 3],
         device_id: None,
@@ -241,7 +241,7 @@ pub enum FlashState {
     Failed(StoreError),
 }
 
-/// What the board is and how it is.
+/// The board's identity and state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Info {
     /// [`PROTOCOL`].
@@ -250,42 +250,42 @@ pub struct Info {
     pub identity: Identity,
     /// Layout of the configuration and of the calibration.
     pub record_versions: [u8; 2],
-    /// What is stored.
+    /// The state of the store.
     pub flash: FlashState,
-    /// Whether a controller answers, so that something can be stored; the emulator has none.
+    /// A controller answers, so that something can be stored; the emulator has none.
     pub writable: bool,
-    /// Of the configuration.
+    /// The origin of the configuration.
     pub configuration: Origin,
-    /// Of the calibration.
+    /// The origin of the calibration.
     pub calibration: Origin,
     /// The weights that the network runs on.
     pub weights: WeightSource,
     /// Their checksum.
     pub weights_crc: Option<u32>,
-    /// Why the sensor could not be set up, where the board does so.
+    /// The reason why the sensor could not be set up, where the board does so.
     pub sensor: Option<SensorFault>,
-    /// Why each slot that should be used is not.
+    /// The reason why each slot that should be used is not.
     pub refused_slots: [Option<SlotError>; 2],
-    /// Of the corrected yaw rate.
+    /// The status of the corrected yaw rate.
     pub status: Status,
 }
 
 /// Everything that is counted since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct AllCounters {
-    /// Of the pipeline.
+    /// The counters of the pipeline.
     pub pipeline: Counters,
-    /// Of the sensor monitor.
-    pub watch: WatchCounters,
-    /// Of the lines.
+    /// The counters of the sensor monitor.
+    pub watch: MonitorCounters,
+    /// The counters of the lines.
     pub lines: LineCounters,
-    /// Of the fibre-optic gyro.
+    /// The counters of the fibre-optic gyro.
     pub fog: FogCounters,
-    /// Of the coprocessor's inputs.
+    /// The counters of the coprocessor's inputs.
     pub inputs: InputCounters,
 }
 
-/// What went wrong on the lines.
+/// The numbers of errors on the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LineCounters {
     /// Frames that the SLCAN line did not take.
@@ -304,7 +304,7 @@ pub struct LineCounters {
 }
 
 impl LineCounters {
-    /// Nothing yet.
+    /// The counters before the first event.
     pub const NONE: Self =
         Self { unsent: 0, line_errors: 0, held: 0, overruns: 0, service_errors: 0, frames_lost: 0 };
 }

@@ -21,7 +21,7 @@ impl StandstillGate {
         Self { quiet: None, open: true }
     }
 
-    /// Whether the flash may be written now.
+    /// Returns whether the flash may be written now.
     #[must_use]
     pub const fn is_open(&self) -> bool {
         self.open
@@ -31,7 +31,7 @@ impl StandstillGate {
     pub fn observe(&mut self, sample: Option<&ImuSample>, wheels: Standstill, limits: &StaticConfig) {
         let quiet =
             self.quiet.get_or_insert_with(|| QuietDetector::new(QuietConfig::DEFAULT, limits, &ANY_REST));
-        let still = sample.is_none_or(|sample| quiet.process(sample));
+        let still = sample.is_none_or(|sample| quiet.observe(sample));
         self.open = match wheels {
             Standstill::Still => true,
             Standstill::Moving => false,

@@ -22,13 +22,13 @@ pub const MAX_TILT_DEG: f32 = 45.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BiasPoint {
-    /// Of the part.
+    /// The temperature of the part.
     pub temperature: CentiCelsius,
     /// About x, y, z.
     pub gyro_bias: [AngularRate; 3],
 }
 
-/// How the configured sensor frame is tilted against level ground.
+/// The tilt of the configured sensor frame against level ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Level {
@@ -39,7 +39,7 @@ pub struct Level {
 }
 
 impl Level {
-    /// From the configured frame into the vehicle's; `None` when an angle is not finite.
+    /// Returns the rotation from the configured frame into the vehicle's; `None` when an angle is not finite.
     #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         Rotation::from_mounting(self.roll_deg, self.pitch_deg, 0.0)
@@ -49,16 +49,16 @@ impl Level {
 /// Bias, its temperature table, and the mounting as found on level ground.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Of the last static calibration.
+    /// The result of the last static calibration.
     pub gyro_bias: Option<[AngularRate; 3]>,
     /// Rising temperatures, at least 5 deg C apart.
     pub temperature_table: Vec<BiasPoint, MAX_POINTS>,
-    /// Of the last mounting calibration.
+    /// The result of the last mounting calibration.
     pub level: Option<Level>,
 }
 
 impl Calibration {
-    /// Nothing is known.
+    /// The calibration of an unknown sensor.
     pub const NONE: Self = Self { gyro_bias: None, temperature_table: Vec::new(), level: None };
 
     /// Takes over the bias of a static calibration, and into the table where the part gives its
@@ -86,8 +86,8 @@ impl Calibration {
         }
     }
 
-    /// The bias at a temperature, linear between the table's points and level beyond its ends;
-    /// the last static calibration's where there is no table or no temperature.
+    /// Returns the bias at a temperature, linear between the table's points and level beyond its ends; the last
+    /// static calibration's where there is no table or no temperature.
     #[must_use]
     pub fn bias_at(&self, temperature: Option<CentiCelsius>) -> Option<[AngularRate; 3]> {
         let (Some(at), Some(first), Some(last)) =

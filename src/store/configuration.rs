@@ -37,7 +37,7 @@ pub enum FogPart {
     Dsp3000,
 }
 
-/// How the sensor is turned against the vehicle: about x (forward), then y (left), then z (up).
+/// The rotation of the sensor against the vehicle: about x (forward), then y (left), then z (up).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mounting {
@@ -50,7 +50,7 @@ pub struct Mounting {
 }
 
 impl Mounting {
-    /// From the sensor's axes into the vehicle's; `None` when an angle is not finite.
+    /// Returns the rotation from the sensor's axes into the vehicle's; `None` when an angle is not finite.
     #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         Rotation::from_mounting(self.roll_deg, self.pitch_deg, self.yaw_deg)
@@ -68,11 +68,11 @@ pub struct Configuration {
     pub can: Settings,
     /// -90 to 90 deg, north positive; `None`: the Earth's rate stays in the bias.
     pub latitude_deg: Option<f32>,
-    /// Of the sensor.
+    /// The mounting of the sensor.
     pub mounting: Mounting,
-    /// When the vehicle counts as standing.
+    /// The limits by which the vehicle counts as standing.
     pub static_init: StaticConfig,
-    /// How much correction is believed.
+    /// The limits of a correction.
     pub compensate: CompensateConfig,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
@@ -93,8 +93,8 @@ impl Configuration {
 }
 
 impl Configuration {
-    /// What it and a calibration mean for the pipeline. A level that was found on level ground is
-    /// the mounting: the street is not asked any more.
+    /// Makes the pipeline's configuration from this one and a calibration. A level that was found on level ground
+    /// is the mounting: the street is not asked any more.
     #[must_use]
     pub fn pipeline(&self, calibration: &Calibration) -> PipelineConfig {
         // All angles have been checked to be finite.
@@ -134,7 +134,7 @@ impl Record for Configuration {
     const KEY: u8 = 1;
     const VERSION: u8 = 2;
 
-    /// Layout 1 ended before `fog_ids`: those were [`FOG_IDS`], here as varints.
+    /// Returns the end that layout 1 lacks: it ended before `fog_ids`, which were [`FOG_IDS`], here as varints.
     fn missing(version: u8) -> Option<&'static [u8]> {
         (version == 1).then_some(&[0xA4, 3, 0xA5, 3, 0xA6, 3])
     }

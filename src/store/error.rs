@@ -29,7 +29,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// The field as a user writes it.
+    /// Returns the field as a user writes it.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -54,7 +54,7 @@ impl Field {
     }
 }
 
-/// Why a configuration or calibration is refused.
+/// The reason why a configuration or calibration is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -62,9 +62,9 @@ pub enum FieldError {
     /// A value is not a number or outside its range.
     #[error("{}: {value} is not within {low} to {high}", .field.name())]
     Range {
-        /// Which one.
+        /// The field.
         field: Field,
-        /// What it is.
+        /// The value.
         value: f32,
         /// Least that it may be.
         low: f32,
@@ -88,7 +88,7 @@ pub(super) fn within(field: Field, value: f32, low: f32, high: f32) -> Result<()
     if (low..=high).contains(&value) { Ok(()) } else { Err(FieldError::Range { field, value, low, high }) }
 }
 
-/// What the flash itself said.
+/// The fault that the flash reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -96,7 +96,7 @@ pub enum FlashFault {
     /// An address that is no start of a word or sector.
     #[error("not the start of a word or sector")]
     NotAligned,
-    /// Beyond the end.
+    /// The address is beyond the end.
     #[error("beyond its end")]
     OutOfBounds,
     /// It did not take the operation, or did not finish it in time.
@@ -104,7 +104,7 @@ pub enum FlashFault {
     Refused,
 }
 
-/// Why the store has not done what it was asked for.
+/// The reason why the store has not done what was requested.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -115,15 +115,15 @@ pub enum StoreError {
     /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// No room is left.
+    /// There is no room left.
     #[error("no room is left for the record")]
     Full,
     /// A record of another layout.
     #[error("the record has layout {found}, this firmware reads {expected}")]
     Version {
-        /// As stored.
+        /// The version as stored.
         found: u8,
-        /// What this firmware reads.
+        /// The version that this firmware reads.
         expected: u8,
     },
     /// A record that is not what its version says.

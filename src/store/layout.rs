@@ -13,7 +13,7 @@
 
 use core::ops::Range;
 
-/// Where the processor sees the flash.
+/// The address at which the processor sees the flash.
 pub const FLASH_BASE: u32 = 0x0800_0000;
 /// Size of each sector, bytes.
 pub const SECTORS: [u32; 12] = {
@@ -36,10 +36,10 @@ pub const CODE: u32 = 0xC000;
 pub const CODE_END: u32 = 0xC_0000;
 /// Size of a weight slot: one sector.
 pub const SLOT_SIZE: usize = 128 << 10;
-/// Both weight slots.
+/// The offsets of both weight slots.
 pub const SLOTS: Range<u32> = 0xC_0000..0x10_0000;
 
-/// Number of the sector that begins at an offset; `None` where none begins.
+/// Returns the number of the sector that begins at an offset; `None` where none begins.
 #[must_use]
 pub fn sector_at(offset: u32) -> Option<u8> {
     let mut start = 0;

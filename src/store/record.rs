@@ -26,7 +26,7 @@ const WORD_U32: u32 = WORD as u32;
 const HEADER: u32 = 2 * WORD_U32;
 /// Most bytes of an encoded record.
 const MAX_LEN: usize = 248;
-/// With its first and last word.
+/// The longest record, with its first and last word.
 const BUFFER: usize = MAX_LEN + 2 * WORD;
 /// Highest key.
 const MAX_KEY: u8 = 7;
@@ -37,16 +37,16 @@ const FORMAT: u32 = u32::from_le_bytes(*b"GYR1");
 pub trait Record: Serialize + DeserializeOwned {
     /// Its place among the records, 1 to 7; never given to another one.
     const KEY: u8;
-    /// Of its layout; raised with every change of it.
+    /// The version of its layout; it is raised with every change.
     const VERSION: u8;
 
-    /// What a record of an older layout lacks at its end, as it would be encoded; `None`: this firmware
-    /// does not read that layout.
+    /// Returns the bytes that a record of an older layout lacks at its end; `None` where this firmware does not
+    /// read that layout.
     fn missing(_version: u8) -> Option<&'static [u8]> {
         None
     }
 
-    /// Whether all values are inside their ranges.
+    /// Checks that all values are inside their ranges.
     ///
     /// # Errors
     /// [`FieldError`] that names the first one that is not.
@@ -67,7 +67,7 @@ impl Raw {
         2 * WORD + len.next_multiple_of(WORD)
     }
 
-    /// `None` when it does not fit.
+    /// Encodes a record; `None` when it does not fit.
     fn encode<R: Record>(&mut self, record: &R) -> Option<()> {
         let (first, rest) = self.words.split_first_chunk_mut::<WORD>()?;
         let len = postcard::to_slice(record, rest.get_mut(..MAX_LEN)?).ok()?.len();
@@ -112,11 +112,11 @@ impl Raw {
     }
 }
 
-/// What stands at a place in a sector.
+/// The content of a place in a sector.
 enum Place {
     /// A record; it may be torn.
     Record,
-    /// Nothing yet.
+    /// The counters before the first event.
     Blank,
     /// No record can begin so, or none fits any more.
     End,
@@ -126,11 +126,11 @@ enum Place {
 pub struct Store<F> {
     flash: F,
     start: u32,
-    /// Whether flash that reads as zeros was never written, which holds in an emulator without a flash controller.
+    /// Flash that reads as zeros was never written, which holds in an emulator without a flash controller.
     zeros_are_blank: bool,
     /// Sector in use and its generation.
     current: Option<(u32, u32)>,
-    /// Where the next record goes, while there is room.
+    /// The place of the next record, while there is room.
     free: Option<u32>,
     damaged: bool,
     /// A header is neither one nor blank: a sector that would count may be lost.
@@ -164,14 +164,14 @@ impl<F: NorFlash> Store<F> {
         Ok(store)
     }
 
-    /// Whether a record or a sector's header was found that is not whole: a power cut tore it, or
-    /// the flash has lost bits. What is read is then the record before.
+    /// Returns whether a damaged record or sector header was found: a power cut tore it, or the flash has lost
+    /// bits. The record before it is then read.
     #[must_use]
     pub fn damaged(&self) -> bool {
         self.damaged || self.header_damaged
     }
 
-    /// The newest whole record; `None` before the first one.
+    /// Returns the newest whole record; `None` before the first one.
     ///
     /// # Errors
     /// [`StoreError`]: nothing that is not whole and inside its ranges is returned.
@@ -192,7 +192,8 @@ impl<F: NorFlash> Store<F> {
         self.write(&raw)
     }
 
-    /// Apart from [`Store::set`], which there is one of for each kind of record.
+    /// Writes an encoded record. It stands apart from [`Store::set`], of which there is one for each kind of
+    /// record.
     #[inline(never)]
     fn write(&mut self, raw: &Raw) -> Result<(), StoreError> {
         let appended = match (self.current, self.free) {
@@ -287,7 +288,7 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Where the record after it goes; `None` without room for it.
+    /// Returns the place of the record after it; `None` without room for it.
     fn append(&mut self, sector: u32, at: u32, raw: &Raw) -> Result<Option<u32>, StoreError> {
         let end = at + raw.bytes().len() as u32;
         if end > self.range(sector).end {

@@ -23,10 +23,10 @@ pub enum Slot {
 }
 
 impl Slot {
-    /// Both, in order.
+    /// Both slots, in order.
     pub const ALL: [Self; 2] = [Self::A, Self::B];
 
-    /// The other one.
+    /// Returns the other slot.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -35,7 +35,7 @@ impl Slot {
         }
     }
 
-    /// Its first byte, as an offset into the slots.
+    /// Returns the offset of its first byte in the slots.
     #[must_use]
     pub const fn offset(self) -> u32 {
         match self {
@@ -44,7 +44,7 @@ impl Slot {
         }
     }
 
-    /// Its place in a pair.
+    /// Returns its element of a pair.
     pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
         match self {
             Self::A => a,
@@ -59,7 +59,7 @@ impl core::fmt::Display for Slot {
     }
 }
 
-/// Which files were accepted, and which of them is to be used.
+/// The files that were accepted, and the one that is to be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Accepted {
     /// The slot to use; `None`: the built-in weights.
@@ -69,10 +69,10 @@ pub struct Accepted {
 }
 
 impl Accepted {
-    /// Nothing accepted yet.
+    /// The record before any file was accepted.
     pub const NONE: Self = Self { active: None, files: [None; 2] };
 
-    /// With a checked file in a slot, to be used.
+    /// Returns the record with a checked file in a slot, to be used.
     #[must_use]
     pub const fn with(mut self, slot: Slot, file: u32) -> Self {
         let [a, b] = self.files;
@@ -94,7 +94,7 @@ impl Record for Accepted {
     }
 }
 
-/// Why a slot, or what is uploaded to it, is not used.
+/// The reason why a slot, or the upload to it, is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -105,7 +105,7 @@ pub enum SlotError {
     /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// Nothing was written to it since it was erased.
+    /// The slot was not written since it was erased.
     #[error("the slot is empty")]
     Empty,
     /// A file that is longer than a slot, or no whole number of words.
@@ -114,7 +114,7 @@ pub enum SlotError {
     /// A block that does not continue the upload.
     #[error("the next block must begin at {expected}")]
     Offset {
-        /// Where the next block must begin; what is before it is written.
+        /// The offset at which the next block must begin; the bytes before it are written.
         expected: u32,
     },
     /// No upload is under way.
@@ -126,7 +126,7 @@ pub enum SlotError {
         /// Bytes written.
         written: u32,
     },
-    /// Not the checksum under which the file was announced or accepted.
+    /// The file's checksum is not the announced or accepted one.
     #[error("file {0:08x} is not the one that was accepted")]
     NotAccepted(u32),
     /// The file is refused.
@@ -134,7 +134,7 @@ pub enum SlotError {
     Blob(BlobError),
 }
 
-/// The file in a slot, checked. Slots begin on a word.
+/// Checks the file in a slot. Slots begin on a word.
 ///
 /// # Errors
 /// [`SlotError::Empty`], [`SlotError::Length`], [`SlotError::Blob`].
@@ -149,7 +149,7 @@ pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
     Blob::new_checked(bytes).map_err(SlotError::Blob)
 }
 
-/// Where the weights in use come from.
+/// The origin of the weights in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WeightSource {
@@ -171,18 +171,18 @@ impl core::fmt::Display for WeightSource {
     }
 }
 
-/// What [`select`] has found.
+/// The result of [`select`].
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'w> {
     /// The weights to run on.
     pub weights: Option<Blob<'w>>,
-    /// Where they come from.
+    /// The origin of the weights.
     pub source: WeightSource,
-    /// Why each slot that was asked for is not used.
+    /// The reason why each requested slot is not used.
     pub refused: [Option<SlotError>; 2],
 }
 
-/// The first weights that pass all checks.
+/// Selects the first weights that pass all checks.
 #[must_use]
 pub fn select<'w>(accepted: &Accepted, slots: [&'w [u8]; 2], built_in: &'w [u8]) -> Selection<'w> {
     let mut refused = [None; 2];
@@ -238,7 +238,7 @@ impl Upload {
     /// # Errors
     /// [`SlotError::Offset`] when it does not continue what is written, [`SlotError::Length`]
     /// when it is no whole number of words or goes beyond the announced end,
-    /// [`SlotError::Flash`]; after the last one the upload must begin anew.
+    /// [`SlotError::Flash`]; after the last one the upload must begin again.
     pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
         if offset != self.written {
             return Err(SlotError::Offset { expected: self.written });
@@ -264,13 +264,13 @@ impl Upload {
         file(self.slot.of(slots)).map(|blob| blob.crc)
     }
 
-    /// The slot.
+    /// Returns the slot.
     #[must_use]
     pub const fn slot(&self) -> Slot {
         self.slot
     }
 
-    /// Bytes written.
+    /// Returns the number of bytes written.
     #[must_use]
     pub const fn written(&self) -> u32 {
         self.written

@@ -11,7 +11,9 @@ from unicorn.unicorn_const import UC_MEM_WRITE as WRITE
 from .bus import Bus, Fixed
 from .dwt import CoreDebug, Dwt
 from .events import EventQueue, Handle
-from .exceptions import IACCVIOL, IBUSERR, INVSTATE, NOCP, PRECISERR, UNDEFINSTR, Exceptions
+from .exceptions import (
+    ENTRY_CLOCKS, IACCVIOL, IBUSERR, INVSTATE, NOCP, PRECISERR, RETURN_CLOCKS, UNDEFINSTR, Exceptions,
+)  # fmt: skip
 from .memory import Memory
 from .nvic import NMI, Nvic
 from .processor import COUNT, FAULT, SLEEP, STATE, UNDEFINED, Processor
@@ -25,8 +27,8 @@ CLOCKS_PER_INSTRUCTION = 1.3
 MASKED_SLICE = 32
 #: Longest slice, so that other work of this process gets its turn.
 LONGEST_SLICE = 1 << 22
-#: Bits of SCR.
-SLEEPONEXIT, SLEEPDEEP = 2, 4
+#: A bit of SCR.
+SLEEPDEEP = 4
 
 
 class Board:
@@ -40,8 +42,11 @@ class Board:
         self.bus = Bus(self)
         self._now = 0
         self._base = 0
-        self._in_slice = False
+        #: Whether instructions run at present.
+        self.in_slice = False
         self._reset_cause: str | None = None
+        #: Whether the current slice only has to come to its end: power, reset or a violation came.
+        self.halted = True
         self.violation: Violation | None = None
         self.powered = False
         self.sleeping = False
@@ -76,7 +81,7 @@ class Board:
     @property
     def now(self) -> int:
         """Board time in picoseconds; within a slice that of the current instruction."""
-        if self._in_slice:
+        if self.in_slice:
             return self._now + max(self.processor.executed.value - 1 - self._base, 0) * self._instruction_ps
         return self._now
 
@@ -84,20 +89,21 @@ class Board:
         """Calls back after a delay."""
         now = self.now
         handle = self.events.schedule(now + max(delay_ps, 0), callback)
-        if self._in_slice:
+        if self.in_slice:
             self.processor.shorten(-(-max(delay_ps, 0) // self._instruction_ps))
         return handle
 
-    def spend(self, clocks: int) -> None:
-        """Lets core clocks pass without an instruction."""
-        self._now += clocks * 10**12 // self.rcc.core_hz
-        if self._in_slice:
-            left = self.processor.limit.value - self.processor.executed.value
-            self.processor.shorten(left - int(clocks / CLOCKS_PER_INSTRUCTION))
+    def spend(self, cost: tuple[int, int]) -> None:
+        """Lets time pass without an instruction: picoseconds, and the instructions that would have run."""
+        self._now += cost[0]
+        if self.in_slice:
+            limit = self.processor.limit
+            end = limit.value - cost[1]
+            limit.value = max(end, self.processor.executed.value)
 
     def clocks_changed(self) -> None:
         """Counts with the new clocks from now on. RCC calls this after a change."""
-        if self._in_slice:
+        if self.in_slice:
             now = self.now
             self._now, self._base = now, self.processor.executed.value - 1
             self.processor.end_slice()
@@ -106,6 +112,10 @@ class Board:
         self.dwt.hold()
         #: The duration of an instruction in picoseconds.
         self._instruction_ps = round(CLOCKS_PER_INSTRUCTION * 1e12 / self.rcc.core_hz)
+        self.exceptions.entry, self.exceptions.leaving = map(self._cost, (ENTRY_CLOCKS, RETURN_CLOCKS))
+
+    def _cost(self, clocks: int) -> tuple[int, int]:
+        return clocks * 10**12 // self.rcc.core_hz, int(clocks / CLOCKS_PER_INSTRUCTION)
 
     def record(self, kind: str, **fields) -> None:
         """Adds an entry to the event log."""
@@ -131,12 +141,13 @@ class Board:
 
     def interrupt_raised(self) -> None:
         """Ends the slice where an exception may be due. One that the running handler keeps waiting is looked at with its return."""
-        if self._in_slice and self.nvic.preempts():
+        if self.in_slice and self.nvic.preempting() is not None:
             self.processor.end_slice()
 
     def request_reset(self, cause: str) -> None:
         """Resets the chip before the next instruction."""
         self._reset_cause = self._reset_cause or cause
+        self.halted = True
         self.processor.end_slice()
 
     def stall(self, until_ps: int) -> None:
@@ -162,11 +173,6 @@ class Board:
 
     # What the core tells the board.
 
-    @property
-    def halted_inside_slice(self) -> bool:
-        """Whether the current slice only has to come to its end: power, reset or a violation came."""
-        return self.violation is not None or self._reset_cause is not None or not self.powered
-
     def violate(self, violation: Violation) -> None:
         """Stops the run with a violation, with time and place added."""
         if self.violation is None:
@@ -174,6 +180,7 @@ class Board:
             violation.symbol = self.symbol_at(violation.pc)
             violation.now = self.now
             self.violation = violation
+            self.halted = True
         self.processor.end_slice()
 
     def lock_up(self, why: str) -> None:
@@ -183,15 +190,10 @@ class Board:
         self.record("lockup", why=why, pc=pc, symbol=self.symbol_at(pc))
         self.processor.end_slice()
 
-    def exception_entered(self, number: int) -> None:
-        """Wakes the core."""
-        self.sleeping = False
-
-    def exception_left(self, number: int, to_thread: bool) -> None:
-        """Goes to sleep after the last handler with SCR.SLEEPONEXIT."""
-        if to_thread and self.scb.scr & SLEEPONEXIT:
-            self.sleeping = True
-            self.processor.end_slice()
+    def sleep_on_exit(self) -> None:
+        """Goes to sleep after the last handler, for SCR.SLEEPONEXIT."""
+        self.sleeping = True
+        self.processor.end_slice()
 
     def fpu_switched(self) -> None:
         """Watches for FPU instructions while CPACR keeps the FPU off."""
@@ -216,11 +218,13 @@ class Board:
                 if hasattr(peripheral, "power_off"):
                     peripheral.power_off()
             self.powered = False
+            self.halted = True
             self.events.clear()
             self.record("power_off")
 
     def _reset(self, cause: str) -> None:
         self._reset_cause = None
+        self.halted = self.violation is not None
         self.sleeping = self.locked_up = False
         self.stalled_until = 0
         self.nvic.lines = 0
@@ -239,26 +243,29 @@ class Board:
     def run(self, until: int) -> None:
         """Runs until a board time, or until `stop` is called. Raises a violation."""
         self._stop = bool(self.watcher and self.watcher(None))
+        events, nvic, dispatch = self.events, self.nvic, self.exceptions.dispatch
         while self._now < until:
-            due = self.events.next_time()
+            due = events.next_time()
             if due is not None and due <= self._now:
                 self._run_due()
-                due = self.events.next_time()
-            if self.violation is not None:
-                raise self.violation
-            if self._reset_cause is not None and self.powered:
-                self._reset(self._reset_cause)
-                continue
+                due = events.next_time()
+            if self.halted:
+                if self.violation is not None:
+                    raise self.violation
+                if self._reset_cause is not None and self.powered:
+                    self._reset(self._reset_cause)
+                    continue
             if self._stop:
                 return
-            due = until if due is None else min(due, until)
+            if due is None or due > until:
+                due = until
             if not self.powered or self.locked_up:
                 self._now = max(due, self._now)
             elif self._now < self.stalled_until:
                 self._now = max(min(due, self.stalled_until), self._now)
-            elif self.nvic.pending & self.nvic.enabled and self.exceptions.dispatch():
+            elif nvic.pending & nvic.enabled and dispatch():
                 continue
-            elif self.sleeping and not self._wakes():
+            elif self.sleeping and not (nvic.pending & nvic.enabled and self._wakes()):
                 self.dwt.skip(due - self._now)
                 self.slept += due - self._now
                 self._now = due
@@ -270,15 +277,16 @@ class Board:
             raise self.violation
 
     def _run_due(self) -> None:
+        pop_due, watcher = self.events.pop_due, self.watcher
         while not self._stop:
-            callback = self.events.pop_due(self._now)
+            callback = pop_due(self._now)
             if callback is None:
                 return
             try:
                 callback()
             except Violation as violation:
                 self.violate(violation)
-            if self.watcher and self.watcher(None):
+            if watcher is not None and watcher(None):
                 self._stop = True
 
     def _wakes(self) -> bool:
@@ -291,8 +299,7 @@ class Board:
 
     def _slice_length(self, due: int) -> int:
         count = min(-(-(due - self._now) // self._instruction_ps), LONGEST_SLICE)
-        highest = self.nvic.highest_pending()
-        if highest is None or self.nvic.group(highest[1]) >= self.nvic.execution_priority(0, 0, 0):
+        if self.nvic.preempting() is None:
             self._masked = 0
             return count
         # PRIMASK or BASEPRI holds it back. They are looked at after a slice, which may be a quarter of the wait so far.
@@ -304,7 +311,8 @@ class Board:
         """Runs instructions until an event is due or the slice ends by itself."""
         processor = self.processor
         count = self._slice_length(due)
-        processor.watch_blocks(not self.scb.fpu_on)
+        if processor.watching == (self.scb.cpacr >> 20 & 1):
+            processor.watch_blocks(not processor.watching)
         if processor.fpu_ahead:
             if self.scb.next_is_fpu_instruction(processor.get("pc")):
                 processor.fpu_ahead = False
@@ -312,18 +320,18 @@ class Board:
                 return
             count = 1
         stepping = processor.fpu_ahead
-        self._base, self._in_slice = 0, True
+        self._base, self.in_slice = 0, True
         try:
             why = processor.run(count)
         finally:
-            self._in_slice = False
+            self.in_slice = False
         executed = processor.executed.value
         self._now += max(executed - self._base, 0) * self._instruction_ps
         self.instructions += executed
         self.slices += 1
         if stepping:
             processor.fpu_ahead = False
-        if why == COUNT or self.halted_inside_slice:
+        if why == COUNT or self.halted:
             return
         if why == SLEEP:
             if self.scb.scr & SLEEPDEEP:

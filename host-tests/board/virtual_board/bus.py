@@ -6,8 +6,6 @@ answered, and the bit-band aliases are not modelled: each is a violation.
 
 from .violation import Violation
 
-PRIVATE = 0xE000_0000
-
 
 class Fixed:
     """Registers of the core with fixed contents: ICTR (96 lines) and ACTLR."""
@@ -55,12 +53,11 @@ class Bus:
             self.private[word] = device
 
     def _find(self, address: int):
-        if address >= PRIVATE:
+        peripheral = self.blocks.get(address >> 10)
+        if peripheral is None:
             device = self.private.get(address >> 2)
             if device is not None:
                 return device
-        peripheral = self.blocks.get(address >> 10)
-        if peripheral is None:
             if 0x4200_0000 <= address < 0x4400_0000:
                 raise Violation("the bit-band alias is not modelled", address)
             raise Violation("no peripheral is modelled here", address)
@@ -70,9 +67,11 @@ class Bus:
 
     def read(self, address: int, size: int) -> int:
         """Reads a register."""
-        if self.board.halted_inside_slice:
+        if self.board.halted:
             return 0
-        device = self._find(address)
+        device = self.blocks.get(address >> 10)
+        if device is None or device.clock not in self.board.rcc.open:
+            device = self._find(address)
         if address & size - 1:
             raise Violation("unaligned register access", address)
         try:
@@ -86,9 +85,11 @@ class Bus:
 
     def write(self, address: int, value: int, size: int) -> None:
         """Writes a register."""
-        if self.board.halted_inside_slice:
+        if self.board.halted:
             return
-        device = self._find(address)
+        device = self.blocks.get(address >> 10)
+        if device is None or device.clock not in self.board.rcc.open:
+            device = self._find(address)
         if address & size - 1:
             raise Violation("unaligned register access", address)
         try:
@@ -118,7 +119,7 @@ class Bus:
 
     def write_memory(self, address: int, value: int, size: int) -> None:
         """Hands a write to the flash array to the flash controller."""
-        if self.board.halted_inside_slice:
+        if self.board.halted:
             return
         self.board.flash.program(address, value, size)
         if self.counted == self.board.flash.name:

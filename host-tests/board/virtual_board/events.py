@@ -3,7 +3,7 @@
 Times are integer picoseconds. Events of one time run in the order in which they were scheduled.
 """
 
-import heapq
+from heapq import heappop, heappush
 
 
 class Handle:
@@ -29,26 +29,28 @@ class EventQueue:
 
     def schedule(self, time: int, callback) -> Handle:
         """Adds a call at a board time."""
-        self.order += 1
+        self.order = order = self.order + 1
         handle = Handle(callback)
-        heapq.heappush(self.heap, (time, self.order, handle))
+        heappush(self.heap, (time, order, handle))
         return handle
 
     def next_time(self) -> int | None:
         """Returns the time of the earliest call, or `None` when the queue is empty."""
         heap = self.heap
         while heap and heap[0][2].callback is None:
-            heapq.heappop(heap)
+            heappop(heap)
         return heap[0][0] if heap else None
 
     def pop_due(self, now: int):
         """Takes out the earliest call that is due and returns it, or `None`."""
-        time = self.next_time()
-        if time is None or time > now:
-            return None
-        handle = heapq.heappop(self.heap)[2]
-        callback, handle.callback = handle.callback, None
-        return callback
+        heap = self.heap
+        while heap and heap[0][0] <= now:
+            handle = heappop(heap)[2]
+            callback = handle.callback
+            if callback is not None:
+                handle.callback = None
+                return callback
+        return None
 
     def clear(self) -> None:
         """Cancels everything."""

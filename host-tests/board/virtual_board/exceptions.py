@@ -21,8 +21,15 @@ VECTTBL, FORCED, DEBUGEVT = 1 << 1, 1 << 30, 1 << 31
 # without SFPA a new FPSCR with its next FPU instruction: both are set and cleared together.
 SPSEL, FPCA, SFPA = 2, 4, 8
 
+#: The values of LR that return from a handler.
+EXC_RETURNS = {0xFFFF_FFE1, 0xFFFF_FFE9, 0xFFFF_FFED, 0xFFFF_FFF1, 0xFFFF_FFF9, 0xFFFF_FFFD}
 #: Unicorn's numbers of what a program raises.
 UC_SVC, UC_BKPT, UC_EXCEPTION_RETURN, UC_NOCP, UC_INVSTATE = 2, 7, 8, 17, 18
+#: A bit of SCR.
+SLEEPONEXIT = 2
+#: PRIMASK, BASEPRI and FAULTMASK where they hold nothing back.
+UNMASKED = (0, 0, 0)
+FRAME = struct.Struct("<8I")
 #: Core clocks from the last instruction to the first of the handler, and back (DDI0439 section 3.9.1, no wait states).
 ENTRY_CLOCKS, RETURN_CLOCKS = 12, 10
 
@@ -42,6 +49,8 @@ class Exceptions:
         self.fpu = Batch(processor.handle, " ".join(f"d{n}" for n in range(8)) + " fpscr")
         #: The exception number in IPSR.
         self.current = 0
+        #: The time that entry and return take: picoseconds, and instructions.
+        self.entry = self.leaving = (0, 0)
 
     def reset(self) -> None:
         """Forgets the handler that was running."""
@@ -49,12 +58,13 @@ class Exceptions:
 
     def dispatch(self) -> bool:
         """Enters the exception that is due now. Returns whether there was one."""
-        highest = self.board.nvic.highest_pending()
-        if highest is None:
+        nvic = self.board.nvic
+        number = nvic.preempting()
+        if number is None:
             return False
-        number, priority = highest
         registers = self.frame.read()
-        if self.board.nvic.group(priority) >= self.board.nvic.execution_priority(*registers[-3:]):
+        masks = registers[-3:]
+        if masks != UNMASKED and nvic.group(nvic.priority[number]) >= nvic.execution_priority(*masks):
             return False
         self.enter(number, registers)
         return True
@@ -64,7 +74,7 @@ class Exceptions:
         primask, basepri, faultmask, _ = self.board.processor.masks.read()
         return self.board.nvic.execution_priority(primask, basepri, faultmask)
 
-    def enter(self, number: int, registers: list[int] | None = None) -> None:
+    def enter(self, number: int, registers: tuple[int, ...] | None = None) -> None:
         """Stores the frame and begins the handler. `registers`: those of `frame`, where they have been read."""
         board = self.board
         r0, r1, r2, r3, r12, lr, pc, xpsr, sp, control, *_ = registers or self.frame.read()
@@ -72,7 +82,7 @@ class Exceptions:
         length = 104 if extended else 32
         frame = sp - length & ~7 & 0xFFFF_FFFF
         saved_xpsr = xpsr & ~(1 << 9) | (sp >> 2 & 1) << 9
-        data = struct.pack("<8I", r0, r1, r2, r3, r12, lr, pc, saved_xpsr)
+        data = FRAME.pack(r0, r1, r2, r3, r12, lr, pc, saved_xpsr)
         if extended:
             data += self.fpu.read_bytes()
             board.scb.fpcar = frame + 32
@@ -104,32 +114,34 @@ class Exceptions:
 
     def _begin(self, number: int, frame: int, xpsr: int, control: int, excret: int) -> None:
         board = self.board
-        vector = board.memory.read(board.scb.vtor + 4 * number, 4)
-        if vector is None:
+        target = board.memory.word(board.scb.vtor + 4 * number)
+        if target is None:
             board.scb.hfsr |= VECTTBL
             if number in (HARD_FAULT, NMI):
                 board.lock_up("the vector of a fault cannot be read")
                 return
             board.nvic.pending |= 1 << number
             number = HARD_FAULT
-            vector = board.memory.read(board.scb.vtor + 4 * number, 4)
-            if vector is None:
+            target = board.memory.word(board.scb.vtor + 4 * number)
+            if target is None:
                 board.lock_up("the vector of HardFault cannot be read")
                 return
-        target = int.from_bytes(vector, "little")
-        board.nvic.activate(number)
+        nvic, bit = board.nvic, 1 << number
+        nvic.active |= bit
+        nvic.pending &= ~bit
         self.current = number
         entered = xpsr & 0xF80F_0000 | (target & 1) << 24 | number
         self.enter_batch.write(frame, control & ~(SPSEL | FPCA | SFPA), entered, entered & 0xF000_0000, excret, target)
         board.processor.start_at = target & ~1
-        board.spend(ENTRY_CLOCKS)
-        board.exception_entered(number)
+        board.spend(self.entry)
+        board.sleeping = False
 
     def processor_event(self, number: int) -> None:
         """Handles what unicorn reports while it runs: SVC, BKPT, the return from an exception, a missing coprocessor."""
         if number == UC_EXCEPTION_RETURN:
             self._return()
-            while self.dispatch():
+            nvic = self.board.nvic
+            while nvic.pending & nvic.enabled and self.dispatch():
                 pass
         elif number == UC_SVC:
             self.raise_synchronous(SVCALL)
@@ -149,11 +161,14 @@ class Exceptions:
         nvic = board.nvic
         excret, control, faultmask, msp, psp = self.at_return.read()
         excret |= 1
-        known = excret in (0xFFFF_FFE1, 0xFFFF_FFE9, 0xFFFF_FFED, 0xFFFF_FFF1, 0xFFFF_FFF9, 0xFFFF_FFFD)
+        known = excret in EXC_RETURNS
         to_thread = bool(excret & 8)
-        others = nvic.active & ~(1 << self.current)
         leaving = self.current
-        nvic.deactivate(leaving)
+        bit = 1 << leaving
+        nvic.active = others = nvic.active & ~bit
+        if nvic.lines & bit:
+            # The line is still high: pending again.
+            nvic.pending |= bit
         if faultmask and leaving != NMI:
             board.processor.set("faultmask", 0)
         if not known or (to_thread and others and not board.scb.ccr & 1) or (not to_thread and not others):
@@ -166,7 +181,7 @@ class Exceptions:
         if data is None:
             self._return_fault(excret, "the frame cannot be read", BUS_FAULT, UNSTKERR)
             return
-        r0, r1, r2, r3, r12, lr, pc, xpsr = struct.unpack_from("<8I", data)
+        r0, r1, r2, r3, r12, lr, pc, xpsr = FRAME.unpack_from(data)
         number = xpsr & 0x1FF
         if (number == 0) != to_thread:
             self._return_fault(excret, "the stored xPSR does not fit EXC_RETURN", USAGE_FAULT, INVPC)
@@ -179,8 +194,9 @@ class Exceptions:
         xpsr &= 0xFF0F_FDFF
         target = pc & ~1 | xpsr >> 24 & 1
         self.leave.write(xpsr, control, r0, r1, r2, r3, r12, lr, sp, xpsr & 0xF000_0000, target)
-        board.spend(RETURN_CLOCKS)
-        board.exception_left(leaving, to_thread)
+        board.spend(self.leaving)
+        if to_thread and board.scb.scr & SLEEPONEXIT:
+            board.sleep_on_exit()
 
     def _return_fault(self, excret: int, why: str, kind: int = USAGE_FAULT, bit: int = INVPC) -> None:
         """Takes a fault of the return itself: the frame stays, and the handler's LR holds EXC_RETURN."""

@@ -6,6 +6,7 @@ data bus alone, so nothing can be fetched from it. RAM keeps its contents over a
 
 import ctypes
 import random
+import struct
 
 FLASH = 0x0800_0000
 FLASH_SIZE = 1 << 20
@@ -16,6 +17,7 @@ CCM_SIZE = 64 << 10
 SYSTEM = 0x1FFF_0000
 #: Up to the page of the option bytes (table 5); nothing is between it and SRAM.
 SYSTEM_SIZE = 0xC400
+WORD = struct.Struct("<I")
 #: Section 39.1: the unique identifier, 96 bits. This one is the model's own.
 UNIQUE_ID = 0x1FFF_7A10
 #: Section 39.2: the flash size in KiB, 16 bits.
@@ -67,11 +69,21 @@ class Memory:
 
     def read(self, address: int, length: int) -> bytes | None:
         """Reads a range, or returns `None` where no memory is."""
+        offset = address - SRAM
+        if 0 <= offset <= SRAM_SIZE - length:
+            return bytes(self.sram.view[offset : offset + length])
         region = self.region(address, length)
         if region is None:
             return None
         offset = (address - region.base) & (FLASH_SIZE - 1)
         return bytes(region.view[offset : offset + length])
+
+    def word(self, address: int) -> int | None:
+        """Reads 32 bits, or returns `None` where no memory is."""
+        if 0 <= address - FLASH <= FLASH_SIZE - 4:
+            return WORD.unpack_from(self.flash.view, address - FLASH)[0]
+        data = self.read(address, 4)
+        return None if data is None else WORD.unpack(data)[0]
 
     def write(self, address: int, data: bytes) -> bool:
         """Writes a range, flash included. Returns whether there is memory."""

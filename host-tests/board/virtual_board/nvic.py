@@ -40,6 +40,12 @@ class Nvic:
         self.lines = getattr(self, "lines", 0)
         self.priority = [LOWEST] * 2 + [-2, -1] + [0] * (COUNT - 4)
         self.group_mask = 0xFF  # AIRCR.PRIGROUP = 0: bits 7 to 1 preempt, and bit 0 is not implemented.
+        self.priorities_changed()
+
+    def priorities_changed(self) -> None:
+        """Forgets what has been worked out from the priorities."""
+        #: The execution priority without masks, by the set of active exceptions.
+        self._levels: dict[int, int] = {0: LOWEST}
 
     def set_line(self, number: int, level: bool) -> None:
         """Drives an interrupt line. A rising edge makes the interrupt pending, of an active one once more after its end."""
@@ -55,20 +61,8 @@ class Nvic:
     def pend(self, number: int) -> None:
         """Makes an exception pending."""
         self.pending |= 1 << number
-        if self.enabled >> number & 1:
+        if self.enabled >> number & 1 and self.board.in_slice:
             self.board.interrupt_raised()
-
-    def activate(self, number: int) -> None:
-        """Begins an exception."""
-        self.active |= 1 << number
-        self.pending &= ~(1 << number)
-
-    def deactivate(self, number: int) -> None:
-        """Ends an exception. A line that is still high makes it pending again."""
-        bit = 1 << number
-        self.active &= ~bit
-        if self.lines & bit:
-            self.pending |= bit
 
     def highest_pending(self) -> tuple[int, int] | None:
         """Returns number and priority of the pending, enabled exception that comes first."""
@@ -80,14 +74,25 @@ class Nvic:
             return number, self.priority[number]
         return min(((self.priority[n], n) for n in bits(ready)))[::-1]
 
-    def preempts(self) -> bool:
-        """Says whether a pending exception comes before the active ones, if no mask holds it back."""
-        highest = self.highest_pending()
-        return highest is not None and self.group(highest[1]) < self.execution_priority(0, 0, 0)
+    def preempting(self) -> int | None:
+        """Returns the pending exception that comes before the active ones, if no mask holds it back."""
+        ready = self.pending & self.enabled
+        if not ready:
+            return None
+        number = self.highest_pending()[0] if ready & ready - 1 else ready.bit_length() - 1
+        level = self._levels.get(self.active)
+        return number if self.group(self.priority[number]) < (self.level() if level is None else level) else None
+
+    def level(self) -> int:
+        """Returns the execution priority that the active exceptions give."""
+        level = self._levels.get(self.active)
+        if level is None:
+            level = self._levels[self.active] = min(self.group(self.priority[n]) for n in bits(self.active))
+        return level
 
     def execution_priority(self, primask: int, basepri: int, faultmask: int) -> int:
         """Returns the priority that an exception must undercut to be taken."""
-        lowest = min([self.group(self.priority[n]) for n in bits(self.active)]) if self.active else LOWEST
+        lowest = self.level()
         if basepri & PRIORITY_MASK:
             lowest = min(lowest, self.group(basepri & PRIORITY_MASK))
         if primask & 1:
@@ -130,6 +135,7 @@ class Nvic:
             for n in range(size):
                 if 16 + offset - 0x300 + n < COUNT:
                     self.priority[16 + offset - 0x300 + n] = value >> 8 * n & PRIORITY_MASK
+            self.priorities_changed()
         elif offset == 0xE00 and size == 4:
             if value & 0x1FF < INTERRUPTS:
                 self.pending |= 1 << 16 + (value & 0x1FF)

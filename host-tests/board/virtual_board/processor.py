@@ -22,7 +22,7 @@ from unicorn import arm_const, unicorn_const as const
 from unicorn.unicorn_py3.unicorn import uclib
 
 from . import memory as map_
-from .registers import Batch
+from .registers import LIBRARY, Batch
 from .violation import Violation
 
 PERIPHERALS = 0x4000_0000
@@ -78,7 +78,8 @@ class Processor:
         self.uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
         self.uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
         self.handle = self.uc._uch
-        self._start = uclib.uc_emu_start
+        self._start = LIBRARY.uc_emu_start
+        self._begin = ctypes.c_uint64()
         self._callbacks: list = []
         self._find_fields()
         self._map(board.memory)
@@ -95,6 +96,8 @@ class Processor:
         #: The program counter, where an exception has just been entered and unicorn need not be asked.
         self.start_at: int | None = None
         self._singles: dict[str, Batch] = {}
+        #: Whether blocks are reported before they run.
+        self.watching = False
         self._block_hook = None
         self._block_callback = BLOCK(self._on_block)
         #: A block with FPU instructions was reached while the FPU is off.
@@ -172,7 +175,7 @@ class Processor:
     def _reader(self, base: int):
         def read(_, offset, size, __, call=self.board.bus.read):
             try:
-                return call(base + offset, size) or 0
+                return call(base + offset, size)
             except BaseException as error:
                 return self._failed(error)
 
@@ -202,7 +205,10 @@ class Processor:
         return 0
 
     def _on_interrupt(self, _, number, __) -> None:
-        self._guard(self.board.exceptions.processor_event, number)
+        try:
+            self.board.exceptions.processor_event(number)
+        except BaseException as error:
+            self._failed(error)
 
     def _on_tlb(self, _, address, kind, entry, __) -> bool:
         permissions = self._permissions(address, kind)
@@ -270,8 +276,7 @@ class Processor:
 
     def watch_blocks(self, on: bool) -> None:
         """Reports each block of instructions before it runs. Needed only while the FPU is off."""
-        if on == (self._block_hook is not None):
-            return
+        self.watching = on
         if on:
             self._block_hook = self._hook(const.UC_HOOK_BLOCK, self._block_callback)
         else:
@@ -300,7 +305,8 @@ class Processor:
             self._stale_code.clear()
         self.fault = None
         start = self.pc.read()[0] if self.start_at is None else self.start_at
-        code = self._start(self.handle, start | 1, 0, 0, count)
+        self._begin.value = start | 1
+        code = self._start(self.handle, self._begin, 0, 0, count)
         self.start_at = None
         executed, limit = self.executed.value, self.limit.value
         if executed > limit:

@@ -1,9 +1,11 @@
 """Sets of processor registers that are read or written with one call.
 
-A call through `ctypes` costs about a microsecond, so the registers of an exception frame travel together.
+A call through `ctypes` costs about a microsecond, so the registers of an exception frame travel together. `LIBRARY` gives the
+functions without the argument types that `unicorn` declares, whose conversions double that, and keeps Python's lock.
 """
 
 import ctypes
+import struct
 
 from unicorn import arm_const as arm
 from unicorn.unicorn_py3.unicorn import uclib
@@ -26,6 +28,9 @@ IDS = {f"r{n}": getattr(arm, f"UC_ARM_REG_R{n}") for n in range(13)} | {
     "apsr_nzcv": arm.UC_ARM_REG_APSR_NZCV,
 } | {f"d{n}": getattr(arm, f"UC_ARM_REG_D{n}") for n in range(16)}
 
+LIBRARY = ctypes.PyDLL(uclib._name)
+_read, _write = LIBRARY.uc_reg_read_batch, LIBRARY.uc_reg_write_batch
+
 
 class Batch:
     """A list of registers, read and written in its order. Each has 64 bits where the first is one of `d0` to `d15`, else 32."""
@@ -33,30 +38,32 @@ class Batch:
     def __init__(self, handle, names: str):
         self.names = names.split()
         count = len(self.names)
-        cell = ctypes.c_uint64 if self.names[0].startswith("d") else ctypes.c_uint32
+        wide = self.names[0].startswith("d")
+        cell = ctypes.c_uint64 if wide else ctypes.c_uint32
         self.values = (cell * count)()
+        self._layout = struct.Struct(f"<{count}{'Q' if wide else 'I'}")
         size = ctypes.sizeof(cell)
         start = ctypes.addressof(self.values)
         self._ids = (ctypes.c_int * count)(*(IDS[name] for name in self.names))
         self._pointers = (ctypes.c_void_p * count)(*(start + size * n for n in range(count)))
         self._arguments = (handle, self._ids, self._pointers, count)
 
-    def read(self) -> list[int]:
+    def read(self) -> tuple[int, ...]:
         """Reads all of them."""
-        uclib.uc_reg_read_batch(*self._arguments)
-        return self.values[:]
+        _read(*self._arguments)
+        return self._layout.unpack(self.values)
 
     def read_bytes(self) -> bytes:
         """Reads all of them as bytes in memory order."""
-        uclib.uc_reg_read_batch(*self._arguments)
+        _read(*self._arguments)
         return bytes(self.values)
 
     def write_bytes(self, data: bytes) -> None:
         """Writes all of them from bytes in memory order."""
         ctypes.memmove(self.values, data, len(data))
-        uclib.uc_reg_write_batch(*self._arguments)
+        _write(*self._arguments)
 
     def write(self, *values: int) -> None:
         """Writes all of them."""
-        self.values[:] = values
-        uclib.uc_reg_write_batch(*self._arguments)
+        self._layout.pack_into(self.values, 0, *values)
+        _write(*self._arguments)

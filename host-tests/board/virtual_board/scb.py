@@ -112,6 +112,7 @@ class Scb:
                 n = register - (at & 0xFF)
                 if 0 <= n < size:
                     nvic.priority[number] = value >> 8 * n & PRIORITY_MASK
+            nvic.priorities_changed()
         elif 0xED28 <= at < 0xED2C:
             self.cfsr &= ~(value << 8 * (at & 3))
         elif size != 4:
@@ -160,6 +161,7 @@ class Scb:
             raise Violation("AIRCR: VECTRESET and VECTCLRACTIVE are for debuggers")
         self.prigroup = value >> 8 & 7
         self.board.nvic.group_mask = 0xFF << self.prigroup + 1 & 0xFF
+        self.board.nvic.priorities_changed()
         if value & 4:
             self.board.request_reset("software")
 

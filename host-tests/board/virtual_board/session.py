@@ -49,7 +49,8 @@ class Session:
         board = self.board
         conditions = [_condition(board, wanted) for wanted in until or ()]
         self._met = None
-        board.watcher = lambda entry: self._watch(conditions, entry)
+        if conditions:
+            board.watcher = lambda entry: self._watch(conditions, entry)
         try:
             board.run(board.now + round((limit_us if us is None else us) * US))
         finally:

@@ -10,7 +10,7 @@ import copy
 
 BOARD_FIELDS = (
     "_now", "_base", "_reset_cause", "powered", "sleeping", "locked_up", "stalled_until", "instructions", "slept", "slices",
-    "_masked", "_instruction_ps",
+    "_masked", "_instruction_ps", "halted",
 )  # fmt: skip
 #: Memory is compared and put back in pieces of this size, so that translated code is kept where nothing changed.
 PIECE = 4096
@@ -24,7 +24,8 @@ class Snapshot:
             raise ValueError("a board that was stopped by a violation cannot be kept")
         self.fields = {name: getattr(board, name) for name in BOARD_FIELDS if hasattr(board, name)}
         self.log = list(board.log)
-        self.exception = board.exceptions.current
+        exceptions = board.exceptions
+        self.exceptions = exceptions.current, exceptions.entry, exceptions.leaving
         self.context = board.processor.uc.context_save()
         self.memory = [bytes(region.view) for region in board.memory.regions]
         self.devices = _copy(board, _state(board))
@@ -36,7 +37,8 @@ class Snapshot:
             setattr(board, name, value)
         board.log[:] = self.log
         board.violation = None
-        board.exceptions.current = self.exception
+        exceptions = board.exceptions
+        exceptions.current, exceptions.entry, exceptions.leaving = self.exceptions
         board.memory.random = state["random"]
         board.events.heap, board.events.order = state["events"]
         for device, attributes in zip(_devices(board), state["devices"]):

@@ -71,7 +71,7 @@ pub fn wheels(mut data: &[u8]) {
         let id = if kind & 0x0F == 0x0F { OTHER } else { ID };
         let len = if kind & 0x0F < 8 { usize::from(kind & 0x0F) + 1 } else { 8 };
         let frame = DataFrame::new(id, &content[..len]).expect("eight bytes at most");
-        let judged = receiver.process(&frame, Micros(now));
+        let judged = receiver.decode(&frame, Micros(now));
         assert_eq!(judged.is_none(), id == OTHER);
         let known = receiver.poll(Micros(now));
         if let Some(Ok(judged)) = judged {

@@ -23,9 +23,9 @@ pub fn xsens(data: &[u8]) {
     let mut mti = Mti::new();
     let mut dialogue = XsensDialogue::new();
     for (now, byte) in (0..).zip(data) {
-        mti.push(*byte);
+        mti.receive(*byte);
         while mti.next_sample().is_some() {}
-        dialogue.push(*byte);
+        dialogue.receive(*byte);
         let _ = dialogue.poll(Micros(now * 10_000));
     }
     if let Ok(message) = MtData2::parse(data) {
@@ -53,9 +53,9 @@ pub fn dsp1760(data: &[u8]) {
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
     let mut dialogue = KvhDialogue::new(Dsp1760Config::DEFAULT);
     for (now, byte) in (0..).zip(data) {
-        part.push(*byte);
+        part.receive(*byte);
         while part.next_sample().is_some() {}
-        dialogue.push(*byte);
+        dialogue.receive(*byte);
         let _ = dialogue.poll(Micros(now * 10_000));
     }
     let _ = (Command::parse(data), Reply::parse(data));
@@ -90,11 +90,11 @@ pub fn dsp3000(data: &[u8]) {
     let mut lines = Dsp3000Ascii::new();
     let mut words = Dsp3000Binary::new(Mode::Rate, 0);
     for byte in data {
-        if let Some(Ok(reading)) = lines.push(*byte) {
+        if let Some(Ok(reading)) = lines.receive(*byte) {
             let line = reading.emit();
             assert_eq!(Reading::parse(line.trim_end().as_bytes()), Ok(reading));
         }
-        if let Some(word) = words.push(*byte) {
+        if let Some(word) = words.receive(*byte) {
             assert_eq!(Word::parse(word.emit()), Ok(word));
         }
     }

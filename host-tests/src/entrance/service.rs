@@ -12,12 +12,15 @@ use gyronet::sample::Standstill;
 use gyronet::service::calibrate::Task;
 use gyronet::service::frame::{Deframer, MAX_MESSAGE, emit};
 use gyronet::service::message::{AllCounters, Calibrate, Identity};
-use gyronet::service::{Device, Drives, Reply, Request};
+use gyronet::service::{Device, Reply, Request, SupportedHardware};
 use gyronet::store::layout::SLOT_SIZE;
 use gyronet::store::{Configuration, FogPart, ImuPart, Record};
 
-const DRIVES: Drives =
-    Drives { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], bits_per_second: &[250_000, 500_000] };
+const DRIVES: SupportedHardware = SupportedHardware {
+    imus: &[ImuPart::XsensMti],
+    fogs: &[FogPart::Dsp1760],
+    bits_per_second: &[250_000, 500_000],
+};
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
 
@@ -32,7 +35,7 @@ pub fn line(mut data: &[u8]) {
     // As the asking side, which a board might talk nonsense to.
     let mut asker = Deframer::new();
     for byte in data {
-        if let Some(Ok((number, reply))) = asker.push::<Reply>(*byte) {
+        if let Some(Ok((number, reply))) = asker.receive::<Reply>(*byte) {
             let _ = emit(number, &reply);
         }
     }
@@ -59,9 +62,9 @@ pub fn line(mut data: &[u8]) {
 
 /// Gives a byte to the board and reads its answer.
 fn answer(board: &mut Board, byte: u8) {
-    let Some(frame) = board.push(byte, &AllCounters::default()) else { return };
+    let Some(frame) = board.receive(byte, &AllCounters::default()) else { return };
     let mut deframer = Deframer::new();
-    let replies: Vec<_> = frame.iter().filter_map(|byte| deframer.push::<Reply>(*byte)).collect();
+    let replies: Vec<_> = frame.iter().filter_map(|byte| deframer.receive::<Reply>(*byte)).collect();
     assert!(matches!(replies[..], [Ok(_)]), "{replies:?}");
 }
 

@@ -24,7 +24,7 @@ pub fn board(data: &[u8]) {
     let mut sent = Vec::new();
     for (k, byte) in (0..).zip(data) {
         if k % 8 == 0 {
-            port.push(own, Micros(k * 10_000));
+            port.enqueue(own, Micros(k * 10_000));
         }
         if let Some(frame) = port.receive(*byte) {
             let line = emit(&frame).expect("a data frame");

@@ -3,8 +3,8 @@
 use super::{Seed, byte, take};
 use gyronet::model::blob::{Blob, CRC, HEADER_LEN};
 use gyronet::model::fognet_blob::FogBlob;
+use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{GyroNet, WindowNetwork, weights};
-use gyronet::window::{FEATURES, WINDOW};
 
 /// Copies bytes to a word boundary.
 fn aligned(bytes: &[u8]) -> Vec<u32> {

@@ -27,6 +27,8 @@ use std::time::{Duration, Instant};
 
 const FOG: usize = 3;
 const SECOND: Duration = Duration::from_secs(1);
+/// Seconds between two lines that say how far a run is.
+const MINUTE: usize = 60;
 const MS: Duration = Duration::from_millis(1);
 /// Samples in a second, and messages of the fibre-optic gyro in a sample.
 const SAMPLES: usize = 100;
@@ -162,7 +164,7 @@ impl Received {
             lines[both..].iter().flat_map(|frame| slcan::emit(frame).expect("a data frame")).collect();
         self.slcan.splice(..0, ahead);
         for byte in board.sent(SERVICE) {
-            match self.deframer.push(byte) {
+            match self.deframer.receive(byte) {
                 Some(Ok((_, Reply::Counters(counters)))) => {
                     self.answers += 1;
                     self.counters = Some(counters);
@@ -173,6 +175,41 @@ impl Received {
                 None => {}
             }
         }
+    }
+}
+
+impl Received {
+    /// Holds everything that has come so far against what `samples` must give, of which the last ones may be under way.
+    fn check(&self, samples: usize, under_way: usize) {
+        let fog_sets = self.fog / FOG_SET;
+        assert!((SET * (samples - under_way)..=SET * samples).contains(&self.own), "{} frames", self.own);
+        assert!((samples - under_way.max(2)..=samples + 1).contains(&fog_sets), "{} fog frames", self.fog);
+        let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } =
+            self.monitor.counts;
+        assert_eq!([foreign, lost, repeated, out_of_sequence, damaged, unreadable], [0; 6]);
+        assert_eq!(frames as usize, self.own + self.fog);
+        let questions = samples / QUESTION;
+        assert!(
+            (questions - under_way.min(1)..=questions).contains(&self.answers),
+            "{} answers",
+            self.answers
+        );
+        // The last question for them is one of the last four, or five where an answer is under way.
+        let counters = self.counters.expect("they were asked for");
+        let AllCounters { lines, pipeline, watch, fog, inputs } = counters;
+        assert_eq!((lines, inputs), (LineCounters::NONE, InputCounters::default()));
+        let taken = pipeline.samples as usize;
+        assert!(samples - taken <= 4 * QUESTION + under_way, "{taken} of {samples} samples");
+        assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, pipeline.late], [0; 4]);
+        assert_eq!([watch.silences, watch.stuck, watch.wrong, watch.clock_off], [0; 4]);
+        assert!(
+            fog.samples as usize + 2 * MESSAGES > taken * MESSAGES,
+            "{} messages at sample {taken}",
+            fog.samples
+        );
+        // The first message does not fill the step that it begins in.
+        assert!(fog.gaps <= 1, "{} gaps", fog.gaps);
+        assert_eq!([fog.misplaced, fog.stuck, fog.late], [0; 3]);
     }
 }
 
@@ -205,44 +242,23 @@ fn run(test: &str, seconds: usize) {
         if second == seconds.div_ceil(10) {
             early = Some(stack_used(&mut board));
         }
-        if second % 60 == 0 || second == seconds {
+        if second % MINUTE == 0 || second == seconds {
+            received.check(second * SAMPLES, 2);
+            let (own, fog, answers) = (received.own, received.fog, received.answers);
+            let stack = stack_used(&mut board);
+            assert!(stack <= STACK_BUDGET, "{stack} bytes of stack");
+            let took = begun.elapsed();
             println!(
-                "{test}: {second} s of board time in {:.0?}; {} + {} frames are right, {} answers, stack {} bytes",
-                begun.elapsed(),
-                received.own,
-                received.fog,
-                received.answers,
-                stack_used(&mut board)
+                "{test}: {second} s of board time in {took:.0?}: {own} + {fog} frames, {answers} answers, {stack} bytes of stack"
             );
         }
     }
     // What is under way comes out.
     board.run(SAMPLE * 2 - MS);
     received.take(&mut board, &mut outside.host);
-    let samples = seconds * SAMPLES;
     assert_eq!(outside.host.lines, Vec::<Vec<u8>>::new(), "frames that did not come");
-    assert_eq!(received.own, samples * SET);
-    assert!((samples - 2..=samples + 1).contains(&(received.fog / FOG_SET)), "{} fog frames", received.fog);
-    let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } =
-        received.monitor.counts;
-    assert_eq!([foreign, lost, repeated, out_of_sequence, damaged, unreadable], [0; 6]);
-    assert_eq!(frames as usize, received.own + received.fog);
-    assert_eq!(received.answers, samples / QUESTION);
-    // The last question for them is one of the last four.
-    let AllCounters { lines, pipeline, watch, fog, inputs } = received.counters.expect("they were asked for");
-    assert_eq!((lines, inputs), (LineCounters::NONE, InputCounters::default()));
-    let taken = pipeline.samples as usize;
-    assert!(samples - taken <= 4 * QUESTION, "{taken} of {samples} samples");
-    assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, pipeline.late], [0; 4]);
-    assert_eq!([watch.silences, watch.stuck, watch.wrong, watch.clock_off], [0; 4]);
-    assert!(
-        fog.samples as usize + 2 * MESSAGES > taken * MESSAGES,
-        "{} messages at sample {taken}",
-        fog.samples
-    );
-    // The first message does not fill the step that it begins in.
-    assert!(fog.gaps <= 1, "{} gaps", fog.gaps);
-    assert_eq!([fog.misplaced, fog.stuck, fog.late], [0; 3]);
+    received.check(seconds * SAMPLES, 0);
+    let AllCounters { pipeline, fog, .. } = received.counters.expect("they were asked for");
     let (early, late) = (early.expect("a tenth has passed"), stack_used(&mut board));
     println!("{test}: {early} bytes of stack after a tenth, {late} at the end; {pipeline:?}; {fog:?}");
     assert!(late <= STACK_BUDGET, "{late} bytes of stack");
@@ -253,9 +269,13 @@ fn all_lines_busy_for_seconds() {
     run("all_lines_busy_for_seconds", 8);
 }
 
+/// Names how many seconds of board time [`all_lines_busy_for_an_hour`] takes instead.
+const SECONDS: &str = "GYRONET_ENDURANCE_S";
+
 /// `cargo test -p gyronet-host-tests --test board endurance -- --ignored --nocapture`
 #[test]
 #[ignore = "an hour of board time"]
 fn all_lines_busy_for_an_hour() {
-    run("all_lines_busy_for_an_hour", 3_600);
+    let seconds = std::env::var(SECONDS).map_or(3_600, |text| text.parse().expect("whole seconds"));
+    run("all_lines_busy_for_an_hour", seconds);
 }

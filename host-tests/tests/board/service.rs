@@ -27,7 +27,7 @@ pub fn answer(board: &mut Board, limit: Duration) -> Option<Reply> {
     let mut limit = limit;
     while board.run_until_sent(SERVICE, 1, limit) {
         for byte in board.sent(SERVICE) {
-            match deframer.push(byte) {
+            match deframer.receive(byte) {
                 Some(Ok((_, reply))) => return Some(reply),
                 Some(Err(error)) => panic!("a damaged answer: {error}"),
                 None => {}

@@ -1,8 +1,8 @@
 //! What `gyronet demo` says of the image: the same bytes as the library's, and that it would tell
 //! if they were others.
 
+use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};
-use gyronet::window::{Features, WINDOW};
 use gyronet_host_tests::image;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::board::{Agreement, SAMPLES};

@@ -73,9 +73,9 @@ fn converse(stream: &mut TcpStream, config: Config, samples: u32, yaw: &mut Yaw)
         };
         stream.set_nonblocking(false)?;
         for byte in bytes.iter().take(count) {
-            if let Some(Ok(line)) = assembler.push(*byte) {
+            if let Some(Ok(line)) = assembler.receive(*byte) {
                 opened |= line == b"O";
-                stream.write_all(&session.process(line, StatusFlags::default()).answer)?;
+                stream.write_all(&session.execute(line, StatusFlags::default()).answer)?;
             }
         }
         if sending {

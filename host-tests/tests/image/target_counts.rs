@@ -5,9 +5,9 @@
 
 use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::units::Angle;
-use gyronet::window::{Features, WINDOW};
 use gyronet_host_tests::require::{Need, wants};
 use gyronet_host_tests::{image, qemu};
 use gyronet_tools::target::bench::{self, Counts};
@@ -159,7 +159,7 @@ fn fognet_hash() -> u32 {
                 numbers.within(if !(3..=5).contains(&k) { 10 << 20 } else { 1 << 25 })
             });
             let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
-            minute.push(Second { features, turn });
+            minute.add(Second { features, turn });
         }
         let window = minute.window(Padding::None).expect("it is full");
         let estimate = network.estimate(&window);

@@ -12,7 +12,7 @@ fn place(aligner: &mut Aligner, time: u64) -> Result<(u32, u32), AlignError> {
     let mut sample = turning(0, AngularRate(7));
     sample.time = Micros(time);
     aligner
-        .process(sample)
+        .align(sample)
         .inspect(|frame| assert_eq!(frame.sample, sample))
         .map(|frame| (frame.tick, frame.missing))
 }
@@ -91,7 +91,7 @@ fn duplicates_and_steps_back_leave_the_grid() {
     let (last, at) = (Micros(2_000_000), Micros(1_990_000));
     assert_eq!(place(&mut aligner, 2_000_000), Err(AlignError::Duplicate { at: last }));
     // A clock that was set back by 10 ms.
-    assert_eq!(aligner.process(other), Err(AlignError::OffGrid { last, at: last }));
+    assert_eq!(aligner.align(other), Err(AlignError::OffGrid { last, at: last }));
     assert_eq!(place(&mut aligner, 2_000_000), Err(AlignError::Duplicate { at: last }));
     assert_eq!(place(&mut aligner, 1_990_000), Err(AlignError::Backwards { last, at }));
     assert_eq!(place(&mut aligner, 1_000_000), Err(AlignError::Backwards { last, at: Micros(1_000_000) }));

@@ -67,10 +67,10 @@ impl Cable {
         for now in (0..END_US).step_by(100) {
             while let Some(arrival) = imu.next_if(|arrival| arrival.now <= now) {
                 // What is refused is counted.
-                let _ = streams.push_imu(Micros(arrival.now), arrival.sample);
+                let _ = streams.add_imu(Micros(arrival.now), arrival.sample);
             }
             while let Some(arrival) = fog.next_if(|arrival| arrival.now <= now) {
-                let _ = streams.push_fog(Micros(arrival.now), arrival.sample);
+                let _ = streams.add_fog(Micros(arrival.now), arrival.sample);
             }
             while let Some(step) = streams.next_step(Micros(now)) {
                 let delay = now.saturating_sub(step.time.0);

@@ -45,7 +45,7 @@ fn resampled(period: f64) -> (Vec<Step>, f64) {
     for now in (0..3_000_000).step_by(500) {
         let time = 3_700 + (f64::from(sent) * period) as u64;
         if time <= now {
-            streams.push_imu(Micros(time), imu(time, wave(time) as i32)).expect("in order");
+            streams.add_imu(Micros(time), imu(time, wave(time) as i32)).expect("in order");
             sent += 1;
         }
         steps.extend(drain(&mut streams, now));
@@ -80,7 +80,7 @@ fn increments_are_neither_lost_nor_made_up() {
             let angle = (n * n % 1_000_003) as i64 * 1_000_001 - 500_000_000_000;
             let now = n * 1_000 + phase;
             // A part whose own clock started elsewhere.
-            streams.push_fog(Micros(now), fog(77_000_000 + n * 1_000, angle)).expect("in order");
+            streams.add_fog(Micros(now), fog(77_000_000 + n * 1_000, angle)).expect("in order");
             steps.extend(drain(&mut streams, now));
         }
         let sum: i64 = steps.iter().map(|step| step.fog.angle[2].expect("good").0).sum();
@@ -119,7 +119,7 @@ proptest! {
         let step = 10 * PERIOD_US;
         let mut increments = Increments::default();
         let end = Micros(step - before + u64::from(span));
-        increments.push(end, &FogSample { span, ..fog(end.0, angle) });
+        increments.add(end, &FogSample { span, ..fog(end.0, angle) });
         let first = (i128::from(angle) * i128::from(before) / i128::from(span)) as i64;
         let [_, _, taken] = increments.take(Micros(step)).angle;
         prop_assert_eq!(taken, Some(Angle(first)));
@@ -139,7 +139,7 @@ fn lost_increments_are_marked() {
         let lost = if n == 46 { 3 } else { 0 };
         let increment = if n == 77 { [None; 3] } else { fog(0, 1_000).increment };
         let sample = FogSample { lost, increment, ..fog(n * 1_000, 1_000) };
-        streams.push_fog(Micros(n * 1_000), sample).expect("in order");
+        streams.add_fog(Micros(n * 1_000), sample).expect("in order");
         steps.extend(drain(&mut streams, n * 1_000));
     }
     let of = |k: usize| (steps[k].fog.covered, steps[k].fog.angle[2]);
@@ -158,10 +158,10 @@ fn no_step_is_later_than_ten_milliseconds() {
     for now in (0..2_000_000u64).step_by(100) {
         let silent = now / 100_000 % 4;
         if now % 10_000 == 4_200 && silent & 1 == 0 {
-            streams.push_imu(Micros(now), imu(now, 5)).expect("in order");
+            streams.add_imu(Micros(now), imu(now, 5)).expect("in order");
         }
         if now % 1_000 == 300 && silent & 2 == 0 {
-            streams.push_fog(Micros(now), fog(now, 5)).expect("in order");
+            streams.add_fog(Micros(now), fog(now, 5)).expect("in order");
         }
         for step in drain(&mut streams, now) {
             worst = worst.max(now.saturating_sub(step.time.0));
@@ -188,7 +188,7 @@ fn gaps_of_the_inertial_sensor_are_bridged_or_reported() {
     let mut at = |time: u64| {
         while !resampler.has_reached(Micros(time)) {
             let next = samples.next().expect("a sample");
-            resampler.push(imu(next, next as i32));
+            resampler.add(imu(next, next as i32));
         }
         resampler.at(Micros(time))
     };
@@ -202,7 +202,7 @@ fn gaps_of_the_inertial_sensor_are_bridged_or_reported() {
 #[test]
 fn events_of_a_clock_are_reported() {
     let mut clock = PartClock::default();
-    let mut at = |stamp, arrival| clock.process(Micros(stamp), Micros(arrival));
+    let mut at = |stamp, arrival| clock.translate(Micros(stamp), Micros(arrival));
     let board = |time, jumped| Ok(BoardTime { time: Micros(time), jumped });
     // The first arrival was 3 ms late, as the second shows; the third is 5 ms late.
     assert_eq!(at(910_000, 503_000), board(503_000, false));
@@ -226,7 +226,7 @@ fn a_small_jump_is_found_within_a_second() {
     for n in 0..300u64 {
         // From the hundredth sample on the stamps are 40 ms behind.
         let stamp = 1_000_000 + n * 10_000 - if n >= 100 { 40_000 } else { 0 };
-        let board = clock.process(Micros(stamp), Micros(n * 10_000));
+        let board = clock.translate(Micros(stamp), Micros(n * 10_000));
         let Ok(board) = board else {
             assert!((100..=104).contains(&n), "sample {n}");
             continue;
@@ -236,7 +236,7 @@ fn a_small_jump_is_found_within_a_second() {
     }
     assert_eq!(clock.counters().jumps, 1);
     // Silence is not lateness.
-    assert!(!clock.process(Micros(13_950_000), Micros(12_995_000)).expect("in order").jumped);
+    assert!(!clock.translate(Micros(13_950_000), Micros(12_995_000)).expect("in order").jumped);
 }
 
 #[test]
@@ -248,7 +248,7 @@ fn a_slow_clock_is_followed() {
         let truth = n * 10_000;
         let stamp = truth - truth / 10_000;
         let arrival = truth + 500 + n * 7_919 % 1_500;
-        let board = clock.process(Micros(stamp), Micros(arrival)).expect("in order").time;
+        let board = clock.translate(Micros(stamp), Micros(arrival)).expect("in order").time;
         worst = worst.max(board.0.abs_diff(truth + 500));
     }
     println!("100 ppm slow with 1.5 ms of jitter: at most {worst} us off");
@@ -274,9 +274,9 @@ proptest! {
                 _ => now,
             };
             if is_imu {
-                let _ = streams.push_imu(Micros(now), imu(stamp, i32::MIN));
+                let _ = streams.add_imu(Micros(now), imu(stamp, i32::MIN));
             } else {
-                let _ = streams.push_fog(Micros(now), FogSample { span: passed as u32, ..fog(stamp, i64::MAX) });
+                let _ = streams.add_fog(Micros(now), FogSample { span: passed as u32, ..fog(stamp, i64::MAX) });
             }
             let restarts = streams.restarts();
             for step in drain(&mut streams, now) {

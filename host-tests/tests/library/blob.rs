@@ -1,10 +1,10 @@
 //! The weight file: whatever is wrong with one, it is refused with the right reason.
 
 use gyronet::model::blob::{BlobError, CRC, HEADER_LEN, HIDDEN, TOPOLOGY, file_len};
+use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{Blob, fognet_blob, weights};
 use gyronet::nn::Aligned;
-use gyronet::nn::lstm::Direction;
-use gyronet::window::{FEATURES, WINDOW};
+use gyronet::nn::lstm::DirectionWeights;
 use gyronet_host_tests::noise::Noise;
 
 /// A copy of the weights that come with the library, on a word boundary, with room behind.
@@ -48,7 +48,9 @@ fn provenance_len() -> usize {
 
 /// Offset of the first record of a layer's direction (0 forward, 1 backward).
 fn direction_at(layer: usize, direction: usize) -> usize {
-    let len = |inputs| 4 * (Direction::input_words(HIDDEN, inputs) + Direction::recurrent_words(HIDDEN));
+    let len = |inputs| {
+        4 * (DirectionWeights::input_words(HIDDEN, inputs) + DirectionWeights::recurrent_words(HIDDEN))
+    };
     let (first, second) = (len(FEATURES), len(2 * HIDDEN));
     HEADER_LEN + provenance_len() + [0, 2 * first][layer] + direction * [first, second][layer]
 }

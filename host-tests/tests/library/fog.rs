@@ -64,7 +64,7 @@ fn a_second_sums_increments_and_averages_the_rest() {
             inertial: (n % 2 == 0).then_some([1, -1, i32::MAX, i32::MIN, 3 + n / 2 % 2, 0]),
             wheels: Some([WheelSpeed(n), WheelSpeed(-n)]),
         };
-        let second = sums.push(&given).expect("nothing is missing");
+        let second = sums.add(&given).expect("nothing is missing");
         assert_eq!(second.is_some(), n == 99);
         let Some(second) = second else { continue };
         assert_eq!(second.turn, Angle(total));
@@ -81,7 +81,7 @@ fn a_second_needs_the_gyro_and_half_of_the_rest() {
             let mut given = frame(1);
             given.inertial = given.inertial.filter(|_| n < inertial);
             given.wheels = given.wheels.filter(|_| n < wheels);
-            sums.push(&given)
+            sums.add(&given)
         });
         judged.last().expect("there are a hundred")
     };
@@ -90,12 +90,12 @@ fn a_second_needs_the_gyro_and_half_of_the_rest() {
     assert_eq!(silent(100, 49), Err(Incomplete::Wheels));
     let mut sums = SecondSums::ZERO;
     for _ in 0..60 {
-        assert_eq!(sums.push(&frame(5)), Ok(None));
+        assert_eq!(sums.add(&frame(5)), Ok(None));
     }
-    assert_eq!(sums.push(&FogFrame { turn: None, ..frame(0) }), Err(Incomplete::Gyro));
+    assert_eq!(sums.add(&FogFrame { turn: None, ..frame(0) }), Err(Incomplete::Gyro));
     // What was summed before the gap is in no second.
     for n in 0..100 {
-        let second = sums.push(&frame(7)).expect("nothing is missing");
+        let second = sums.add(&frame(7)).expect("nothing is missing");
         assert_eq!(second.map(|second| second.turn), (n == 99).then_some(Angle(700)));
     }
 }
@@ -110,7 +110,7 @@ fn a_window_is_padded_as_configured() {
         assert_eq!(rows(&minute, padding), None, "{padding:?}");
     }
     for n in 0..130i64 {
-        minute.push(Second { features: [0; 8], turn: Angle(n) });
+        minute.add(Second { features: [0; 8], turn: Angle(n) });
         let have = n + 1;
         let newest = (have - STEPS as i64)..have;
         let repeat: Vec<i64> =

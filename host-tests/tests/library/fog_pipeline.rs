@@ -34,7 +34,7 @@ fn run(fog: &mut FogPipeline, steps: core::ops::Range<u64>, with: impl Fn(u64) -
     for step in steps {
         let now = Micros(step * PERIOD_US);
         if with(step) {
-            fog.push(now, sample(step)).expect("in order");
+            fog.add(now, sample(step)).expect("in order");
         }
         while let Some(yaw) = fog.next_step(now, Some([0; 6]), Some(&wheels())) {
             sent.push(yaw);
@@ -82,7 +82,7 @@ fn a_gyro_that_says_the_same_is_stuck() {
     // From step 301 on it repeats what it said in step 300.
     for step in 301..351 {
         let repeated = FogSample { time: Micros(step * PERIOD_US), ..sample(300) };
-        fog.push(Micros(step * PERIOD_US), repeated).expect("in order");
+        fog.add(Micros(step * PERIOD_US), repeated).expect("in order");
         let yaw = fog.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
         sent.push(yaw);
     }
@@ -112,7 +112,7 @@ fn a_stuck_gyro_is_found_while_its_clock_drifts() {
             let noise = if millisecond < 500 { millisecond as i64 * 7_919 % 1_000 } else { 0 };
             let increment = [None, None, Some(Angle(TURN / 10 + noise))];
             let reading = FogSample { time: Micros(stamp), span: 1_000, increment, ..sample(0) };
-            fog.push(now, reading).expect("in order");
+            fog.add(now, reading).expect("in order");
             while let Some(yaw) = fog.next_step(now, Some([0; 6]), Some(&wheels())) {
                 sent += 1;
                 let stuck = yaw.faults.contains(Faults::STUCK);
@@ -150,14 +150,14 @@ fn a_missing_input_is_reported() {
     assert!(sent.iter().all(|yaw| yaw.source == Source::Raw && yaw.faults == Faults::STORED));
     assert!(fog.window().is_none());
     let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
-    fog.push(Micros(PERIOD_US), sample(1)).expect("the first one");
+    fog.add(Micros(PERIOD_US), sample(1)).expect("the first one");
     let yaw = fog.next_step(Micros(PERIOD_US), Some([0; 6]), None).expect("a step");
     assert_eq!(yaw.faults, Faults::WHEELS);
     // Nobody runs the window in time.
     let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
     let mut late = 0;
     for step in 1..251 {
-        fog.push(Micros(step * PERIOD_US), sample(step)).expect("in order");
+        fog.add(Micros(step * PERIOD_US), sample(step)).expect("in order");
         let yaw = fog.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
         late += u32::from(yaw.faults == Faults::LATE && yaw.source == Source::Raw);
     }

@@ -5,7 +5,7 @@ use gyronet::model::fognet_blob::{
 };
 use gyronet::model::{Blob, blob, weights};
 use gyronet::nn::Aligned;
-use gyronet::nn::lstm::Direction;
+use gyronet::nn::lstm::DirectionWeights;
 use gyronet_host_tests::noise::Noise;
 
 const LEN: usize = weights::FOGNET.0.len();
@@ -25,7 +25,7 @@ fn with(at: usize, bytes: &[u8]) -> BlobError {
 }
 
 fn direction_len(units: usize, inputs: usize) -> usize {
-    4 * (Direction::input_words(units, inputs) + Direction::recurrent_words(units))
+    4 * (DirectionWeights::input_words(units, inputs) + DirectionWeights::recurrent_words(units))
 }
 
 #[test]

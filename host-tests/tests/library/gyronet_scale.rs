@@ -2,11 +2,11 @@
 //! its weights give, up to both ends of the range, and the network that comes with the library.
 
 use gyronet::model::blob::{CRC, HIDDEN};
+use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, SCALE_MAX, SCALE_MIN, WindowNetwork, weights};
 use gyronet::nn::Aligned;
 use gyronet::nn::dense::Dense;
 use gyronet::nn::exp2::{FRACTION_BITS, times_exp2};
-use gyronet::window::{FEATURES, Features, WINDOW};
 use gyronet_host_tests::noise::Noise;
 
 const LEN: usize = weights::DEFAULT.0.len();

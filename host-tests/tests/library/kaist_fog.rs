@@ -46,9 +46,9 @@ fn turns(increments: &[f64]) -> Vec<Angle> {
     let mut turns = Vec::new();
     for (now, message) in bytes(increments) {
         for byte in message {
-            part.push(byte);
+            part.receive(byte);
             while let Some(sample) = part.next_sample() {
-                streams.push_fog(now, sample.expect("intact")).expect("in time");
+                streams.add_fog(now, sample.expect("intact")).expect("in time");
             }
         }
         while let Some(step) = streams.next_step(now) {

@@ -29,7 +29,7 @@ fn bytes(hex: &str) -> Vec<u8> {
 fn feed(part: &mut Dsp1760, bytes: &[u8]) -> Vec<Result<FogSample, Dsp1760Error>> {
     let mut samples = Vec::new();
     for byte in bytes {
-        part.push(*byte);
+        part.receive(*byte);
         samples.extend(std::iter::from_fn(|| part.next_sample()));
     }
     samples

@@ -41,7 +41,7 @@ fn with_a_byte_lost(lost: usize, pauses: bool) -> (Vec<i32>, Vec<i32>) {
     for (n, value) in values.iter().enumerate() {
         let bytes = rate(*value).emit();
         let sent = bytes.iter().enumerate().filter(|(k, _)| 4 * n + k != lost);
-        got.extend(sent.filter_map(|(_, byte)| part.push(*byte)).map(|word| word.value));
+        got.extend(sent.filter_map(|(_, byte)| part.receive(*byte)).map(|word| word.value));
         if pauses {
             part.pause();
         }
@@ -69,7 +69,7 @@ fn words_of_another_kind_are_no_readings() {
     for (mode, sync) in [(Mode::Incremental, 0), (Mode::Rate, 1)] {
         let mut part = Dsp3000Binary::new(Mode::Rate, 0);
         let words = (0..200).map(|n| Word { mode, sync, ..rate(166_667 - 37 * n) });
-        let readings = words.flat_map(|word| word.emit()).filter_map(|byte| part.push(byte));
+        let readings = words.flat_map(|word| word.emit()).filter_map(|byte| part.receive(byte));
         // In another phase some may look as if they were.
         for word in readings {
             assert_eq!((word.mode, word.sync), (Mode::Rate, 0));
@@ -94,7 +94,7 @@ fn readings_become_samples() {
 
 fn lines(text: &[u8]) -> Vec<Result<Reading, LineError>> {
     let mut part = Dsp3000Ascii::new();
-    text.iter().filter_map(|byte| part.push(*byte)).collect()
+    text.iter().filter_map(|byte| part.receive(*byte)).collect()
 }
 
 #[test]
@@ -146,6 +146,6 @@ proptest! {
     fn any_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..500)) {
         lines(&bytes);
         let mut part = Dsp3000Binary::new(Mode::Rate, 0);
-        prop_assert!(bytes.iter().filter_map(|byte| part.push(*byte)).count() <= bytes.len() / 4);
+        prop_assert!(bytes.iter().filter_map(|byte| part.receive(*byte)).count() <= bytes.len() / 4);
     }
 }

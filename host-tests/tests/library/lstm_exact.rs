@@ -2,8 +2,8 @@
 //! at a time, in 64 bits, written from the documentation of `gyronet::nn`.
 
 use gyronet::nn::activation::{saturate, sigmoid, tanh};
-use gyronet::nn::bilstm::{Layer, Run, Way, word_index};
-use gyronet::nn::lstm::{Accumulators, Direction, ROW_LIMIT, Scratch, row_bound};
+use gyronet::nn::bilstm::{Direction, Layer, Run, word_index};
+use gyronet::nn::lstm::{Accumulators, DirectionWeights, ROW_LIMIT, Scratch, row_bound};
 use gyronet::nn::lstm::{project, project_portable, step, step_portable};
 use gyronet::nn::{GATES, HIDDEN_MAX};
 use gyronet_host_tests::noise::{Noise, cases};
@@ -39,12 +39,12 @@ fn naive_step(rows: &Rows, x: &[i16], previous: &[i16], cell: &[i32]) -> (Vec<i3
 }
 
 /// Hidden states (T, U) of one direction over (T, I).
-fn naive_direction(rows: &Rows, way: Way, x: &[Vec<i16>]) -> Vec<Vec<i16>> {
+fn naive_direction(rows: &Rows, way: Direction, x: &[Vec<i16>]) -> Vec<Vec<i16>> {
     let units = rows.0.len();
     let (mut cell, mut hidden) = (vec![0; units], vec![0; units]);
     let mut output = vec![Vec::new(); x.len()];
     for n in 0..x.len() {
-        let t = if way == Way::Forward { n } else { x.len() - 1 - n };
+        let t = if way == Direction::Forward { n } else { x.len() - 1 - n };
         (cell, hidden) = naive_step(rows, &x[t], &hidden, &cell);
         output[t].clone_from(&hidden);
     }
@@ -107,8 +107,13 @@ fn check_step<const U: usize, const W: usize>(inputs: usize, seed: u64) {
         for (x, projection) in x.iter().zip(&projections[0]) {
             let zero = vec![0; U];
             let expected = naive_step(&rows, x, if previous.is_some() { &hidden } else { &zero }, &cell);
-            type Step<const U: usize, const W: usize> =
-                fn(&Direction<'_>, &[Accumulators; U], Option<&[u32; W]>, &mut [i32; U], &mut [u32; W]);
+            type Step<const U: usize, const W: usize> = fn(
+                &DirectionWeights<'_>,
+                &[Accumulators; U],
+                Option<&[u32; W]>,
+                &mut [i32; U],
+                &mut [u32; W],
+            );
             for kernel in [step::<U, W> as Step<U, W>, step_portable::<U, W>] {
                 let (mut cell, mut hidden) = (cell, [0; W]);
                 kernel(&direction, projection, previous, &mut cell, &mut hidden);
@@ -122,7 +127,7 @@ fn check_step<const U: usize, const W: usize>(inputs: usize, seed: u64) {
 fn check_run<const U: usize, const W: usize>(inputs: usize, steps: usize, seed: u64) {
     let mut noise = Noise::new(seed);
     let input_max = 24 * HIDDEN_MAX;
-    let ways = [Way::Forward, Way::Backward];
+    let ways = [Direction::Forward, Direction::Backward];
     let rows = [(inputs, input_max), (2 * U, HIDDEN_MAX)]
         .map(|(inputs, max)| ways.map(|_| Rows::random(&mut noise, inputs, U, max)));
     let packed = rows.each_ref().map(|layer| layer.each_ref().map(Rows::pack));
@@ -142,11 +147,11 @@ fn check_run<const U: usize, const W: usize>(inputs: usize, steps: usize, seed: 
     }
     let (mut between, mut scratch, mut run) = (vec![0; steps * U], Scratch::<U, W>::ZERO, Run::new());
     // With room for a copy of the weights, and without.
-    let mut room = vec![0; if seed.is_multiple_of(2) { U * (Direction::padded(U) + 2) } else { 0 }];
+    let mut room = vec![0; if seed.is_multiple_of(2) { U * (DirectionWeights::padded(U) + 2) } else { 0 }];
     let mut seen = [vec![None; steps], vec![None; steps]];
     let mut pieces = 0;
     while run.advance(&layers, &input, &mut between, &mut scratch, &mut room, |way, step, hidden| {
-        seen[usize::from(way == Way::Backward)][step] = Some(unpack::<U>(hidden).to_vec());
+        seen[usize::from(way == Direction::Backward)][step] = Some(unpack::<U>(hidden).to_vec());
     }) {
         pieces += 1;
     }
@@ -173,12 +178,15 @@ fn the_rows_reach_their_bounds() {
 fn sizes_that_do_not_fit_are_refused() {
     let packed = Rows::random(&mut Noise::new(9), 6, 4, HIDDEN_MAX).pack();
     let (input, recurrent) = (packed.direction().input(), packed.direction().recurrent());
-    assert!(Direction::new(4, 6, input, recurrent).is_some());
+    assert!(DirectionWeights::new(4, 6, input, recurrent).is_some());
     for (units, inputs) in [(4, 8), (4, 4), (6, 6), (2, 6), (0, 0), (3, 6), (4, 5)] {
-        assert!(Direction::new(units, inputs, input, recurrent).is_none(), "{units} units, {inputs} inputs");
+        assert!(
+            DirectionWeights::new(units, inputs, input, recurrent).is_none(),
+            "{units} units, {inputs} inputs"
+        );
     }
-    assert!(Direction::new(4, 6, &input[1..], recurrent).is_none());
-    assert!(Direction::new(4, 6, input, &recurrent[1..]).is_none());
+    assert!(DirectionWeights::new(4, 6, &input[1..], recurrent).is_none());
+    assert!(DirectionWeights::new(4, 6, input, &recurrent[1..]).is_none());
 }
 
 proptest! {

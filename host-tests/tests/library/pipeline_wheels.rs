@@ -47,12 +47,12 @@ fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<u16>) -> Vec<Output> {
         if let Some(speed) = wheels(tick) {
             let [low, high] = speed.to_le_bytes();
             let frame = DataFrame::new(ID, &[low, high, low, high]).expect("four bytes");
-            receiver.process(&frame, now).expect("a wheel frame").expect("a good one");
+            receiver.decode(&frame, now).expect("a wheel frame").expect("a good one");
         }
         if let Some(known) = receiver.poll(now) {
             pipeline.wheels(known);
         }
-        pipeline.process(turning(tick, rate(0.001))).expect("a place on the grid")
+        pipeline.correct(turning(tick, rate(0.001))).expect("a place on the grid")
     };
     (0..ticks).map(step).collect()
 }

@@ -64,7 +64,7 @@ fn samples(bytes: &[u8]) -> usize {
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
     let mut samples = 0;
     for byte in bytes {
-        part.push(*byte);
+        part.receive(*byte);
         samples += std::iter::from_fn(|| part.next_sample()).count();
     }
     samples
@@ -163,7 +163,7 @@ fn a_flipped_bit_of_an_icm42688_packet_breaks_its_header_or_changes_a_value() {
 
 fn lines(bytes: &[u8]) -> Vec<Result<Reading, LineError>> {
     let mut part = Dsp3000Ascii::new();
-    bytes.iter().filter_map(|byte| part.push(*byte)).collect()
+    bytes.iter().filter_map(|byte| part.receive(*byte)).collect()
 }
 
 /// No checksum: a flipped bit is found where it leaves the form of a line; else it changes a digit,

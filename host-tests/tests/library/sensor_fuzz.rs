@@ -19,7 +19,7 @@ fn random(seed: u8) -> TestRng {
 fn samples<P: ByteSource>(part: &mut P, stream: &[u8]) -> Vec<P::Sample> {
     let mut samples = Vec::new();
     for byte in stream {
-        part.push(*byte);
+        part.receive(*byte);
         while let Some(sample) = part.next_sample() {
             samples.extend(sample);
         }

@@ -10,7 +10,7 @@ use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
 use gyronet::service::frame::{Deframer, FrameError, MAX_FRAME, emit};
 use gyronet::service::message::{AllCounters, Calibrate, FlashState, Identity, Origin, Refusal};
-use gyronet::service::{Device, Drives, Reply, Request};
+use gyronet::service::{Device, Reply, Request, SupportedHardware};
 use gyronet::store::layout::{self, RECORD_SECTOR};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{
@@ -26,8 +26,8 @@ use std::ops::Range;
 use std::rc::Rc;
 
 type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
-const DRIVES: Drives =
-    Drives { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], bits_per_second: &[500_000] };
+const DRIVES: SupportedHardware =
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], bits_per_second: &[500_000] };
 const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
     device_id: Some(0x413),
@@ -68,10 +68,10 @@ fn bare() -> Board {
 fn ask(board: &mut Board, request: &Request) -> Reply {
     let frame = emit(7, request).expect("it fits");
     let answers: Vec<_> =
-        frame.iter().filter_map(|byte| board.push(*byte, &AllCounters::default())).collect();
+        frame.iter().filter_map(|byte| board.receive(*byte, &AllCounters::default())).collect();
     let [answer] = &answers[..] else { panic!("{} answers", answers.len()) };
     let mut deframer = Deframer::new();
-    let mut replies = answer.iter().filter_map(|byte| deframer.push::<Reply>(*byte));
+    let mut replies = answer.iter().filter_map(|byte| deframer.receive::<Reply>(*byte));
     let (number, reply) = replies.next().expect("a frame").expect("a reply");
     assert_eq!((number, replies.next()), (7, None));
     reply
@@ -452,10 +452,10 @@ proptest! {
             let length = noise.int(0, 2_000);
             for _ in 0..length {
                 // Noise whose frames would have a right checksum is one in 2^32.
-                prop_assert!(board.push(noise.byte(), &AllCounters::default()).is_none());
+                prop_assert!(board.receive(noise.byte(), &AllCounters::default()).is_none());
             }
             for byte in emit(1, &Request::Info).expect("it fits") {
-                answers += usize::from(board.push(byte, &AllCounters::default()).is_some());
+                answers += usize::from(board.receive(byte, &AllCounters::default()).is_some());
             }
         }
         prop_assert_eq!(answers, 10);
@@ -472,7 +472,7 @@ proptest! {
         let mut frame = vec![0; content.len() + 4];
         let len = cobs::encode(&content, &mut frame[1..]);
         frame.truncate(len + 2);
-        let answers: Vec<_> = frame.iter().filter_map(|b| board.push(*b, &AllCounters::default())).collect();
+        let answers: Vec<_> = frame.iter().filter_map(|b| board.receive(*b, &AllCounters::default())).collect();
         prop_assert_eq!(answers.len(), 1);
         prop_assert!(answers[0].len() <= MAX_FRAME);
     }
@@ -486,7 +486,7 @@ proptest! {
         frame[at] ^= 1 << bit;
         let mut deframer = Deframer::new();
         for byte in frame.iter().chain(&[0]) {
-            if let Some(Ok((_, request))) = deframer.push::<Request>(*byte) {
+            if let Some(Ok((_, request))) = deframer.receive::<Request>(*byte) {
                 prop_assert!(false, "{request:?}");
             }
         }
@@ -497,6 +497,6 @@ proptest! {
 fn a_message_that_is_too_long_is_refused() {
     let mut deframer = Deframer::new();
     let long: Vec<_> =
-        [0].into_iter().chain([1; 2_000]).chain([0]).filter_map(|b| deframer.push::<Request>(b)).collect();
+        [0].into_iter().chain([1; 2_000]).chain([0]).filter_map(|b| deframer.receive::<Request>(b)).collect();
     assert_eq!(long, [Err(FrameError::TooLong)]);
 }

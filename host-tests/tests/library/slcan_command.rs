@@ -13,9 +13,9 @@ fn converse(session: &mut Session, bytes: &[u8]) -> (Vec<u8>, Vec<DataFrame>) {
     let mut assembler = LineAssembler::new();
     let (mut answers, mut frames) = (Vec::new(), Vec::new());
     for byte in bytes {
-        let reaction = match assembler.push(*byte) {
+        let reaction = match assembler.receive(*byte) {
             None => continue,
-            Some(Ok(line)) => session.process(line, StatusFlags::default()),
+            Some(Ok(line)) => session.execute(line, StatusFlags::default()),
             Some(Err(TooLong)) => session.refuse(),
         };
         answers.extend(reaction.answer);
@@ -83,7 +83,7 @@ fn bit_rates_have_their_digits() {
 fn the_status_is_reported() {
     let flags =
         StatusFlags(StatusFlags::BUS_ERROR.0 | StatusFlags::TRANSMIT_FULL.0 | StatusFlags::ERROR_PASSIVE.0);
-    assert_eq!(session().process(b"F", flags).answer, b"FA2\r");
+    assert_eq!(session().execute(b"F", flags).answer, b"FA2\r");
 }
 
 #[test]
@@ -123,17 +123,17 @@ fn time_stamps_come_on_demand() {
 fn long_lines_end_somewhere() {
     let mut assembler = LineAssembler::new();
     for _ in 0..100_000 {
-        assert_eq!(assembler.push(b'A'), None);
+        assert_eq!(assembler.receive(b'A'), None);
     }
-    assert_eq!(assembler.push(b'\r'), Some(Err(TooLong)));
+    assert_eq!(assembler.receive(b'\r'), Some(Err(TooLong)));
     for byte in *b"V" {
-        assert_eq!(assembler.push(byte), None);
+        assert_eq!(assembler.receive(byte), None);
     }
-    assert_eq!(assembler.push(b'\r'), Some(Ok(&b"V"[..])));
+    assert_eq!(assembler.receive(b'\r'), Some(Ok(&b"V"[..])));
     for _ in 0..MAX_HOST_LINE {
-        assert_eq!(assembler.push(b'B'), None);
+        assert_eq!(assembler.receive(b'B'), None);
     }
-    assert_eq!(assembler.push(b'\r'), Some(Ok(&[b'B'; MAX_HOST_LINE][..])));
+    assert_eq!(assembler.receive(b'\r'), Some(Ok(&[b'B'; MAX_HOST_LINE][..])));
 }
 
 proptest! {

@@ -87,7 +87,7 @@ fn minute(config: Config, baud: u32, hello: &[u8]) -> u32 {
     for tick in 0..6_000 {
         let sample = synthetic::vehicle(tick, synthetic::rate(0.1), gyronet::units::Yaw(0));
         for frame in encoder.encode(&sample) {
-            port.push(frame, Micros(u64::from(tick) * PERIOD_US));
+            port.enqueue(frame, Micros(u64::from(tick) * PERIOD_US));
         }
         // A UART holds nothing over for later.
         line.room = (baud / BITS / 100) as usize;
@@ -123,7 +123,7 @@ fn a_line_that_stalls_breaks_or_goes_holds_up_nothing() {
             outputs.extend(run(&mut pipeline, [sample], constant(0.002)));
             for frame in encoder.encode(&outputs[tick].vehicle) {
                 all.push(frame);
-                port.push(frame, sample.time);
+                port.enqueue(frame, sample.time);
             }
             // In the middle of a line, which must be whole nevertheless.
             let gone = (400..800).contains(&tick);
@@ -148,8 +148,8 @@ fn a_line_that_stalls_breaks_or_goes_holds_up_nothing() {
 fn commands_are_answered_between_frames() {
     let mut port = Port::<QUEUE>::new(500_000);
     let mut line = Line { room: 10, ..Line::default() };
-    port.push(frame(1), Micros(0));
-    port.push(frame(2), Micros(1_234_000));
+    port.enqueue(frame(1), Micros(0));
+    port.enqueue(frame(2), Micros(1_234_000));
     port.service(&mut line, |_| ()).expect("the line holds");
     line.received.extend(b"V\rZ1\rt0AA21A6F\r");
     line.room = 1_000;
@@ -168,7 +168,7 @@ fn the_bus_state_is_reported_beside_drops() {
     let mut port = Port::<1>::new(500_000);
     let mut line = Line { room: 1_000, ..Line::default() };
     port.set_bus(StatusFlags::BUS_ERROR);
-    (0..2).for_each(|number| port.push(frame(number), Micros(0)));
+    (0..2).for_each(|number| port.enqueue(frame(number), Micros(0)));
     line.received.extend(b"F\rF\r");
     port.service(&mut line, |_| ()).expect("the line holds");
     // The drop once, the bus as long as it is off.
@@ -185,7 +185,7 @@ fn drops_are_reported_once() {
     let mut port = Port::<2>::new(500_000);
     let mut line = Line::default();
     for number in 0..5 {
-        port.push(frame(number), Micros(0));
+        port.enqueue(frame(number), Micros(0));
     }
     line.received.extend(b"F\rF\r");
     line.room = 1_000;
@@ -218,7 +218,7 @@ proptest! {
         let (mut line, mut number) = (Line::default(), 0);
         for (pushes, room, broken, said) in turns {
             for _ in 0..pushes {
-                port.push(frame(number), Micros(0));
+                port.enqueue(frame(number), Micros(0));
                 number += 1;
             }
             line.received.extend(said.bytes());

@@ -62,7 +62,7 @@ fn a_bus_that_is_gone_costs_the_oldest_frames() {
     let mut gone = Controller::new([]);
     // Ten seconds of six frames every ten milliseconds.
     for number in 0..6_000 {
-        queue.push(frame(number));
+        queue.enqueue(frame(number));
         assert_eq!(queue.service(&mut gone), 0);
         assert!(!queue.is_empty());
     }
@@ -80,7 +80,7 @@ fn a_bus_that_is_off_is_counted_and_tried_again() {
     let mut queue = TransmitQueue::<DataFrame, 2>::new();
     let mut controller = Controller::new([Mood::Off, Mood::Off, Mood::Takes, Mood::Takes]);
     for number in 0..3 {
-        queue.push(frame(number));
+        queue.enqueue(frame(number));
     }
     assert_eq!(queue.service(&mut controller), 0);
     assert_eq!(queue.service(&mut controller), 0);
@@ -93,7 +93,7 @@ fn a_bus_that_is_off_is_counted_and_tried_again() {
 fn a_frame_that_is_given_back_is_not_lost() {
     let mut queue = TransmitQueue::<DataFrame, 3>::new();
     for number in 0..3 {
-        queue.push(frame(number));
+        queue.enqueue(frame(number));
     }
     let mut controller = Controller::new([Mood::Swaps, Mood::Swaps, Mood::Takes]);
     assert_eq!(queue.service(&mut controller), 2);
@@ -119,7 +119,7 @@ proptest! {
         let mut number = 0;
         for count in pushes {
             for _ in 0..count {
-                queue.push(frame(number));
+                queue.enqueue(frame(number));
                 number += 1;
             }
             let before = controller.tries;

@@ -68,14 +68,14 @@ fn speeds_are_read_in_metres_per_second() {
     let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
     // 0.01 km/h: 6767 + 3600 for the front right wheel, standstill for the others.
     let sample = receiver
-        .process(&frame(ID, &[0x28, 0x7F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]), Micros(0))
+        .decode(&frame(ID, &[0x28, 0x7F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]), Micros(0))
         .expect("a wheel frame")
         .expect("valid");
     let [front_left, front_right, ..] = sample.speeds.map(|speed| speed.expect("known").metre_per_sec());
     assert!((front_right - 10.0).abs() < 1e-3, "{front_right}");
     assert!(front_left.abs() < 1e-3, "{front_left}");
     assert_eq!(sample.standstill, Standstill::Moving);
-    assert!(receiver.process(&frame(OTHER, &[0; 8]), Micros(0)).is_none(), "not a wheel frame");
+    assert!(receiver.decode(&frame(OTHER, &[0; 8]), Micros(0)).is_none(), "not a wheel frame");
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn standing_still_is_asserted_late_and_dropped_at_once() {
     let mut now = 0;
     let mut step = |kmh: f64| {
         now += 20 * MS;
-        receiver.process(&at_kmh(kmh), Micros(now)).expect("a wheel frame").expect("valid").standstill
+        receiver.decode(&at_kmh(kmh), Micros(now)).expect("a wheel frame").expect("valid").standstill
     };
     assert_eq!(step(5.0), Standstill::Moving);
     for _ in 0..10 {
@@ -101,16 +101,16 @@ fn silence_is_neither_standing_nor_moving() {
     let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
     assert_eq!(receiver.poll(Micros(0)), None, "nothing has come");
     for k in 0..=20 {
-        let _ = receiver.process(&at_kmh(0.0), Micros(k * 20 * MS));
+        let _ = receiver.decode(&at_kmh(0.0), Micros(k * 20 * MS));
     }
     assert_eq!(receiver.poll(Micros(450 * MS)).expect("frames have come").standstill, Standstill::Still);
     let silent = receiver.poll(Micros(451 * MS)).expect("frames have come");
     assert_eq!((silent.standstill, silent.speeds), (Standstill::Unknown, [None; 4]));
     // After the gap the time of standing starts again.
-    let sample = receiver.process(&at_kmh(0.0), Micros(800 * MS)).expect("a wheel frame").expect("valid");
+    let sample = receiver.decode(&at_kmh(0.0), Micros(800 * MS)).expect("a wheel frame").expect("valid");
     assert_eq!(sample.standstill, Standstill::Unknown);
     // The same without anyone having asked in between.
-    let sample = receiver.process(&at_kmh(0.0), Micros(9_000 * MS)).expect("a wheel frame").expect("valid");
+    let sample = receiver.decode(&at_kmh(0.0), Micros(9_000 * MS)).expect("a wheel frame").expect("valid");
     assert_eq!(sample.standstill, Standstill::Unknown);
     // A clock that goes backwards does no harm.
     assert_eq!(receiver.poll(Micros(0)).expect("frames have come").standstill, Standstill::Unknown);
@@ -120,10 +120,10 @@ fn silence_is_neither_standing_nor_moving() {
 fn one_wheel_that_is_not_valid_ends_standing() {
     let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
     for k in 0..=20 {
-        let _ = receiver.process(&at_kmh(0.0), Micros(k * 20 * MS));
+        let _ = receiver.decode(&at_kmh(0.0), Micros(k * 20 * MS));
     }
     let marked = frame(ID, &[0xFF, 0xFF, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
-    let refused = receiver.process(&marked, Micros(420 * MS)).expect("a wheel frame");
+    let refused = receiver.decode(&marked, Micros(420 * MS)).expect("a wheel frame");
     assert_eq!(refused, Err(WheelError::Invalid { wheel: 1 }));
     let sample = receiver.poll(Micros(420 * MS)).expect("frames have come");
     assert_eq!(sample.standstill, Standstill::Unknown);
@@ -140,14 +140,14 @@ fn wheels_may_be_spread_over_frames() {
     let mut receiver = WheelReceiver::new(spread).expect("checked");
     let still = at_kmh(0.0);
     for k in 0..20 {
-        let _ = receiver.process(&frame(id(0x100), still.data()), Micros(k * 20 * MS));
+        let _ = receiver.decode(&frame(id(0x100), still.data()), Micros(k * 20 * MS));
     }
     assert_eq!(
         receiver.poll(Micros(400 * MS)).expect("frames have come").standstill,
         Standstill::Unknown,
         "the rear is silent"
     );
-    let _ = receiver.process(&frame(id(0x101), still.data()), Micros(400 * MS));
+    let _ = receiver.decode(&frame(id(0x101), still.data()), Micros(400 * MS));
     assert_eq!(
         receiver.poll(Micros(401 * MS)).expect("frames have come").speeds.map(|speed| speed.is_some()),
         [true; 4]
@@ -171,7 +171,7 @@ fn wrong_checksums_and_counters_are_refused() {
             let mut data = [0x55, 0xAA, 0x9C, 0xFF, 0x2C, 0x01, counter, 0];
             data[7] = compute(&data);
             data[2] ^= damage;
-            receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame")
+            receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame")
         };
         let [.., left, right] = send(0, 0).expect("valid").speeds;
         assert!((left.expect("known").metre_per_sec() + 1.0).abs() < 1e-3);
@@ -182,7 +182,7 @@ fn wrong_checksums_and_counters_are_refused() {
         assert!(send(15, 0).is_ok());
         assert!(send(0, 0).is_ok());
         assert_eq!(receiver.lost(), 1 + 12);
-        let short = receiver.process(&frame(OTHER, &[0; 3]), Micros(0)).expect("a wheel frame");
+        let short = receiver.decode(&frame(OTHER, &[0; 3]), Micros(0)).expect("a wheel frame");
         assert_eq!(short, Err(WheelError::Short(3)));
     }
 }
@@ -194,11 +194,11 @@ fn e2e_protected_frames_are_checked() {
     let mut receiver = WheelReceiver::new(settings(layout)).expect("checked");
     let mut data = [0; 8];
     profile.protect(&mut data, 3).expect("eight bytes");
-    assert!(receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame").is_ok());
-    let again = receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
+    assert!(receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame").is_ok());
+    let again = receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
     assert_eq!(again, Err(WheelError::Repeated));
     data[5] ^= 4;
-    let damaged = receiver.process(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
+    let damaged = receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
     assert!(matches!(damaged, Err(WheelError::E2e(Fault::Crc { .. }))));
 }
 
@@ -296,7 +296,7 @@ proptest! {
             _ => Checksum::Sum { at: 3 },
         };
         let mut receiver = WheelReceiver::new(settings(two_wheels(checksum))).expect("checked");
-        let _ = receiver.process(&frame(OTHER, &data), Micros(now));
+        let _ = receiver.decode(&frame(OTHER, &data), Micros(now));
         let _ = receiver.poll(Micros(now.wrapping_mul(3)));
     }
 }

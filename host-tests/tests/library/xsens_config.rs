@@ -17,7 +17,7 @@ const SET_OUTPUT_CONFIGURATION: [u8; 29] = [
 ];
 
 fn push(dialogue: &mut Dialogue, bytes: &[u8]) {
-    bytes.iter().for_each(|byte| dialogue.push(*byte));
+    bytes.iter().for_each(|byte| dialogue.receive(*byte));
 }
 
 fn frame(mid: u8, data: &[u8]) -> Vec<u8> {

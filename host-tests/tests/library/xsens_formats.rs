@@ -41,7 +41,7 @@ fn one_message_is_the_same_in_each_precision() {
         let (_, data) = xbus::parse(&frame).expect("intact");
         assert_eq!(MtData2::parse(data), Ok(message), "{precision:?}");
         let mut mti = Mti::new();
-        frame.iter().for_each(|byte| mti.push(*byte));
+        frame.iter().for_each(|byte| mti.receive(*byte));
         mti.next_sample().expect("a frame").expect("a sample")
     });
     assert!(samples.iter().all(|sample| *sample == samples[0]));

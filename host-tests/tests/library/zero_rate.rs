@@ -55,7 +55,7 @@ fn run_with(
         if let Some(standstill) = standstill(tick) {
             pipeline.wheels(wheels(&sample, standstill));
         }
-        let output = pipeline.process(sample).expect("a place on the grid");
+        let output = pipeline.correct(sample).expect("a place on the grid");
         if let Some(due) = &output.window {
             pipeline.deliver(due.end, network(due).expect("an estimate"));
         }
@@ -185,7 +185,7 @@ fn uncertainty_grows_with_time_and_temperature_and_shrinks_at_stops() {
     let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
     let mut go = |seconds: u32, source, celsius: i16| {
         for _ in 0..100 * seconds {
-            zero_rate.process(Some(rate(0.0001)), source, Some(CentiCelsius(100 * celsius)));
+            zero_rate.observe(Some(rate(0.0001)), source, Some(CentiCelsius(100 * celsius)));
         }
         (zero_rate.sigma(), zero_rate.bias().rad_per_sec())
     };

@@ -30,7 +30,7 @@ fn minute(window: &Window) -> Minute {
         let rate = [rx, ry, rz].map(|rate| AngularRate::from_rad_per_sec(rate).expect("in range").0);
         let way = [left, right].map(|way| (way * (1u32 << WheelSpeed::FRACTION_BITS) as f32) as i32);
         let features = [force.as_slice(), &rate, &way].concat().try_into().expect("eight of them");
-        minute.push(Second { features, turn: Angle::from_rad(turn).expect("in range") });
+        minute.add(Second { features, turn: Angle::from_rad(turn).expect("in range") });
     }
     minute
 }

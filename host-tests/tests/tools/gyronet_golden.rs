@@ -2,9 +2,9 @@
 //! of the built-in weight file in its output.
 
 use gyronet::model::blob::HIDDEN;
+use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet::window::{FEATURES, Features, WINDOW};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_tools::network::checkpoint::Checkpoint;

@@ -1,11 +1,11 @@
 //! Standing still on recordings: half an hour of it, and what looks like it on the road.
 
 use gyronet::bias::{QuietConfig, QuietDetector, STATIC_SAMPLES, StaticConfig, StaticInit};
+use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
 use gyronet::units::{AngularRate, Micros, WheelSpeed};
-use gyronet::window::WINDOW;
 use gyronet_host_tests::recordings;
 use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::synthetic::{force, rate};
@@ -44,7 +44,7 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
             let speeds = [Some(WheelSpeed(0)); WHEELS];
             pipeline.wheels(WheelSample { time: sample.time, speeds, standstill });
         }
-        let output = pipeline.process(sample).expect("a place on the grid");
+        let output = pipeline.correct(sample).expect("a place on the grid");
         assert_eq!(output.refused, None);
         // No network has been trained for this part.
         if let Some(due) = output.window {
@@ -105,11 +105,11 @@ fn quiet_is_found_at_rest_and_hardly_ever_on_the_road() {
         let recording = Recording::read(&path).expect("a recording");
         let (start, rest) = recording.rows.split_at(STATIC_SAMPLES as usize);
         let mut init = StaticInit::new(StaticConfig::DEFAULT);
-        let judged = start.iter().filter_map(|row| init.process(&row.sample)).last();
+        let judged = start.iter().filter_map(|row| init.add(&row.sample)).last();
         let at_rest = judged.expect("a verdict").expect("it stands");
         let mut detector = QuietDetector::new(QuietConfig::DEFAULT, &StaticConfig::DEFAULT, &at_rest);
         for row in rest {
-            let quiet = detector.process(&row.sample);
+            let quiet = detector.observe(&row.sample);
             let (fastest, slowest) = wheels(row);
             if fastest < STANDS {
                 still += 1;

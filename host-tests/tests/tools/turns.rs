@@ -2,10 +2,10 @@
 //! goes with it, the integer network's correction stays where it was. Weights trained on the
 //! drives alone failed here: a turn faster than theirs was taken for an error and marked good.
 
+use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet::window::{Features, WINDOW};
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::Recording;
@@ -24,7 +24,7 @@ const LARGEST: f64 = 0.001;
 /// Returns every twentieth window of the pipeline.
 fn windows(recording: &Recording) -> Vec<[Features; WINDOW]> {
     let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
-    let outputs = recording.rows.iter().filter_map(|row| pipeline.process(row.sample).ok());
+    let outputs = recording.rows.iter().filter_map(|row| pipeline.correct(row.sample).ok());
     outputs.filter_map(|output| output.window).map(|due| due.features).step_by(20).collect()
 }
 

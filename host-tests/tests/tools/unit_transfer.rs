@@ -13,10 +13,10 @@
 //! estimates of the unmodified drive, held as they were (`unmoved`). There the network must not add
 //! to it: the error stays within 10 % of `unmoved`, and is not within 10 % of the unmodified drive's.
 
+use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet::window::{Features, WINDOW};
 use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::{Drive, Step};

@@ -7,9 +7,9 @@ use cortex_m::peripheral::{DCB, DWT};
 use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::gyronet::GyroNetState;
+use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::units::Angle;
-use gyronet::window::{FEATURES, WINDOW};
 
 /// Counts a window of each network.
 pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
@@ -40,7 +40,7 @@ fn fognet(report: &mut Report) {
     };
     let mut network = FogNet::new(blob, state);
     for _ in 0..STEPS {
-        minute.push(Second { features: [0; _], turn: Angle::ZERO });
+        minute.add(Second { features: [0; _], turn: Angle::ZERO });
     }
     let Some(window) = minute.window(Padding::None) else { return };
     watchdog::feed();

@@ -149,7 +149,7 @@ impl Idle {
         }
         for _ in 0..SERVICE_TURN {
             let Some(byte) = self.service.receive() else { return };
-            if let Some(answer) = self.device.push(byte, counters) {
+            if let Some(answer) = self.device.receive(byte, counters) {
                 self.answer = answer;
                 return;
             }

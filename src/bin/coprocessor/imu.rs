@@ -66,7 +66,7 @@ impl Imu {
                     return Some(sample.map_err(drop));
                 }
                 *turn = turn.checked_sub(1)?;
-                mti.push(port.receive()?);
+                mti.receive(port.receive()?);
             },
             Self::Spi(part) => {
                 *turn = turn.checked_sub(LOOK)?;

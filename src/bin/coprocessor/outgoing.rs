@@ -36,9 +36,9 @@ impl Outgoing {
 
     /// Queues a frame; `stamp` is the time of its measurement.
     pub fn push(&mut self, frame: DataFrame, stamp: Micros) {
-        self.port.push(frame, stamp);
+        self.port.enqueue(frame, stamp);
         if self.can.is_some() {
-            self.queue.push((frame, self.now));
+            self.queue.enqueue((frame, self.now));
         }
     }
 

@@ -131,7 +131,7 @@ impl Output {
         }
         for _ in 0..board::FOG_RING {
             let Some(byte) = self.fog.receive() else { break };
-            self.dsp1760.push(byte);
+            self.dsp1760.receive(byte);
             while let Some(sample) = self.dsp1760.next_sample() {
                 match sample {
                     Ok(sample) => {

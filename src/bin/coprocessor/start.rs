@@ -13,11 +13,11 @@ use gyronet::coprocessor::{Clock, Config, StorageFaults};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{Blob, FogBlob, FogNet, weights};
-use gyronet::service::{Device, Drives};
+use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{FogPart, ImuPart};
 
 /// The hardware that this image drives. It listens to a fibre-optic gyro whether one is configured or not.
-const DRIVES: Drives = Drives {
+const DRIVES: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti, ImuPart::Icm42688],
     fogs: &[FogPart::Dsp1760],
     bits_per_second: &[BITS_PER_SECOND],

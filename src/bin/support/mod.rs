@@ -4,7 +4,7 @@ mod numbers;
 
 pub use numbers::Numbers;
 
-use gyronet::nn::lstm::Direction;
+use gyronet::nn::lstm::DirectionWeights;
 
 /// Random input and recurrent records of one direction, made by the compiler and kept in flash.
 ///
@@ -19,7 +19,7 @@ impl<const INPUT: usize, const RECURRENT: usize> Records<INPUT, RECURRENT> {
     pub const fn random(units: usize, inputs: usize, weight: i32, seed: u32) -> Self {
         let mut numbers = Numbers::new(seed);
         let mut records = Self { input: [0; INPUT], recurrent: [0; RECURRENT] };
-        let padded = Direction::padded(units);
+        let padded = DirectionWeights::padded(units);
         let mut unit = 0;
         while unit < units {
             let at = unit * (4 + inputs);
@@ -53,8 +53,8 @@ impl<const INPUT: usize, const RECURRENT: usize> Records<INPUT, RECURRENT> {
         records
     }
 
-    pub fn direction(&self, units: usize, inputs: usize) -> Direction<'_> {
-        match Direction::new(units, inputs, &self.input, &self.recurrent) {
+    pub fn direction(&self, units: usize, inputs: usize) -> DirectionWeights<'_> {
+        match DirectionWeights::new(units, inputs, &self.input, &self.recurrent) {
             Some(direction) => direction,
             None => panic!("records of the wrong length"),
         }
@@ -75,12 +75,12 @@ const fn word(numbers: &mut Numbers, limit: i32) -> u32 {
 
 /// Words of the records of a direction, for the type of [`Records`].
 pub const fn input_words(units: usize, inputs: usize) -> usize {
-    Direction::input_words(units, inputs)
+    DirectionWeights::input_words(units, inputs)
 }
 
 /// As [`input_words`], for the recurrent records.
 pub const fn recurrent_words(units: usize) -> usize {
-    Direction::recurrent_words(units)
+    DirectionWeights::recurrent_words(units)
 }
 
 /// Random records of U units and I inputs as a static.

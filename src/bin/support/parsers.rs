@@ -37,7 +37,7 @@ fn stream<P: ByteSource>(meter: &mut Meter, name: &str, part: &mut P, frames: [&
     let mut samples = 0;
     let mut feed = |bytes: &[u8]| {
         for byte in bytes {
-            part.push(*byte);
+            part.receive(*byte);
             while let Some(sample) = part.next_sample() {
                 samples += u32::from(black_box(sample).is_ok());
             }
@@ -87,7 +87,7 @@ fn dsp3000(meter: &mut Meter) {
     let mut lines = Dsp3000Ascii::new();
     meter.run("sensor/dsp3000_line", || {
         for byte in black_box(line.as_bytes()) {
-            if let Some(Ok(reading)) = lines.push(*byte) {
+            if let Some(Ok(reading)) = lines.receive(*byte) {
                 black_box(reading.sample(Mode::Rate, Micros(5), 10_000));
             }
         }
@@ -97,7 +97,7 @@ fn dsp3000(meter: &mut Meter) {
     let mut words = Dsp3000Binary::new(Mode::Incremental, 0);
     let mut feed = || {
         for byte in black_box(&word) {
-            if let Some(word) = words.push(*byte) {
+            if let Some(word) = words.receive(*byte) {
                 black_box(word.sample(Micros(5), 1_000));
             }
         }

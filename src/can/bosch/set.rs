@@ -16,7 +16,7 @@ use super::{
 use crate::units::{AngularRate, CentiCelsius, SpecificForce};
 use embedded_can::{Frame, StandardId};
 
-/// What one message of the set carries.
+/// The content of one message of the set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Identifier.
@@ -85,7 +85,7 @@ impl From<Tx1> for Message {
 }
 
 impl Message {
-    /// The eight bytes.
+    /// Returns the eight bytes.
     #[must_use]
     pub fn emit(&self) -> [u8; 8] {
         let [rate0, rate1] = self.rate.to_le_bytes();
@@ -120,20 +120,20 @@ impl Message {
         })
     }
 
-    /// The rate in deg/s.
+    /// Returns the rate in deg/s.
     #[must_use]
     pub fn rate_deg_per_sec(&self) -> f64 {
         f64::from(i32::from(self.rate) - ZERO) * 0.005
     }
 
-    /// The acceleration in g (0.127465e-3 g a code).
+    /// Returns the acceleration in g (0.127465e-3 g a code).
     #[must_use]
     pub fn acceleration_g(&self) -> f64 {
         f64::from(i32::from(self.acceleration) - ZERO) * 0.000_127_465
     }
 
-    /// The frame under a layout's identifier, in a driver's own type; `None` only if that type
-    /// cannot hold eight bytes.
+    /// Returns the frame under a layout's identifier, in a driver's own type; `None` only if that type cannot hold
+    /// it.
     #[must_use]
     pub fn frame<F: Frame>(&self, layout: &Layout) -> Option<F> {
         F::new(layout.id, &self.emit())
@@ -148,7 +148,7 @@ pub struct Motion {
     pub angular_rate: [AngularRate; 3],
     /// Along x, y, z.
     pub specific_force: [SpecificForce; 3],
-    /// Of the part, where known.
+    /// The temperature of the part, where it is known.
     pub temperature: Option<CentiCelsius>,
     /// Quality of the rates.
     pub rate_status: SignalStatus,
@@ -158,7 +158,7 @@ pub struct Motion {
     pub counter: u8,
 }
 
-/// There are three, as [`LAYOUTS`] knows.
+/// Returns the message at a place of [`LAYOUTS`].
 fn axis<T: Copy + Default>(axes: &[T; 3], axis: usize) -> T {
     axes.get(axis).copied().unwrap_or_default()
 }
@@ -170,8 +170,8 @@ pub struct SetEncoder {
 }
 
 impl SetEncoder {
-    /// The three messages of one sample, in the order of [`LAYOUTS`]. A value that does not fit
-    /// its signal is sent as the nearest limit, marked as failed.
+    /// Encodes the three messages of one sample, in the order of [`LAYOUTS`]. A value that does not fit its signal
+    /// is sent as the nearest limit and marked as failed.
     pub fn encode(&mut self, motion: &Motion) -> [Message; 3] {
         let mut messages = LAYOUTS.map(|layout| {
             let (acceleration, fits) = encode_acceleration(axis(&motion.specific_force, layout.force_axis));

@@ -2,16 +2,16 @@
 
 use super::{MAX_PERIOD_MS, SAMPLE_MS};
 
-/// Why settings are no configuration.
+/// The reason why settings are no configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// Nothing would be sent.
+    /// No message is configured.
     #[error("no message is configured")]
     Empty,
-    /// Not a bit rate of a classic CAN bus.
+    /// A classic CAN bus has no such bit rate.
     #[error("{0} bit/s is no bit rate of a classic CAN bus")]
     BitRate(u32),
     /// More than 11 bits, or kept for diagnosis.
@@ -20,7 +20,7 @@ pub enum ConfigError {
     /// Two messages under one identifier.
     #[error("identifier {0:03x} is used twice")]
     DuplicateIdentifier(u16),
-    /// Not a multiple of 10 ms, or over a second.
+    /// The period is not a multiple of 10 ms, or over a second.
     #[error("period {0} ms is not a multiple of {SAMPLE_MS} up to {MAX_PERIOD_MS}")]
     Period(u16),
     /// More bits than the mode sends, so that receivers could not tell it from another one.
@@ -29,7 +29,7 @@ pub enum ConfigError {
     /// Two messages with one E2E identifier: exchanged, they would pass.
     #[error("an E2E identifier is used twice")]
     DuplicateDataId,
-    /// Not an address that a J1939 node can have.
+    /// A J1939 node cannot have this address.
     #[error("{0} is no J1939 source address")]
     SourceAddress(u8),
     /// Over 80 % of the bus.

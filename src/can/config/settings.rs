@@ -9,7 +9,7 @@ use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 pub enum E2e {
     /// Profile 1.
     P01 {
-        /// How the identifier enters the CRC.
+        /// The way in which the identifier enters the CRC.
         mode: DataIdMode,
         /// Rate, angle, detail.
         data_ids: [u16; 3],
@@ -26,7 +26,7 @@ pub enum E2e {
     },
     /// Profile 11.
     P11 {
-        /// How the identifier enters the CRC.
+        /// The way in which the identifier enters the CRC.
         mode: P11Mode,
         /// Rate, angle, detail.
         data_ids: [u16; 3],
@@ -34,7 +34,7 @@ pub enum E2e {
 }
 
 impl E2e {
-    /// The profile of each message.
+    /// Returns the profile of each message.
     #[must_use]
     pub fn profiles(&self) -> [Profile; 3] {
         match *self {
@@ -77,7 +77,7 @@ pub struct Vdc2Settings {
     pub source: u8,
 }
 
-/// What is sent on the bus, and how; [`super::Config::new`] checks it.
+/// The messages on the bus; [`super::Config::new`] checks them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -105,8 +105,8 @@ impl Settings {
         vdc2: None,
     };
 
-    /// What fits an SLCAN line of 115200 bit/s, time stamps included: our own messages five
-    /// times less often, where the mean over the period loses nothing.
+    /// Settings that fit an SLCAN line of 115200 bit/s, time stamps included: our own messages go out five times
+    /// less often, and the mean over the period loses nothing.
     pub const SLCAN_115200: Self = Self {
         yaw: match Self::DEFAULT.yaw {
             Some(yaw) => Some(YawSettings { period_ms: 50, ..yaw }),

@@ -3,7 +3,7 @@
 
 use super::Fault;
 
-/// What differs between the profiles.
+/// The properties in which the profiles differ.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShortHeader {
     /// The longest data that the CRC covers, the header included.

@@ -24,7 +24,7 @@ pub(super) const COUNTERS: u16 = 15;
 const MAX_LEN: usize = 30;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// How the 16-bit identifier enters the CRC.
+/// The way in which the 16-bit identifier enters the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -45,7 +45,7 @@ pub enum DataIdMode {
 pub struct P01 {
     /// Identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
     pub data_id: u16,
-    /// How it enters the CRC.
+    /// The way in which it enters the CRC.
     pub mode: DataIdMode,
 }
 

@@ -6,7 +6,7 @@ use super::header::ShortHeader;
 
 /// CRC-8-AUTOSAR (8H2F): polynomial 0x2F, start and final XOR FF.
 const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_AUTOSAR);
-/// All values of the nibble.
+/// The counter takes all values of the nibble.
 pub(super) const COUNTERS: u16 = 16;
 /// With the identifier this is at most 127 bits, the order of the polynomial.
 const MAX_LEN: usize = 14;

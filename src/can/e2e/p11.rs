@@ -3,7 +3,7 @@
 use super::Fault;
 use super::p01::{DataIdMode, P01};
 
-/// How the identifier enters the CRC.
+/// The way in which the identifier enters the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -20,7 +20,7 @@ pub enum P11Mode {
 pub struct P11 {
     /// Identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.
     pub data_id: u16,
-    /// How it enters the CRC.
+    /// The way in which it enters the CRC.
     pub mode: P11Mode,
 }
 

@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
-    /// Nothing came before it; its counter is only noted.
+    /// No message came before it; its counter is only noted.
     First,
     /// The one expected.
     Ok,
@@ -20,7 +20,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Whether the message's content may be used.
+    /// Returns whether the message's content may be used.
     #[must_use]
     pub const fn usable(self) -> bool {
         matches!(self, Self::First | Self::Ok | Self::Lost(_))
@@ -36,7 +36,7 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// A counter of `counters` values; steps up to `max_delta` are loss, larger ones disorder.
+    /// Makes a check of a counter with `counters` values; steps up to `max_delta` are loss, larger ones disorder.
     #[must_use]
     pub const fn new(counters: u16, max_delta: u8) -> Self {
         Self { counters, max_delta, last: None }
@@ -44,7 +44,7 @@ impl Sequence {
 
     /// Judges the next counter and takes it as the new reference, whatever the verdict: a
     /// sender that was restarted is believed again from its second message on.
-    pub fn process(&mut self, counter: u8) -> Verdict {
+    pub fn check(&mut self, counter: u8) -> Verdict {
         let Some(last) = self.last.replace(counter) else { return Verdict::First };
         let step = u16::from(counter) + self.counters - u16::from(last);
         // Of no values at all each one is the same.

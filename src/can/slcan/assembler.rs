@@ -16,12 +16,12 @@ pub struct TooLong;
 pub struct LineAssembler {
     line: Vec<u8, MAX_HOST_LINE>,
     too_long: bool,
-    /// The line was handed out and begins anew with the next character.
+    /// The line was handed out and begins again with the next character.
     done: bool,
 }
 
 impl LineAssembler {
-    /// Nothing received yet.
+    /// Begins before the first sample.
     #[must_use]
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false, done: false }
@@ -29,7 +29,7 @@ impl LineAssembler {
 
     /// Takes a character; gives the line, without its CR, when it is complete. LF is passed
     /// over, so that a terminal can be used.
-    pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], TooLong>> {
+    pub fn receive(&mut self, byte: u8) -> Option<Result<&[u8], TooLong>> {
         if core::mem::take(&mut self.done) {
             self.line.clear();
             self.too_long = false;

@@ -43,10 +43,10 @@ impl StatusFlags {
     pub const BUS_ERROR: Self = Self(1 << 7);
 }
 
-/// What a line of the host leads to.
+/// The effect of a line of the host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reaction {
-    /// To be sent before the next frame.
+    /// The answer to send before the next frame.
     pub answer: Answer,
     /// A frame from the host, for whoever wants it (wheel speeds on a bench).
     pub frame: Option<DataFrame>,
@@ -59,7 +59,7 @@ impl Reaction {
     }
 }
 
-/// Digit of the command `S` for a bit rate.
+/// Returns the digit of the command `S` for a bit rate.
 #[must_use]
 pub const fn bit_rate_digit(bits_per_second: u32) -> Option<u8> {
     Some(match bits_per_second {
@@ -85,26 +85,26 @@ pub struct Session {
 }
 
 impl Session {
-    /// Frames without time stamps, as hosts expect at first.
+    /// Begins without time stamps, as hosts expect at first.
     #[must_use]
     pub const fn new(bits_per_second: u32) -> Self {
         Self { bit_rate: bit_rate_digit(bits_per_second), stamped: false, refused: 0 }
     }
 
-    /// Whether the host wants time stamps behind the frames.
+    /// Returns whether the host wants time stamps behind the frames.
     #[must_use]
     pub const fn stamped(&self) -> bool {
         self.stamped
     }
 
-    /// Lines that were answered with an error.
+    /// Returns the number of lines that were answered with an error.
     #[must_use]
     pub const fn refused(&self) -> u32 {
         self.refused
     }
 
     /// Takes a line without its CR.
-    pub fn process(&mut self, line: &[u8], status: StatusFlags) -> Reaction {
+    pub fn execute(&mut self, line: &[u8], status: StatusFlags) -> Reaction {
         match line {
             // An empty line is how hosts clear what may be left in a buffer.
             [] | [b'C' | b'O' | b'L'] => Reaction::answer(OK),

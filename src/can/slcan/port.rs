@@ -22,7 +22,7 @@ const MAX_RECEIVED: usize = 64;
 
 const _: () = assert!(MAX_ANSWERS > MAX_STAMPED_LINE, "answers are sent the way lines are");
 
-/// At most `N` frames wait.
+/// The frames that wait, `N` at most.
 #[derive(Debug, Clone)]
 pub struct Port<const N: usize> {
     session: Session,
@@ -30,16 +30,16 @@ pub struct Port<const N: usize> {
     queue: TransmitQueue<(DataFrame, Micros), N>,
     answers: Vec<u8, MAX_ANSWERS>,
     unanswered: u32,
-    /// What is on its way, and how much of it the line has taken.
+    /// The line that is being sent, and the number of its bytes that have gone out.
     line: Vec<u8, MAX_ANSWERS>,
     taken: usize,
-    /// Drops that the host has been told of.
-    told: u32,
+    /// Drops that have been reported to the host.
+    reported: u32,
     bus: StatusFlags,
 }
 
 impl<const N: usize> Port<N> {
-    /// For a bus of this bit rate; nothing sent yet.
+    /// Begins for a bus of this bit rate, with nothing sent.
     #[must_use]
     pub const fn new(bits_per_second: u32) -> Self {
         Self {
@@ -50,30 +50,31 @@ impl<const N: usize> Port<N> {
             unanswered: 0,
             line: Vec::new(),
             taken: 0,
-            told: 0,
+            reported: 0,
             bus: StatusFlags(0),
         }
     }
 
-    /// What the command `F` says of the bus beyond this line, beside frames that gave way here.
+    /// Sets what the command `F` reports of the bus; frames that this line dropped are added.
     pub fn set_bus(&mut self, flags: StatusFlags) {
         self.bus = flags;
     }
 
     /// Puts a frame at the end; the oldest one gives way. `time` is its stamp, should the host
     /// want one.
-    pub fn push(&mut self, frame: DataFrame, time: Micros) {
-        self.queue.push((frame, time));
+    pub fn enqueue(&mut self, frame: DataFrame, time: Micros) {
+        self.queue.enqueue((frame, time));
     }
 
     /// Takes a byte from the host; gives the frame that it completes.
     pub fn receive(&mut self, byte: u8) -> Option<DataFrame> {
         let dropped = self.queue.dropped();
-        let reaction = match self.assembler.push(byte)? {
+        let reaction = match self.assembler.receive(byte)? {
             Ok(line) => {
-                let told = if line == b"F" { core::mem::replace(&mut self.told, dropped) } else { dropped };
-                let full = if told < dropped { StatusFlags::TRANSMIT_FULL.0 } else { 0 };
-                self.session.process(line, StatusFlags(self.bus.0 | full))
+                let reported =
+                    if line == b"F" { core::mem::replace(&mut self.reported, dropped) } else { dropped };
+                let full = if reported < dropped { StatusFlags::TRANSMIT_FULL.0 } else { 0 };
+                self.session.execute(line, StatusFlags(self.bus.0 | full))
             }
             Err(TooLong) => self.session.refuse(),
         };
@@ -83,7 +84,7 @@ impl<const N: usize> Port<N> {
         reaction.frame
     }
 
-    /// What is to be sent next: the rest of the line begun, else answers, else the oldest frame.
+    /// Returns the bytes to send next: the rest of the line under way, else answers, else the oldest frame.
     pub fn outgoing(&mut self) -> Option<&[u8]> {
         if self.taken == self.line.len() {
             self.taken = 0;
@@ -97,7 +98,7 @@ impl<const N: usize> Port<N> {
         self.line.get(self.taken..)
     }
 
-    /// The line has taken so many bytes of what is [`Port::outgoing`].
+    /// Removes bytes of [`Port::outgoing`] that the line has taken.
     pub fn sent(&mut self, bytes: usize) {
         self.taken = self.taken.saturating_add(bytes).min(self.line.len());
     }
@@ -129,13 +130,13 @@ impl<const N: usize> Port<N> {
         Ok(())
     }
 
-    /// Frames that gave way to newer ones.
+    /// Returns the number of frames that gave way to newer ones.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.queue.dropped()
     }
 
-    /// Lines of the host that were refused, and answers that had no room.
+    /// Returns the number of the host's lines that were refused, and of answers that found no room.
     #[must_use]
     pub fn refused(&self) -> u32 {
         self.session.refused().saturating_add(self.unanswered)

@@ -11,9 +11,9 @@ use embedded_can::{Id, StandardId};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSignal {
-    /// Which wheel: 0 front left, 1 front right, 2 rear left, 3 rear right.
+    /// The wheel: 0 front left, 1 front right, 2 rear left, 3 rear right.
     pub wheel: usize,
-    /// Where it lies.
+    /// The place of its bits.
     pub field: BitField,
     /// Speed codes (2^-16 m/s) for one bit, times 2^16: see [`WheelSignal::per_bit_kmh`].
     pub factor_q16: i32,
@@ -24,7 +24,7 @@ pub struct WheelSignal {
 }
 
 impl WheelSignal {
-    /// Factor of a DBC file in km/h, as [`WheelSignal::factor_q16`]; below 1000 km/h per bit.
+    /// Converts the factor of a DBC file in km/h to [`WheelSignal::factor_q16`]; it is below 1000 km/h per bit.
     #[must_use]
     pub const fn per_bit_kmh(factor: f64) -> i32 {
         (factor / 3.6 * 4_294_967_296.0) as i32
@@ -42,25 +42,25 @@ impl WheelSignal {
     }
 }
 
-/// How a frame of wheel speeds is protected, if it is.
+/// The protection of a frame of wheel speeds, if it has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Checksum {
-    /// Not at all.
+    /// The frame is not protected.
     None,
     /// SAE J1850 in one byte, over all the others in their order.
     J1850 {
-        /// Which byte.
+        /// The byte that holds it.
         at: usize,
     },
     /// Exclusive or in one byte, of all the others.
     Xor {
-        /// Which byte.
+        /// The byte that holds it.
         at: usize,
     },
     /// Sum modulo 256 in one byte, of all the others.
     Sum {
-        /// Which byte.
+        /// The byte that holds it.
         at: usize,
     },
     /// AUTOSAR E2E; its counter is used.
@@ -102,7 +102,7 @@ const fn toyota(wheel: usize, start: u8) -> Option<WheelSignal> {
     }
 }
 
-/// Why a frame gives no wheel speeds.
+/// The reason why a frame gives no wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -122,13 +122,13 @@ pub enum WheelError {
     /// A wheel's speed is marked, or cannot be.
     #[error("wheel {wheel}: speed is not valid")]
     Invalid {
-        /// Which wheel.
+        /// The wheel.
         wheel: usize,
     },
 }
 
 impl WheelFrame {
-    /// Values of the frame's counter.
+    /// Returns the number of values of the frame's counter.
     pub(super) fn counters(&self) -> u16 {
         match (self.checksum, self.counter) {
             (Checksum::E2e(profile), _) => profile.counters(),

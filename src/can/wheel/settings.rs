@@ -17,16 +17,16 @@ pub struct WheelSettings {
     pub timeout_us: u64,
     /// Up to this speed a wheel may stand still.
     pub still_speed: WheelSpeed,
-    /// So long all wheels must be that slow.
+    /// The time for which all wheels must be that slow.
     pub still_for_us: u64,
 }
 
-/// Why wheel settings are no configuration.
+/// The reason why wheel settings are no configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelConfigError {
-    /// Not two or four wheels.
+    /// There are not two or four wheels.
     #[error("{0} wheels instead of two or four")]
     Wheels(usize),
     /// A wheel that does not exist, or is in two signals.
@@ -54,7 +54,7 @@ impl WheelSettings {
         still_for_us: 500_000,
     };
 
-    /// The wheels that there are, each in one signal.
+    /// Returns the wheels that the settings name, each in one signal.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
         let mut expected = [false; WHEELS];
         let frames = || self.frames.iter().flatten();

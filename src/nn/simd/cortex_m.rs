@@ -54,7 +54,7 @@
 #![allow(unsafe_code, reason = "assembly; the only such file of the library")]
 
 use crate::nn::activation::{SIGMOID, SIGMOID_SHIFT, TANH, TANH_FRACTION_SCALE, TANH_SHIFT};
-use crate::nn::lstm::{Accumulators, BIAS_WORDS, Direction, MAX_INPUTS, Projection};
+use crate::nn::lstm::{Accumulators, BIAS_WORDS, DirectionWeights, MAX_INPUTS, Projection};
 use core::arch::naked_asm;
 use core::mem::MaybeUninit;
 
@@ -82,7 +82,7 @@ const STEP_UNROLL: usize = 8;
 /// Bytes of code for one of them: 4 loads of 2 bytes and 14 instructions of 4; the last one has 2 more.
 const STEP_BYTES: usize = 64;
 
-/// What the projection kernel needs, in the order in which it unpacks it.
+/// The arguments of the projection kernel, in the order in which it unpacks them.
 #[repr(C)]
 struct ProjectCall {
     /// A word before the columns of the first pair of steps.
@@ -92,7 +92,7 @@ struct ProjectCall {
     /// The first unit's, of the first step.
     projection: *mut Accumulators,
     projection_end: *const Accumulators,
-    /// Where a unit's record is copied to, or null: it is read where it lies.
+    /// The place to copy a unit's record to; null where it is read in place.
     record: *mut u32,
     record_bytes: usize,
     /// Bytes into the unrolled loop at which a pair of steps begins.
@@ -105,7 +105,7 @@ struct ProjectCall {
     pair_bytes: usize,
 }
 
-/// What the step kernel needs, in the order in which it unpacks it.
+/// The arguments of the step kernel, in the order in which it unpacks them.
 #[repr(C)]
 struct StepCall {
     /// A word before the columns, less those that the first turn of the loop leaves out.
@@ -118,8 +118,8 @@ struct StepCall {
     hidden_end: *const u16,
     /// Bytes into the unrolled loop at which a unit begins, or [`NO_PREVIOUS`].
     entry: usize,
-    /// From a unit's weights back to where they would begin if the loop were entered at its top; without
-    /// a previous state, over all of them to its multipliers.
+    /// The step from a unit's weights back to where they would begin if the loop were entered at its top; without a
+    /// previous state, over all of them to its multipliers.
     to_weights: isize,
     sigmoid: *const i32,
     tanh: *const i32,
@@ -129,7 +129,7 @@ struct StepCall {
 const NO_PREVIOUS: usize = usize::MAX;
 
 pub(in crate::nn) fn project<const U: usize>(
-    direction: &Direction<'_>,
+    direction: &DirectionWeights<'_>,
     x: &[u32],
     projection: &mut [Projection<U>],
 ) {
@@ -163,7 +163,7 @@ pub(in crate::nn) fn project<const U: usize>(
 }
 
 pub(in crate::nn) fn step<const U: usize, const W: usize>(
-    direction: &Direction<'_>,
+    direction: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],
@@ -238,12 +238,12 @@ unsafe extern "C" fn copy_kernel(
     )
 }
 
-/// Where to enter a loop of `unroll` so that `count` is met at the end of a turn.
+/// Returns the place to enter a loop of `unroll`, so that `count` is met at the end of a turn.
 fn entry(count: usize, unroll: usize) -> usize {
     (unroll - count % unroll) % unroll
 }
 
-/// For each unit and each pair of steps: both steps' accumulators := bias + rows . columns.
+/// Computes for each unit and each pair of steps: both steps' accumulators := bias + rows . columns.
 ///
 /// r0 a word before the weights, r1 a word before the columns, r2 r3 columns of both steps, r4 r5
 /// weights, r6-r9 sums of the first step, r10-r12 lr of the second.
@@ -389,7 +389,7 @@ unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
     )
 }
 
-/// For each unit: sums := projection + rows . previous; gates; cell state; hidden state.
+/// Computes for each unit: sums := projection + rows . previous; gates; cell state; hidden state.
 ///
 /// r0 a word before the weights, r1 a word before previous, r2 r3 columns, r4-r7 weights, r8-r11 sums,
 /// r12 and lr the middles of the tables.

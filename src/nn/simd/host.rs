@@ -4,7 +4,7 @@
 //! the matching columns copied beside each other, one multiply-add of halfword pairs does all
 //! four packed rows; the low rows take the same words with their low bytes sign-extended.
 
-use crate::nn::lstm::{Accumulators, Direction, Projection, update};
+use crate::nn::lstm::{Accumulators, DirectionWeights, Projection, update};
 use crate::nn::pack;
 use wide::{i16x8, i32x4};
 
@@ -18,7 +18,7 @@ struct Sums {
 impl Sums {
     const ZERO: Self = Self { packed: i32x4::ZERO, low: i32x4::ZERO };
 
-    /// `x`: the words of two column pairs, each twice.
+    /// Adds the products of a unit's record. `x` holds the words of two column pairs, each twice.
     #[inline]
     fn add(&mut self, packed: i16x8, low: i16x8, x: [u32; 4]) {
         let x: i16x8 = bytemuck::cast(x);
@@ -26,7 +26,7 @@ impl Sums {
         self.low += low.dot(x);
     }
 
-    /// Accumulators, on top of where they started.
+    /// Returns the accumulators, added to their start values.
     #[inline]
     fn finish(self, start: Accumulators) -> Accumulators {
         let [packed, low] = [self.packed.to_array(), self.low.to_array()];
@@ -37,7 +37,7 @@ impl Sums {
     }
 }
 
-/// Packed rows and their low bytes.
+/// Multiplies packed rows and their low bytes.
 #[inline]
 fn rows(words: [u32; 4]) -> (i16x8, i16x8) {
     let packed: i16x8 = bytemuck::cast(words);
@@ -60,7 +60,7 @@ fn accumulate<const STEPS: usize>(
 }
 
 pub(in crate::nn) fn project<const U: usize>(
-    direction: &Direction<'_>,
+    direction: &DirectionWeights<'_>,
     x: &[u32],
     projection: &mut [Projection<U>],
 ) {
@@ -69,7 +69,11 @@ pub(in crate::nn) fn project<const U: usize>(
     }
 }
 
-fn project_pair<const U: usize>(direction: &Direction<'_>, x: &[u32], [first, second]: &mut Projection<U>) {
+fn project_pair<const U: usize>(
+    direction: &DirectionWeights<'_>,
+    x: &[u32],
+    [first, second]: &mut Projection<U>,
+) {
     let inputs = direction.inputs();
     let (x_quads, x_tail) = x.as_chunks::<4>();
     // Units come in pairs, so that the columns are laid out once for two of them.
@@ -94,7 +98,7 @@ fn project_pair<const U: usize>(direction: &Direction<'_>, x: &[u32], [first, se
 }
 
 pub(in crate::nn) fn step<const U: usize, const W: usize>(
-    direction: &Direction<'_>,
+    direction: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],

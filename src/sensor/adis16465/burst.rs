@@ -20,7 +20,7 @@ pub const BURST: usize = 20;
 /// Bytes of a burst that are summed.
 const SUMMED: usize = 18;
 
-/// Which part; its scales.
+/// The part, which fixes the scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Model {
@@ -55,7 +55,7 @@ impl Model {
     }
 }
 
-/// What the part says of itself; reading it clears it.
+/// The part's report of its own state; reading it clears it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiagStat(pub u16);
@@ -75,18 +75,18 @@ impl DiagStat {
     pub const MEMORY: Self = Self(1 << 6);
     /// The clocks disagree.
     pub const CLOCK: Self = Self(1 << 7);
-    /// What makes the readings worthless. An overrun, a failed write to flash or a transfer
-    /// error concerns another transfer than this one, whose sum fits.
+    /// The bits that make readings useless. An overrun, a failed write to flash or a transfer error concerns
+    /// another transfer than this one, whose sum fits.
     pub const FATAL: Self = Self(Self::STANDBY.0 | Self::SELF_TEST.0 | Self::MEMORY.0 | Self::CLOCK.0);
 
-    /// Whether any of these bits is set.
+    /// Returns whether any of these bits is set.
     #[must_use]
     pub const fn intersects(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
 }
 
-/// Why bytes are no burst, or a burst gives no sample.
+/// The reason why bytes are no burst, or a burst gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -94,12 +94,12 @@ pub enum BurstError {
     /// The sum does not fit.
     #[error("ADIS164xx: the bytes add up to {computed:04x}, but the burst says {stored:04x}")]
     Checksum {
-        /// Of the bytes.
+        /// The value that the bytes give.
         computed: u16,
         /// The one in the burst.
         stored: u16,
     },
-    /// Nothing but zeros or nothing but ones: no part answers.
+    /// The bytes are all zeros or all ones: no part answers.
     #[error("ADIS164xx: no part answers")]
     Silent,
     /// The part says that its readings are worthless.
@@ -120,7 +120,7 @@ pub enum BurstError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Burst {
-    /// What the part says of itself.
+    /// The part reports a fault.
     pub diagnosis: DiagStat,
     /// x, y, z.
     pub rate: [i16; 3],
@@ -156,7 +156,7 @@ impl Burst {
         })
     }
 
-    /// The burst's bytes.
+    /// Returns the burst's bytes.
     #[must_use]
     pub fn emit(&self) -> [u8; BURST] {
         let ([gx, gy, gz], [ax, ay, az]) = (self.rate, self.acceleration);
@@ -172,7 +172,7 @@ impl Burst {
         bytes
     }
 
-    /// The readings in the pipeline's units, taken at `time`.
+    /// Converts the readings, taken at `time`, to the pipeline's units.
     ///
     /// # Errors
     /// `Diagnosis` or `Reading`.

@@ -7,14 +7,14 @@ use super::config::OutputRate;
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct MessageClock {
     time: u64,
-    /// Of a division by the rate.
+    /// The remainder of a division by the rate.
     remainder: u32,
 }
 
 impl MessageClock {
     pub(super) const START: Self = Self { time: 0, remainder: 0 };
 
-    /// The time `messages` (127 at most) later.
+    /// Returns the time `messages` (127 at most) later.
     pub(super) fn advance(&mut self, rate: OutputRate, messages: u32) -> u64 {
         // No rate is zero; where the compiler does not see that, nothing is divided by it.
         let hertz = u32::from(rate.hertz()).max(1);

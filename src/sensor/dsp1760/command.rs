@@ -1,4 +1,4 @@
-//! What the DSP-1760 can be told: lines of ASCII, ended by LF.
+//! The commands of the DSP-1760: lines of ASCII, ended by LF.
 //!
 //! Settings are taken in configuration mode only. Whether the part sends radians or degrees is
 //! set at the part and cannot be read from a frame; no command for it is known here.
@@ -29,7 +29,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// The line, LF included.
+    /// Returns the line, LF included.
     #[must_use]
     pub fn emit(&self) -> String<MAX_LINE> {
         let mut line = String::new();
@@ -78,8 +78,8 @@ impl Command {
     }
 }
 
-/// The lines that bring a part to a configuration, in order. Its messages stop meanwhile.
-/// [`super::dialogue`] sends them and asks whether they were heard.
+/// Returns the lines that bring a part to a configuration, in order. Its messages stop meanwhile.
+/// [`super::dialogue`] sends them and asks whether they were received.
 #[must_use]
 pub const fn setup(config: &Dsp1760Config) -> [Command; 5] {
     [
@@ -108,7 +108,7 @@ impl Reply {
         if name.eq_ignore_ascii_case("dr") { rate() } else { None }
     }
 
-    /// The line, CR and LF included.
+    /// Returns the line, CR and LF included.
     #[must_use]
     pub fn emit(&self) -> String<MAX_LINE> {
         let mut line = String::new();

@@ -39,25 +39,25 @@ pub enum TemperatureUnit {
 pub struct OutputRate(u16);
 
 impl OutputRate {
-    /// What the part offers.
+    /// The rates that the part offers.
     pub const OFFERED: [u16; 10] = [1, 5, 10, 25, 50, 100, 250, 500, 750, 1000];
     /// 1000 a second.
     pub const HZ_1000: Self = Self(1000);
 
-    /// `None` when the part does not offer it.
+    /// Returns `None` when the part does not offer it.
     #[must_use]
     pub fn new(hertz: u16) -> Option<Self> {
         Self::OFFERED.contains(&hertz).then_some(Self(hertz))
     }
 
-    /// Messages per second.
+    /// Returns the number of messages per second.
     #[must_use]
     pub const fn hertz(self) -> u16 {
         self.0
     }
 }
 
-/// What the bytes do not say.
+/// The settings that the bytes do not contain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dsp1760Config {

@@ -1,6 +1,6 @@
 //! How a DSP-1760 is brought to a configuration.
 //!
-//! The part acknowledges no setting, so what it was told is asked for afterwards: the lines of
+//! The part acknowledges no setting, so its settings are queried afterwards: the lines of
 //! [`setup`], then the query for the rate, and only then out of configuration mode. The rules:
 //! - Lines follow each other [`PAUSE`] apart.
 //! - Without an answer for [`TIMEOUT`], or with another rate, all of it is sent again,
@@ -16,19 +16,19 @@ use crate::sensor::serial::{self, Action};
 use crate::units::Micros;
 use heapless::Vec;
 
-/// From a line to the next.
+/// The pause between two lines.
 pub const PAUSE: Micros = Micros(20_000);
-/// How long the answer may take.
+/// The time that the answer may take.
 pub const TIMEOUT: Micros = Micros(500_000);
-/// How often everything is sent before the part is given up.
+/// The number of attempts before the part is given up.
 pub const ATTEMPTS: u8 = 3;
 
-/// Why the dialogue has ended without a part that is set.
+/// The reason why the dialogue has ended without a part that is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DialogueError {
-    /// No answer to any query.
+    /// No query was answered.
     #[error("DSP-1760: no answer after {ATTEMPTS} attempts")]
     Silent,
     /// The last answer was another rate than the one that was set.
@@ -54,13 +54,13 @@ pub struct Dialogue {
 }
 
 impl Dialogue {
-    /// Nothing sent yet.
+    /// Begins before the first line is sent.
     #[must_use]
     pub const fn new(config: Dsp1760Config) -> Self {
         Self { config, line: Vec::new(), next: 0, due: Micros(0), attempts: 1, answer: None }
     }
 
-    /// All lines in order. The last one is sent when the query has been answered.
+    /// Returns all lines in order. The last one is sent when the query has been answered.
     fn lines(&self) -> [Command; 6] {
         let [enter, rate, rotation, temperature, leave] = setup(&self.config);
         [enter, rate, rotation, temperature, Command::QueryRate, leave]
@@ -70,7 +70,7 @@ impl Dialogue {
 impl serial::Dialogue for Dialogue {
     type Error = DialogueError;
 
-    fn push(&mut self, byte: u8) {
+    fn receive(&mut self, byte: u8) {
         if byte != b'\n' {
             if self.line.is_full() {
                 self.line.remove(0);

@@ -1,6 +1,6 @@
 //! The three layouts of a data message, and what only some of them carry.
 
-/// What every data message begins with; the format byte follows.
+/// The bytes that begin every data message; the format byte follows.
 pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
 
 /// Layout of a message.
@@ -9,14 +9,14 @@ pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
 pub enum Format {
     /// Without time stamp.
     A,
-    /// With a time stamp.
+    /// The message has a time stamp.
     B,
-    /// With one slow reading in turn.
+    /// The message has one slow reading in turn.
     C,
 }
 
 impl Format {
-    /// The format that the first four bytes announce.
+    /// Returns the format that the first four bytes announce.
     #[must_use]
     pub const fn of(header: [u8; 4]) -> Option<Self> {
         match header {
@@ -27,7 +27,7 @@ impl Format {
         }
     }
 
-    /// Bytes of a whole message.
+    /// Returns the number of bytes of a whole message.
     #[must_use]
     pub const fn length(self) -> usize {
         match self {
@@ -46,31 +46,31 @@ impl Format {
     }
 }
 
-/// Which readings are good, one bit each; bits 3 and 7 are 0.
+/// The good readings, one bit each; bits 3 and 7 are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Validity(pub u8);
 
 impl Validity {
-    /// All three gyro axes.
+    /// All three gyro axes are good.
     pub const GYRO: Self = Self(0x07);
-    /// All gyro and accelerometer axes.
+    /// All gyro and accelerometer axes are good.
     pub const ALL: Self = Self(0x77);
 
-    /// Whether the gyro about `axis` (0 to 2) is good: the part drops the bit in saturation.
+    /// Returns whether the gyro about `axis` (0 to 2) is good: the part drops the bit in saturation.
     #[must_use]
     pub const fn gyro(self, axis: usize) -> bool {
         axis < 3 && self.0 & 1 << axis != 0
     }
 
-    /// Whether the accelerometer along `axis` (0 to 2) is good.
+    /// Returns whether the accelerometer along `axis` (0 to 2) is good.
     #[must_use]
     pub const fn accelerometer(self, axis: usize) -> bool {
         axis < 3 && self.0 & 0x10 << axis != 0
     }
 }
 
-/// What only some formats carry.
+/// The fields that only some formats have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extra {
@@ -80,7 +80,7 @@ pub enum Extra {
     Timed {
         /// Microseconds, wraps.
         time: u32,
-        /// As in format A.
+        /// The fields of format A.
         temperature: i16,
     },
     /// Format C: temperature or magnetic field x, y, z by sequence number modulo 4.

@@ -8,15 +8,14 @@ use crate::sensor::framer::Protocol;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Kvh;
 
-/// Whether a frame is a built-in-test message: FE 81 00, sent at power-up and on request.
+/// Returns whether a frame is a built-in-test message: FE 81 00, sent at power-up and on request.
 pub(super) fn is_self_test(frame: &[u8]) -> bool {
     frame.get(2) == Some(&0x00)
 }
 
-/// Header and status of a built-in-test message; its long form is one more, with eight status
-/// bytes instead of six. The checksum is left out: its rule is not known. So the byte behind
-/// is passed over like any other that begins no frame, and a damaged message of this kind
-/// cannot take the first byte of an intact one with it.
+/// Matches header and status of a built-in-test message; its long form is one more, with eight status bytes instead
+/// of six. The checksum is left out, because its rule is not known. So the byte behind is skipped like any other
+/// that begins no frame, and a damaged message of this kind cannot take the first byte of an intact one with it.
 const fn bit_length(kind: u8) -> Option<usize> {
     match kind {
         0xAA => Some(4 + 6),

@@ -25,15 +25,15 @@ pub const MAX_MESSAGE: usize = 40;
 /// The largest sequence number; 0 follows it.
 pub const MAX_SEQUENCE: u8 = 127;
 
-/// Why bytes are no message.
+/// The reason why bytes are no message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MessageError {
-    /// No header of a data message.
+    /// The bytes begin with no header of a data message.
     #[error("DSP-1760: no header of a data message")]
     Header,
-    /// Not as long as the header announces.
+    /// The message is not as long as the header announces.
     #[error("DSP-1760: {got} bytes where the header announces {expected}")]
     Length {
         /// Bytes given.
@@ -44,7 +44,7 @@ pub enum MessageError {
     /// The checksum does not fit.
     #[error("DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")]
     Crc {
-        /// Of the bytes before it.
+        /// The CRC of the bytes before it.
         computed: u32,
         /// The one in the message.
         stored: u32,
@@ -65,16 +65,16 @@ pub struct Message {
     pub rotation: [f32; 3],
     /// Specific force x, y, z in g; the DSP-1760 has none, the 17xx units do.
     pub acceleration: [f32; 3],
-    /// What the format adds.
+    /// The fields that the format adds.
     pub extra: Extra,
-    /// Which readings are good.
+    /// The good readings.
     pub validity: Validity,
     /// 0 to [`MAX_SEQUENCE`].
     pub sequence: u8,
 }
 
 impl Message {
-    /// The layout that this message is sent in.
+    /// Returns the layout that this message is sent in.
     #[must_use]
     pub const fn format(&self) -> Format {
         match self.extra {
@@ -102,7 +102,7 @@ impl Message {
         Self::parse_checked(frame)
     }
 
-    /// [`Message::parse`] for a frame whose CRC is known to fit: it is computed once.
+    /// Parses a frame whose CRC is known to fit, so that it is computed once.
     pub(super) fn parse_checked(frame: &[u8]) -> Result<Self, MessageError> {
         let format = frame.first_chunk().copied().and_then(Format::of).ok_or(MessageError::Header)?;
         let length = MessageError::Length { got: frame.len(), expected: format.length() };
@@ -132,7 +132,7 @@ impl Message {
         Ok(Self { rotation, acceleration, extra, validity, sequence })
     }
 
-    /// The message's bytes, CRC included.
+    /// Returns the message's bytes, CRC included.
     #[must_use]
     pub fn emit(&self) -> Vec<u8, MAX_MESSAGE> {
         let mut frame = Vec::new();
@@ -163,7 +163,7 @@ impl Message {
     }
 }
 
-/// Status bits that may stay set: those of finite readings, and the two that mean nothing.
+/// Returns the status bits that may stay set: those of finite readings, and the two that mean nothing.
 fn numbers(rotation: &[f32; 3], acceleration: &[f32; 3]) -> u8 {
     let bits = |readings: &[f32; 3]| {
         (0u8..).zip(readings).fold(0, |bits, (axis, reading)| bits | u8::from(reading.is_finite()) << axis)

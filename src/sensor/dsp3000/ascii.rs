@@ -20,18 +20,18 @@ const MILLIONTHS: u32 = 1_000_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading {
-    /// In millionths of the unit, exact.
+    /// The value in millionths of the unit, exact.
     pub millionths: i32,
     /// The part says that it is good.
     pub valid: bool,
 }
 
-/// Why a line is no reading.
+/// The reason why a line is no reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LineError {
-    /// Not of the form `[-]ddd.dddddd y`.
+    /// The line is not of the form `[-]ddd.dddddd y`.
     #[error("DSP-3000: a line that is no number with a validity")]
     Form,
     /// Longer than [`MAX_LINE`].
@@ -68,15 +68,15 @@ impl Reading {
         Ok(Self { millionths: sign * millionths as i32, valid })
     }
 
-    /// The sample of a rate or increment that arrived at `now` and stands for `span`
-    /// microseconds. `None` for an integrated angle: set the part to increments instead.
+    /// Makes the sample of a rate or increment that arrived at `now` and covers `span` microseconds. `None` for an
+    /// integrated angle: set the part to increments instead.
     #[must_use]
     pub fn sample(&self, mode: Mode, now: Micros, span: u32) -> Option<FogSample> {
         super::sample(mode, self.millionths as f32 * 1e-6, self.valid, now, span)
     }
 
-    /// The line, CR and LF included; what has more than three digits before the point is cut to
-    /// the largest number that has not.
+    /// Encodes the line with CR and LF; a number with more than three digits before the point is cut to the largest
+    /// one that fits.
     #[must_use]
     pub fn emit(&self) -> String<MAX_LINE> {
         let mut line = String::new();
@@ -88,7 +88,7 @@ impl Reading {
     }
 }
 
-/// At most six digits.
+/// Reads at most six digits.
 fn decimal(digits: &[u8]) -> Result<u32, LineError> {
     digits.iter().try_fold(0, |value, byte| match byte {
         b'0'..=b'9' => Ok(value * 10 + u32::from(byte - b'0')),
@@ -105,7 +105,7 @@ pub struct Dsp3000Ascii {
 }
 
 impl Dsp3000Ascii {
-    /// Nothing received yet.
+    /// Begins before the first sample.
     #[must_use]
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false }
@@ -114,7 +114,7 @@ impl Dsp3000Ascii {
     /// Takes one byte; a line that it ends is a reading or an error. Empty lines are nothing.
     /// The first line may be half a one, and half a number is a number: drop it if the part
     /// was already sending when the line was opened.
-    pub fn push(&mut self, byte: u8) -> Option<Result<Reading, LineError>> {
+    pub fn receive(&mut self, byte: u8) -> Option<Result<Reading, LineError>> {
         if byte != b'\r' && byte != b'\n' {
             self.too_long |= self.line.push(byte).is_err();
             return None;

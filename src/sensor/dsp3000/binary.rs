@@ -12,7 +12,7 @@
 //! time. Two things hold the stream together. The part is silent for 0.65 of every
 //! millisecond: who calls [`Dsp3000Binary::pause`] then gets no wrong word from a lost byte.
 //! And a part sends one type: [`Dsp3000Binary`] believes a phase of the four bytes only after
-//! [`LOCK`] good words of the expected type and sync in a row, and looks for it anew after one
+//! [`LOCK`] good words of the expected type and sync in a row, and looks for it again after one
 //! bad word. Without the pauses a lost byte gives
 //! wrong readings until a word fails, and there is no bound on how many: a test saw four.
 
@@ -42,14 +42,14 @@ pub struct Word {
     pub valid: bool,
     /// 0 to 3.
     pub sync: u8,
-    /// What the value is.
+    /// The meaning of the value.
     pub mode: Mode,
     /// 26 bits, two's complement. For [`Mode::Integrated`] turns and angle together: the bits
     /// above 22 count turns, so the whole is an angle that wraps after eight turns.
     pub value: i32,
 }
 
-/// Why four bytes are no word.
+/// The reason why four bytes are no word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -88,7 +88,7 @@ impl Word {
         Ok(Self { valid: word & VALID != 0, sync: (word >> 29 & 3) as u8, mode, value })
     }
 
-    /// The word's bytes. Of the value, the low 26 bits are sent.
+    /// Encodes the word's bytes. The low 26 bits of the value are sent.
     #[must_use]
     pub const fn emit(&self) -> [u8; 4] {
         let mode = match self.mode {
@@ -102,14 +102,14 @@ impl Word {
         (word | parity).to_be_bytes()
     }
 
-    /// The sample of a rate or increment that arrived at `now` and stands for `span`
-    /// microseconds. `None` for an integrated angle: set the part to increments instead.
+    /// Makes the sample of a rate or increment that arrived at `now` and covers `span` microseconds. `None` for an
+    /// integrated angle: set the part to increments instead.
     #[must_use]
     pub fn sample(&self, now: Micros, span: u32) -> Option<FogSample> {
         super::sample(self.mode, self.degrees() as f32, self.valid, now, span)
     }
 
-    /// Rate in deg/s, increment or angle in deg; an angle has its turns in it.
+    /// Returns the rate in deg/s, or the increment or angle in deg; an angle contains its turns.
     #[must_use]
     pub fn degrees(&self) -> f64 {
         let lsb = match self.mode {
@@ -134,14 +134,14 @@ pub struct Dsp3000Binary {
 }
 
 impl Dsp3000Binary {
-    /// A part that is set to send this type with these sync bits.
+    /// Makes a parser for a part that is set to send this type with these sync bits.
     #[must_use]
     pub const fn new(mode: Mode, sync: u8) -> Self {
         Self { mode, sync: sync & 3, bytes: Vec::new(), good: 0, losses: 0 }
     }
 
     /// Takes one byte; the fourth of a word may give a reading.
-    pub fn push(&mut self, byte: u8) -> Option<Word> {
+    pub fn receive(&mut self, byte: u8) -> Option<Word> {
         // Three at most are kept between calls.
         let _ = self.bytes.push(byte);
         let bytes: [u8; 4] = self.bytes.as_slice().try_into().ok()?;
@@ -160,8 +160,8 @@ impl Dsp3000Binary {
         }
     }
 
-    /// The line has been silent for longer than a few bytes take (more than 0.3 ms): what was
-    /// begun is no word, and the next byte begins one.
+    /// Drops the word under way, because the line has been silent for longer than a few bytes take (more than 0.3
+    /// ms); the next byte begins a word.
     pub fn pause(&mut self) {
         if !self.bytes.is_empty() {
             self.losses = self.losses.saturating_add(u32::from(self.good == LOCK));
@@ -170,7 +170,7 @@ impl Dsp3000Binary {
         }
     }
 
-    /// Times that a believed phase turned out bad.
+    /// Returns the number of times that a believed phase turned out wrong.
     #[must_use]
     pub fn losses(&self) -> u32 {
         self.losses

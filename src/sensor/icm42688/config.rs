@@ -37,7 +37,7 @@ pub enum OutputRate {
 }
 
 impl OutputRate {
-    /// Low nibble of the two configuration registers.
+    /// Returns the low nibble of the two configuration registers.
     const fn code(self) -> u8 {
         match self {
             Self::Hz1000 => 6,
@@ -75,7 +75,7 @@ impl Bandwidth {
     }
 }
 
-/// How the part is set.
+/// The settings of the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Icm42688Config {
@@ -83,12 +83,12 @@ pub struct Icm42688Config {
     pub rate: OutputRate,
     /// The last filter's bandwidth.
     pub bandwidth: Bandwidth,
-    /// Of the FIFO's packets.
+    /// The resolution of the FIFO's packets.
     pub resolution: Resolution,
 }
 
 impl Icm42688Config {
-    /// What the registers must hold, in the order in which they are written: filters and ranges
+    /// Returns the values that the registers must hold, in the order in which they are written: filters and ranges
     /// before the sensors are switched on.
     #[must_use]
     pub const fn settings(&self) -> [Setting; SETTINGS] {

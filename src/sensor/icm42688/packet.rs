@@ -24,7 +24,7 @@ const CONTENT: u8 = 0xFC;
 const NO_READING_16: i32 = -32_768;
 const NO_READING_20: i32 = -524_288;
 
-/// Which packet.
+/// The packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Resolution {
@@ -36,7 +36,7 @@ pub enum Resolution {
 }
 
 impl Resolution {
-    /// Bytes of a packet.
+    /// Returns the number of bytes of a packet.
     #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
@@ -46,7 +46,7 @@ impl Resolution {
     }
 }
 
-/// Why bytes are no packet.
+/// The reason why bytes are no packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -74,7 +74,7 @@ pub enum PacketError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// Which packet.
+    /// The packet.
     pub resolution: Resolution,
     /// x, y, z, 16 or 20 bits.
     pub acceleration: [Option<i32>; 3],
@@ -129,7 +129,7 @@ impl Packet {
         })
     }
 
-    /// The packet's bytes; of each reading the bits that it has there.
+    /// Encodes the packet's bytes, with the bits that each reading has there.
     #[must_use]
     pub fn emit(&self) -> Vec<u8, MAX_PACKET> {
         let mut bytes = Vec::new();

@@ -10,11 +10,11 @@ pub struct Register {
     pub address: u8,
 }
 
-/// What a register of the configuration must hold.
+/// The content that a register of the configuration must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setting {
-    /// Which register.
+    /// The register.
     pub register: Register,
     /// Its bits that are set; the others stay as they are after a reset.
     pub mask: u8,
@@ -31,7 +31,7 @@ pub const READ: u8 = 0x80;
 
 /// Bit 0 resets the part.
 pub const DEVICE_CONFIG: Register = bank0(0x11);
-/// How the FIFO deals with an overflow.
+/// The FIFO's treatment of an overflow.
 pub const FIFO_CONFIG: Register = bank0(0x16);
 /// Bytes in the FIFO, high byte; the low one follows.
 pub const FIFO_COUNTH: Register = bank0(0x2E);
@@ -43,7 +43,7 @@ pub const SIGNAL_PATH_RESET: Register = bank0(0x4B);
 pub const INTF_CONFIG0: Register = bank0(0x4C);
 /// Clock and AFSR.
 pub const INTF_CONFIG1: Register = bank0(0x4D);
-/// What is switched on.
+/// The sensors that are switched on.
 pub const PWR_MGMT0: Register = bank0(0x4E);
 /// Gyro range and rate.
 pub const GYRO_CONFIG0: Register = bank0(0x4F);
@@ -55,7 +55,7 @@ pub const GYRO_CONFIG1: Register = bank0(0x51);
 pub const GYRO_ACCEL_CONFIG0: Register = bank0(0x52);
 /// Order of the accelerometer's last filter.
 pub const ACCEL_CONFIG1: Register = bank0(0x53);
-/// What goes into the FIFO.
+/// The data that go into the FIFO.
 pub const FIFO_CONFIG1: Register = bank0(0x5F);
 /// [`IDENTITY`].
 pub const WHO_AM_I: Register = bank0(0x75);
@@ -76,7 +76,7 @@ pub const ACCEL_CONFIG_STATIC3: Register = Register { bank: 2, address: 0x04 };
 /// Accelerometer anti-alias filter: BITSHIFT and DELTSQR's high bits.
 pub const ACCEL_CONFIG_STATIC4: Register = Register { bank: 2, address: 0x05 };
 
-/// What [`WHO_AM_I`] must read.
+/// The content that [`WHO_AM_I`] must have.
 pub const IDENTITY: u8 = 0x47;
 /// [`DEVICE_CONFIG`]: reset.
 pub const RESET: u8 = 0x01;
@@ -107,10 +107,10 @@ pub const FIFO_20_BIT: u8 = 0x17;
 
 /// The anti-alias filter for 258 Hz: its three numbers, from the data sheet's table of bandwidths.
 pub mod aaf_258_hz {
-    /// For [`super::GYRO_CONFIG_STATIC3`].
+    /// The value for [`super::GYRO_CONFIG_STATIC3`].
     pub const DELT: u8 = 6;
     /// The square of it, for the two registers behind.
     pub const DELTSQR: u16 = 36;
-    /// For the high nibble of [`super::GYRO_CONFIG_STATIC5`].
+    /// The value for the high nibble of [`super::GYRO_CONFIG_STATIC5`].
     pub const BITSHIFT: u8 = 10;
 }

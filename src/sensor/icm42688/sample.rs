@@ -37,8 +37,7 @@ impl Resolution {
 }
 
 impl Packet {
-    /// The readings in the pipeline's units, taken at `time`; `None` where an axis has no
-    /// reading.
+    /// Converts the readings, taken at `time`, to the pipeline's units; `None` where an axis has no reading.
     #[must_use]
     pub fn sample(&self, time: Micros) -> Option<ImuSample> {
         let (per_dps, per_g) = (self.resolution.counts_per_dps(), self.resolution.counts_per_g());
@@ -64,9 +63,8 @@ impl Packet {
     }
 }
 
-/// Tells whether a reading is an end of the range. With FIFO_HOLD_LAST_DATA_EN = 0, as after a
-/// reset, the lowest reading is -32,766 of 16 bits and -524,256 of 20, for those below mark what is no
-/// reading (DS-000347, 12.8).
+/// Returns whether a reading is an end of the range. With FIFO_HOLD_LAST_DATA_EN = 0, as after a reset, the lowest
+/// reading is -32,766 of 16 bits and -524,256 of 20, because those below mark an absent reading (DS-000347, 12.8).
 const fn clipped(resolution: Resolution, reading: i32) -> bool {
     match resolution {
         Resolution::Bits16 => reading <= -32_766 || reading >= 32_767,

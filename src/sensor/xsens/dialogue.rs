@@ -22,31 +22,31 @@ use crate::sensor::framer::Framer;
 use crate::sensor::serial;
 use crate::units::Micros;
 
-/// How long an answer may take.
+/// The time that an answer may take.
 pub const TIMEOUT: Micros = Micros(500_000);
-/// How often a message is sent before the part is given up.
+/// The number of times that a message is sent before the part is given up.
 pub const ATTEMPTS: u8 = 3;
-/// Why the dialogue has ended without a part that measures.
+/// The reason why the dialogue has ended without a part that measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DialogueError {
-    /// No answer to any attempt.
+    /// No attempt was answered.
     #[error("MTi: no answer to {step:?} after {ATTEMPTS} attempts")]
     Silent {
-        /// What was asked.
+        /// The step that was not answered.
         step: Step,
     },
     /// The last attempt was answered by an error frame.
     #[error("MTi: {step:?} is refused with error {code}")]
     Refused {
-        /// What was asked.
+        /// The step that was not answered.
         step: Step,
         /// The part's error code.
         code: u8,
     },
     /// The part has woken up more than [`ATTEMPTS`] times: its supply fails, or it resets itself.
-    #[error("MTi: started anew more than {ATTEMPTS} times")]
+    #[error("MTi: restarted more than {ATTEMPTS} times")]
     Restarts,
     /// The part has set another rate than asked for, or left the output out (rate 0).
     #[error("MTi: output {id:04x} is set to {rate} Hz")]
@@ -58,7 +58,7 @@ pub enum DialogueError {
     },
 }
 
-/// Where the dialogue stands.
+/// The steps of the dialogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     /// This message is to be sent.
@@ -90,7 +90,7 @@ impl Default for Dialogue {
 }
 
 impl Dialogue {
-    /// Nothing sent yet.
+    /// Begins before the first line is sent.
     #[must_use]
     pub const fn new() -> Self {
         let state = State::Due(Step::GoToConfig);
@@ -98,14 +98,14 @@ impl Dialogue {
     }
 
     /// Takes one byte from the part.
-    pub fn push(&mut self, byte: u8) {
-        self.framer.push(byte);
+    pub fn receive(&mut self, byte: u8) {
+        self.framer.receive(byte);
         while let Some((mid, reply)) = self.framer.next_frame().and_then(xbus::parse).map(Reply::new) {
             self.answer(mid, reply);
         }
     }
 
-    /// What is to be done at `now`.
+    /// Returns the next action at `now`.
     ///
     /// # Errors
     /// [`DialogueError`], again at each call: the dialogue is over.
@@ -175,8 +175,8 @@ impl Dialogue {
 impl serial::Dialogue for Dialogue {
     type Error = DialogueError;
 
-    fn push(&mut self, byte: u8) {
-        self.push(byte);
+    fn receive(&mut self, byte: u8) {
+        self.receive(byte);
     }
 
     fn poll(&mut self, now: Micros) -> Result<Action, DialogueError> {
@@ -184,11 +184,11 @@ impl serial::Dialogue for Dialogue {
     }
 }
 
-/// What matters of a frame's data, whatever its message is.
+/// The relevant part of a frame's data, whatever its message is.
 struct Reply {
-    /// Of an error frame.
+    /// The code of an error frame.
     code: u8,
-    /// Of an output configuration: the first output of those that count which is not as asked.
+    /// The first required output whose rate differs from the request.
     different: Option<Output>,
 }
 

@@ -14,7 +14,7 @@ pub const MAX_EMITTED: usize = 96;
 
 /// Data identifiers, precision and coordinate system masked out.
 pub mod id {
-    /// What is left of an identifier without them.
+    /// The identifier without them.
     pub const MASK: u16 = 0xFFF0;
     /// Counts messages: u16, wraps.
     pub const PACKET_COUNTER: u16 = 0x1020;
@@ -30,7 +30,7 @@ pub mod id {
     pub const STATUS_WORD: u16 = 0xE020;
 }
 
-/// Why an intact MTData2 frame gives no sample.
+/// The reason why an intact MTData2 frame gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -58,12 +58,12 @@ pub enum XsensError {
     Reading {
         /// Identifier of the packet.
         id: u16,
-        /// What is wrong with it.
+        /// The error of the reading.
         error: RangeError,
     },
 }
 
-/// What an MTData2 message says, as far as it is used here.
+/// The used content of an MTData2 message.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MtData2 {
     /// Message counter, wraps.
@@ -110,20 +110,20 @@ impl MtData2 {
         if data.is_empty() { Ok(message) } else { Err(XsensError::Truncated { id: 0 }) }
     }
 
-    /// The whole frame of this message in single precision, absent packets left out.
+    /// Encodes the whole frame of this message in single precision, without absent packets.
     #[must_use]
     pub fn emit(&self) -> Vec<u8, 72> {
         // 72 bytes hold all six packets.
         xbus::emit(MID_MT_DATA2, &self.data(Precision::Single)).unwrap_or_default()
     }
 
-    /// The whole frame with its numbers in another precision.
+    /// Encodes the whole frame with its numbers in another precision.
     #[must_use]
     pub fn emit_as(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
         xbus::emit(MID_MT_DATA2, &self.data(precision)).unwrap_or_default()
     }
 
-    /// All packets.
+    /// Parses all packets.
     fn data(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
         let mut data = Vec::new();
         // MAX_EMITTED bytes hold all six packets in double precision, the longest.

@@ -1,8 +1,8 @@
-//! The four forms of a number in MTData2, told apart by bits 0 and 1 of the data identifier.
+//! The four forms of a number in MTData2, which bits 0 and 1 of the data identifier distinguish.
 
 use heapless::Vec;
 
-/// How a number is written, big-endian.
+/// The encoding of a number, big-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Precision {
@@ -17,7 +17,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// The precision in a data identifier.
+    /// Returns the precision in a data identifier.
     #[must_use]
     pub const fn of(id: u16) -> Self {
         match id & 3 {
@@ -28,7 +28,7 @@ impl Precision {
         }
     }
 
-    /// The identifier with this precision in it.
+    /// Returns the identifier with this precision in it.
     #[must_use]
     pub const fn mark(self, id: u16) -> u16 {
         id & !3
@@ -40,7 +40,7 @@ impl Precision {
             }
     }
 
-    /// Bytes of a number.
+    /// Returns the number of bytes of a number.
     #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
@@ -50,7 +50,7 @@ impl Precision {
         }
     }
 
-    /// The number in exactly these bytes; f64 holds every one exactly.
+    /// Decodes the number in exactly these bytes; f64 holds every one exactly.
     #[must_use]
     pub fn parse(self, bytes: &[u8]) -> Option<f64> {
         match (self, bytes) {
@@ -68,8 +68,8 @@ impl Precision {
         }
     }
 
-    /// The same, rounded once to f32: without f64 where the form needs none, for a target that
-    /// computes f64 in software.
+    /// Decodes the number rounded once to f32, without f64 where the form needs none, for a target that computes
+    /// f64 in software.
     #[must_use]
     pub fn parse_f32(self, bytes: &[u8]) -> Option<f32> {
         match (self, bytes) {
@@ -82,7 +82,7 @@ impl Precision {
         }
     }
 
-    /// The nearest number's bytes; the fixed-point forms clamp to their ends.
+    /// Encodes the nearest number; the fixed-point forms clamp to their ends.
     #[must_use]
     pub fn emit(self, value: f64) -> Vec<u8, 8> {
         let mut bytes = Vec::new();

@@ -19,7 +19,7 @@ pub mod mid {
     pub const WAKE_UP_ACK: u8 = 0x3F;
     /// The part refuses a message; one byte says why.
     pub const ERROR: u8 = 0x42;
-    /// Which data at which rate.
+    /// The data that are requested, and their rates.
     pub const SET_OUTPUT_CONFIGURATION: u8 = 0xC0;
 }
 
@@ -36,7 +36,7 @@ pub struct Output {
     pub rate: u16,
 }
 
-/// What the pipeline wants, 100 Hz, all in single precision.
+/// The outputs that the pipeline needs: 100 Hz, all in single precision.
 pub const OUTPUTS: [Output; 6] = [
     Output { id: id::PACKET_COUNTER, rate: EVERY_MESSAGE },
     Output { id: id::SAMPLE_TIME_FINE, rate: EVERY_MESSAGE },
@@ -67,7 +67,7 @@ impl Step {
         }
     }
 
-    /// The step's frame.
+    /// Returns the step's frame.
     #[must_use]
     pub fn emit(self) -> Vec<u8, MAX_SENT> {
         let mut data = Vec::<u8, 24>::new();

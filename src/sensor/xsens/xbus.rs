@@ -31,7 +31,7 @@ impl Protocol for Xbus {
     }
 }
 
-/// Message identifier and data of an intact frame.
+/// Returns the message identifier and the data of an intact frame.
 #[must_use]
 pub fn parse(frame: &[u8]) -> Option<(u8, &[u8])> {
     match frame {
@@ -42,7 +42,7 @@ pub fn parse(frame: &[u8]) -> Option<(u8, &[u8])> {
     }
 }
 
-/// The frame of a message. `None` when it is longer than `N` bytes or than an Xbus frame.
+/// Encodes the frame of a message. `None` when it is longer than `N` bytes or than an Xbus frame.
 #[must_use]
 pub fn emit<const N: usize>(mid: u8, data: &[u8]) -> Option<Vec<u8, N>> {
     let len = u8::try_from(data.len()).ok().filter(|len| *len != EXTENDED_LENGTH)?;

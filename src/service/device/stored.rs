@@ -1,6 +1,6 @@
 //! Configuration, calibration and the choice of weights: read at the start, stored when asked.
 
-use super::{Device, Drives, MappedSlots};
+use super::{Device, MappedSlots, SupportedHardware};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError};
@@ -33,13 +33,13 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         matches!(self.flash, FlashState::Damaged | FlashState::Failed(_))
     }
 
-    /// Whether anything that is stored is damaged or refused: [`crate::health::Faults::STORED`].
+    /// Returns whether any stored data are damaged or refused: [`crate::health::Faults::STORED`].
     #[must_use]
     pub fn stored_damaged(&self) -> bool {
         self.refused || self.records_damaged()
     }
 
-    /// Whether a configuration was stored and none is used: what the sensor's axes are is not known.
+    /// Returns whether a configuration was stored and none is used: the sensor's axes are then not known.
     #[must_use]
     pub fn configuration_lost(&self) -> bool {
         match self.configuration_origin {
@@ -64,7 +64,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.store = self.writable.then_some(store);
     }
 
-    /// A record that was read, and what is to be said of where it comes from.
+    /// Returns a record that was read, and its origin.
     fn take<T>(
         &mut self,
         found: Result<Option<T>, StoreError>,
@@ -81,7 +81,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let Drives { imus, fogs, bits_per_second } = self.drives;
+        let SupportedHardware { imus, fogs, bits_per_second } = self.drives;
         if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
             return Err(StoreError::Field(FieldError::PartNotInImage));
         }

@@ -10,7 +10,7 @@ use embedded_storage::nor_flash::NorFlash;
 
 /// The flash of the weight slots, which the processor can also read in place.
 pub trait MappedSlots: NorFlash {
-    /// Both slots, each on a word boundary.
+    /// Returns both slots, each on a word boundary.
     fn slots(&self) -> [&[u8]; 2];
 }
 
@@ -22,7 +22,7 @@ pub(super) struct Uploading {
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// The weights to run on: `slots` as the processor reads them, the image's own last.
+    /// Selects the weights to run on from `slots` as the processor reads them, the image's own last.
     pub fn weights<'w>(&mut self, slots: Option<[&'w [u8]; 2]>, built_in: &'w [u8]) -> Option<Blob<'w>> {
         let Selection { weights, source, refused } =
             select(&self.accepted, slots.unwrap_or_default(), built_in);
@@ -40,15 +40,15 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         weights
     }
 
-    /// The weights in use no longer fit their checksum; they are used no more until the next
-    /// start, which checks all files anew.
+    /// Notes that the weights in use no longer fit their checksum; they are not used until the next start, which
+    /// checks all files again.
     pub fn weights_damaged(&mut self) {
         self.weights = WeightSource::None;
         self.weights_crc = None;
         self.note(EventKind::WeightsDamaged);
     }
 
-    /// The slot that the network does not run on.
+    /// Returns the slot that the network does not run on.
     fn unused_slot(&self) -> Slot {
         match self.weights {
             WeightSource::Slot(slot) => slot.other(),

@@ -141,7 +141,7 @@ impl Board {
     fn send(&mut self, now: Micros, networks: &mut impl Networks, out: &mut Vec<Message>) {
         while let Some(sent) = self.coprocessor.next_frame() {
             let row = self.row_of(&sent);
-            self.port.push(sent.frame, now);
+            self.port.enqueue(sent.frame, now);
             while let Some(line) = self.port.outgoing() {
                 let bytes = line.to_vec();
                 self.port.sent(bytes.len());

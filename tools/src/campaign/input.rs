@@ -58,7 +58,7 @@ impl Input {
             Self::Xsens(mti) => imu(mti, &message.bytes, &mut delivered),
             Self::Dsp1760(parts) if message.line == Line::Gyro => {
                 for byte in &message.bytes {
-                    parts.0.push(*byte);
+                    parts.0.receive(*byte);
                     let samples = std::iter::from_fn(|| parts.0.next_sample());
                     delivered.extend(samples.map(|sample| Delivered::Fog(sample.ok())));
                 }
@@ -85,7 +85,7 @@ impl Input {
 
 fn imu(mti: &mut Mti, bytes: &[u8], delivered: &mut Vec<Delivered>) {
     for byte in bytes {
-        mti.push(*byte);
+        mti.receive(*byte);
         delivered.extend(std::iter::from_fn(|| mti.next_sample()).map(|sample| Delivered::Imu(sample.ok())));
     }
 }

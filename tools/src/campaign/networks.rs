@@ -2,9 +2,9 @@
 
 use gyronet::fog::seconds::{Second, SecondsWindow};
 use gyronet::model::fognet::{FogEstimate, FogNetState, MinuteNetwork};
+use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, FogBlob, FogNet, GyroNet, SCALE_MIN, WindowNetwork, weights};
 use gyronet::units::{Angle, AngularRate};
-use gyronet::window::{Features, WINDOW};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 

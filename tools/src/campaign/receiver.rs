@@ -110,7 +110,7 @@ impl Receiver {
         debug_assert_eq!(message.line, Line::Out);
         self.time(message.at, seen);
         for byte in &message.bytes {
-            let Some(line) = self.assembler.push(*byte) else { continue };
+            let Some(line) = self.assembler.receive(*byte) else { continue };
             // Answers to what the wheels' line says are no frames; a frame that begins as one is
             // missed by its counter.
             let line = line.map(|line| line.strip_prefix(b"\x07").unwrap_or(line));

@@ -11,7 +11,7 @@ use crate::drive::wheel_frames;
 use crate::simulate::{Config as Simulated, Sample, Simulation};
 use gyronet::can::slcan::emit_stamped;
 use gyronet::coprocessor::{Config, Coprocessor};
-use gyronet::health::{Counters, Status, WatchCounters};
+use gyronet::health::{Counters, MonitorCounters, Status};
 use gyronet::model::WindowNetwork;
 use gyronet::sample::{PERIOD_US, RATE_HZ, WHEELS};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
@@ -43,7 +43,7 @@ pub struct Soak {
     /// What the pipeline counted.
     pub pipeline: Counters,
     /// What the sensor monitor counted.
-    pub watch: WatchCounters,
+    pub watch: MonitorCounters,
     /// What the receiver counted.
     pub receiver: Counts,
     /// Samples with each status: initialising, degraded, ready.
@@ -142,7 +142,7 @@ impl Drive {
             temperature: None,
             status: Some(GOOD),
         };
-        message.emit().iter().for_each(|byte| self.mti.push(*byte));
+        message.emit().iter().for_each(|byte| self.mti.receive(*byte));
         let received = self.mti.next_sample().and_then(Result::ok).expect("a message of our own");
         let sent = u64::from(self.starts[0]) * 100 + u64::from(k) * PERIOD_US;
         self.clock_error_us = received.time.0 as i64 - sent as i64;
@@ -188,7 +188,7 @@ impl Drive {
             validity: Validity::GYRO,
             sequence: (k % 128) as u8,
         };
-        message.emit().iter().for_each(|byte| self.gyro.push(*byte));
+        message.emit().iter().for_each(|byte| self.gyro.receive(*byte));
         while let Some(received) = self.gyro.next_sample() {
             match received {
                 Ok(received) => {
@@ -231,7 +231,7 @@ impl Soak {
         let samples = u64::from(self.samples);
         let Counters { missing, misplaced, clock_jumps, late, .. } = self.pipeline;
         let Counts { foreign, lost, repeated, out_of_sequence, damaged, unreadable, frames } = self.receiver;
-        let WatchCounters { silences, stuck, .. } = self.watch;
+        let MonitorCounters { silences, stuck, .. } = self.watch;
         let yaw = self.yaw_error_deg.abs() <= YAW_TOLERANCE;
         let memory = self.memory_kib.is_none_or(|[early, late]| late <= early + 64);
         let [init, ..] = self.statuses;

@@ -8,13 +8,13 @@ use super::draw::Draw;
 use gyronet::compensate::CompensateConfig;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::blob::{HEADER_LEN, HIDDEN};
+use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork};
 use gyronet::nn::bilstm::Layer;
 use gyronet::nn::dense::Dense;
-use gyronet::nn::lstm::Direction;
-use gyronet::uncertainty::UncertaintyConfig;
+use gyronet::nn::lstm::DirectionWeights;
+use gyronet::pipeline::UncertaintyConfig;
 use gyronet::units::AngularRate;
-use gyronet::window::{FEATURES, Features, WINDOW};
 use serde::Serialize;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -71,8 +71,8 @@ impl Memory {
             self.words.get(at - words..at)
         };
         let mut direction = |inputs| {
-            let input = take(Direction::input_words(HIDDEN, inputs))?;
-            Direction::new(HIDDEN, inputs, input, take(Direction::recurrent_words(HIDDEN))?)
+            let input = take(DirectionWeights::input_words(HIDDEN, inputs))?;
+            DirectionWeights::new(HIDDEN, inputs, input, take(DirectionWeights::recurrent_words(HIDDEN))?)
         };
         let mut layer = |inputs| Some(Layer { forward: direction(inputs)?, backward: direction(inputs)? });
         let layers = [layer(FEATURES)?, layer(2 * HIDDEN)?];

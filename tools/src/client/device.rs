@@ -109,7 +109,7 @@ impl<L: Read + Write> Device<L> {
                 Err(error) => return Err(self.broken(error)),
             };
             for byte in &bytes[..len] {
-                match deframer.push(*byte) {
+                match deframer.receive(*byte) {
                     Some(Ok((number, reply))) if number == self.number => return Ok(Some(reply)),
                     // Late, to an earlier question.
                     Some(Ok(_)) => *strays += 1,

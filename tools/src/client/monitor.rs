@@ -172,7 +172,7 @@ impl Monitor {
             self.counts.damaged += 1;
             return;
         };
-        let verdict = self.bosch[index].process(message.counter);
+        let verdict = self.bosch[index].check(message.counter);
         if self.account(Ok(verdict)) && index == 0 {
             let good = message.rate_status == bosch::SignalStatus::OK;
             self.drop_in = good.then(|| message.rate_deg_per_sec());

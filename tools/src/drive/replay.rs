@@ -189,8 +189,8 @@ fn earlier(steps: &mut [Step], tick: u32) -> Option<&mut Step> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gyronet::model::window::{Features, WINDOW};
     use gyronet::model::{Estimate, SCALE_MIN};
-    use gyronet::window::{Features, WINDOW};
     use std::fmt::Write;
 
     /// Says that the gyro is always off by 100 codes.

@@ -129,7 +129,7 @@ mod tests {
         let known = recording.rows.iter().map(|row| {
             let now = row.sample.time;
             if let Some(frame) = frames.next(row) {
-                receiver.process(&frame, now).unwrap().unwrap();
+                receiver.decode(&frame, now).unwrap().unwrap();
             }
             receiver.poll(now).map_or(Standstill::Unknown, |wheels| wheels.standstill)
         });

@@ -8,11 +8,11 @@ use crate::evaluate::methods::with_mode;
 use crate::evaluate::metrics::{WINDOW, YawError};
 use gyronet::compensate::{CompensateConfig, Lag, Mode};
 use gyronet::estimate::YawEstimate;
+use gyronet::model::window::Features;
 use gyronet::model::{Estimate, WindowNetwork};
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::Standstill;
 use gyronet::units::AngularRate;
-use gyronet::window::Features;
 use serde::Serialize;
 
 /// One configuration and what it is called.
@@ -38,8 +38,8 @@ impl Variant {
 struct Nothing;
 
 impl WindowNetwork for Nothing {
-    fn estimate(&mut self, _window: &[Features; gyronet::window::WINDOW]) -> Estimate {
-        let corrections = [AngularRate::ZERO; gyronet::window::WINDOW];
+    fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
+        let corrections = [AngularRate::ZERO; gyronet::model::window::WINDOW];
         // 1e-3 rad/s: with it a second's sigma is that of an uncorrected rate.
         Estimate { corrections, scale: AngularRate(134_218), clamped_inputs: 0 }
     }
@@ -166,7 +166,7 @@ pub fn floor(recording: &Recording) -> Option<Floor> {
     let still = recording.rows.iter().map(|row| {
         let now = row.sample.time;
         if let Some(frame) = frames.next(row) {
-            let _ = receiver.process(&frame, now);
+            let _ = receiver.decode(&frame, now);
         }
         let stands = receiver.poll(now).is_some_and(|wheels| wheels.standstill == Standstill::Still);
         row.reference.filter(|_| stands)

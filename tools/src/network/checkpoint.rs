@@ -5,8 +5,8 @@ pub use crate::network::tensors::CheckpointError;
 use crate::network::tensors::{Shape, Tensors, bilstm, dense, tensor};
 use gyronet::model::blob::HIDDEN;
 use gyronet::model::gyronet_f32::GyroNetF32;
+use gyronet::model::window::FEATURES;
 use gyronet::nn::reference::LstmWeights;
-use gyronet::window::FEATURES;
 use std::path::Path;
 
 /// The network's tensors: two LSTMs one above the other, and what is around them.

@@ -2,8 +2,8 @@
 
 use gyronet::fog::seconds::SecondsWindow;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
+use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate, WindowNetwork};
-use gyronet::window::{Features, WINDOW};
 
 /// Runs two networks on every window, passes on the first one's estimate and sums up how far
 /// they are apart.

@@ -11,9 +11,9 @@ mod rows;
 use crate::network::checkpoint::Checkpoint;
 use crate::network::tensors::Tensors;
 use gyronet::model::blob::{self, Blob, HIDDEN, Topology};
+use gyronet::model::window::WINDOW;
 use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet::window::WINDOW;
 use serde_json::json;
 
 /// Network inputs are clamped to this many standard deviations; `gyronet quantize --drives` says

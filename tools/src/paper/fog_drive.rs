@@ -4,9 +4,9 @@ use crate::paper::sequence::{Sequence, Step};
 use gyronet::fog::seconds::FogFrame;
 use gyronet::fog::{FogConfig, FogCorrector, PseudoFog};
 use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::window::Features;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
-use gyronet::window::Features;
 
 /// Steps of static initialisation: 3 s.
 const STATIC_STEPS: usize = 300;

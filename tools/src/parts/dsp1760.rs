@@ -63,14 +63,14 @@ impl Gyro {
             let now = end - PERIOD_US + n * MESSAGE_US;
             let frame = message(now, sample).emit();
             self.bytes += frame.len() as u64;
-            frame.iter().for_each(|byte| self.part.push(*byte));
+            frame.iter().for_each(|byte| self.part.receive(*byte));
             let fog = self.part.next_sample().ok_or("no frame was found")?;
             let fog = fog.map_err(|error| error.to_string())?;
-            streams.push_fog(Micros(now), fog).map_err(|error| error.to_string())?;
+            streams.add_fog(Micros(now), fog).map_err(|error| error.to_string())?;
             while n < MESSAGES && streams.next_step(Micros(now)).is_some() {}
         }
         let imu = ImuSample { time: Micros(end), ..*sample };
-        streams.push_imu(Micros(end), imu).map_err(|error| error.to_string())?;
+        streams.add_imu(Micros(end), imu).map_err(|error| error.to_string())?;
         let step = std::iter::from_fn(|| streams.next_step(Micros(end))).last();
         step.filter(|step| step.time.0 == end).ok_or_else(|| "its grid step does not come".to_owned())
     }

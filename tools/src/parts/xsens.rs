@@ -21,7 +21,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let epoch = first - first % (TICK_US << 32);
     for (row, frame) in recording.rows.iter().zip(messages(recording)) {
         bytes += frame.len() as u64;
-        frame.iter().for_each(|byte| mti.push(*byte));
+        frame.iter().for_each(|byte| mti.receive(*byte));
         let delivered = mti.next_sample().ok_or_else(|| "no frame was found".to_owned());
         let sample = delivered.and_then(|sample| sample.map_err(|error| error.to_string()));
         let sample = sample.map_err(|why| Part::Xsens.no_sample(recording, row, why))?;

@@ -35,6 +35,12 @@ class Gpio(Peripheral):
         self.moder, self.ospeedr, self.pupdr = RESET.get(self.letter, (0, 0, 0))
         self.otyper = self.odr = self.lckr = self.lock_step = 0
         self.afr = [0, 0]
+        self._find_functions()
+
+    def _find_functions(self):
+        #: What `alternate` answers for each pin.
+        self.functions = [self.afr[pin >> 3] >> 4 * (pin & 7) & 15 if self.mode(pin) == ALTERNATE else None
+                          for pin in range(16)]
 
     def reset(self, cause):
         self._registers()
@@ -48,9 +54,7 @@ class Gpio(Peripheral):
 
     def alternate(self, pin):
         """The number of the pin's alternate function, or None where the pin is in another mode."""
-        if self.moder >> 2 * pin & 3 != ALTERNATE:
-            return None
-        return self.afr[pin >> 3] >> 4 * (pin & 7) & 15
+        return self.functions[pin]
 
     def speed(self, pin):
         """OSPEEDR: 0 low (2 MHz), 1 medium (25 MHz), 2 high (50 MHz), 3 very high (100 MHz)."""
@@ -165,6 +169,7 @@ class Gpio(Peripheral):
             self.afr = [both & 0xFFFF_FFFF, both >> 32]
         elif word != IDR:
             raise registers.unmodelled(self, offset, "write")
+        self._find_functions()
         self._changed()
 
     def _lock(self, value):
@@ -200,6 +205,6 @@ def connected(board, pins, function):
     """One of the pins, given as (port letter, number), carries the alternate function."""
     for letter, number in pins:
         port = board.peripherals.get("GPIO" + letter)
-        if port is not None and port.alternate(number) == function:
+        if port is not None and port.functions[number] == function:
             return True
     return False

@@ -66,6 +66,7 @@ class Rcc(Peripheral):
                 self.board.record("early_access", peripheral=name, ps_left=until - now)
             elif now >= self.settle_until:
                 self.settle_until = 0
+                self.open = self.gates | {None}
         return name in self.gates
 
     def is_on(self, name):
@@ -124,6 +125,9 @@ class Rcc(Peripheral):
         self.board.irq(5, False)
 
     def _open_gates(self):
+        #: Gates that an access need not look at; `None` stands for a block that is always clocked.
+        self.open = {None}
+        self.settle_until = max(self.settle_until, 1)
         self.gates = {name for offset, names in ENABLE.items() for bit, name in names.items()
                       if self.words[offset] >> bit & 1}
         for offset, names in RESET.items():

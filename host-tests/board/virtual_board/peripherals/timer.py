@@ -200,10 +200,16 @@ class Timer(Peripheral):
 
     def read(self, offset, size):
         if offset == 0x24:
-            if self.cr1 & CEN:
-                value = self._after(self._steps(self.board.now)) if self._steady() else self._counted()
-            else:
+            if not self.cr1 & CEN:
                 value = self.counter
+            elif self._steady():
+                steps = self._steps(self.board.now)
+                value = self.counter + steps
+                # The wrap and a counter beyond ARR are rare.
+                if value > self.arr:
+                    value = self._after(steps)
+            else:
+                value = self._counted()
             return value if size == 4 else registers.cut(value, offset, size)
         word = offset & ~3
         registers.check(self, offset, size, registers.HALF_WORD)

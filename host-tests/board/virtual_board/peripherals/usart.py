@@ -55,6 +55,7 @@ class Usart(Peripheral):
         self.listening_since = None
         self.last_end, self.idle_armed = 0, False
         self.bit_ps = self.frame_ps = 0
+        self._compare()
 
     def reset(self, cause):
         for handle in (self.departure, self.idle_event):
@@ -85,10 +86,14 @@ class Usart(Peripheral):
         self.bit_ps = divider * PS // hz if divider and hz else 0
         halves = 2 * (1 + (9 if self.cr1 & M else 8)) + STOP_HALVES[self.cr2 >> 12 & 3]
         self.frame_ps = halves * self.bit_ps // 2
+        self._compare()
 
-    def _mismatch(self):
-        """The relative difference between the USART's bit time and the outside's."""
-        return self.bit_ps * self.baud / PS - 1
+    def _compare(self):
+        """What a byte costs follows from both sides' rates: the time to the middle of its stop bit, and the difference of rates."""
+        bit = self.bit_ps or PS // self.baud
+        self.sampled_ps = (10 if self.cr1 & M else 9) * bit + bit // 2
+        #: The relative difference between the USART's bit time and the outside's.
+        self.mismatch = self.bit_ps * self.baud / PS - 1
 
     def _note_mismatch(self, direction, error):
         """The first byte at each pair of rates is recorded."""
@@ -109,7 +114,7 @@ class Usart(Peripheral):
         self.departure = None
         value = self.shift
         self.shift = None
-        mismatch = self._mismatch()
+        mismatch = self.mismatch
         if connected(self.board, self.tx_pins, self.function):
             if abs(mismatch) > TOLERANCE:
                 self._note_mismatch("tx", mismatch)
@@ -143,10 +148,8 @@ class Usart(Peripheral):
 
     def _await(self):
         if self.line:
-            start = self.line[0][0]
-            bit = self.bit_ps or PS // self.baud
-            end = start + (10 if self.cr1 & M else 9) * bit + bit // 2
-            self.arrival = self.board.schedule(max(end - self.board.now, 0), self._arrived)
+            end = self.line[0][0] + self.sampled_ps
+            self.arrival = self.board.schedule(end - self.board.now, self._arrived)
         else:
             self.arrival = None
 
@@ -163,11 +166,11 @@ class Usart(Peripheral):
             self._watch_idle()
 
     def _receive(self, start, byte):
-        self._detect_idle(start)
+        if self.idle_armed:
+            self._detect_idle(start)
         value, framing = byte, False
-        mismatch = self._mismatch()
-        if self.cr1 & M or self.cr1 & PCE or abs(mismatch) > 0.02:
-            value, framing = self._sample(byte, mismatch)
+        if self.cr1 & (M | PCE) or abs(self.mismatch) > 0.02:
+            value, framing = self._sample(byte, self.mismatch)
         if self.sr & RXNE:
             self.sr |= ORE
             self.board.record("overrun", usart=self.name, byte=byte)
@@ -175,7 +178,8 @@ class Usart(Peripheral):
             self.rdr = value
             self.sr |= RXNE | FE if framing else RXNE
         self.last_end, self.idle_armed = self.board.now, True
-        self._interrupt()
+        if not self.irq_level:
+            self._interrupt()
         if self.cr3 & DMAR:
             self.serve_dma()
 
@@ -233,7 +237,8 @@ class Usart(Peripheral):
         if size == 1:
             registers.check(self, offset, size, registers.HALF_WORD)
         if offset == 0x00:
-            self._detect_idle(self.board.now)
+            if self.idle_armed:
+                self._detect_idle(self.board.now)
             self.seen, self.seen_tc = self.sr & ERRORS, True
             return self.sr
         if offset == 0x04:
@@ -327,6 +332,7 @@ class Usart(Peripheral):
     def configure(self, key, value):
         if key in ("baud", "outside_stop_bits"):
             setattr(self, key, value)
+            self._compare()
         else:
             super().configure(key, value)
 

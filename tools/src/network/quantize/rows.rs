@@ -1,7 +1,7 @@
 //! LSTM directions and output rows in int8 and int16, in the order in which the kernels read them.
 
 use super::{QuantizeError, Report, fixed};
-use gyronet::nn::lstm::{Direction, ROW_LIMIT};
+use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::reference::LstmWeights;
 use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, pack};
 
@@ -60,7 +60,7 @@ fn quantize_row(
         row.chain(std::iter::repeat_n(0.0, padded - count)).collect::<Vec<f64>>()
     };
     let input = columns(weights.weight_ih, inputs, inputs.next_multiple_of(2));
-    let recurrent = columns(weights.weight_hh, units, Direction::padded(units));
+    let recurrent = columns(weights.weight_hh, units, DirectionWeights::padded(units));
     let bias = f64::from(weights.bias_ih[row]) + f64::from(weights.bias_hh[row]);
     let largest = input.iter().chain(&recurrent).fold(0.0f64, |max, w| max.max(w.abs()));
     // Gate input (Q14) = accumulator x multiplier / 2^16, and an accumulator's LSB is

@@ -3,10 +3,10 @@ use super::results::{Path, Results, SequenceErrors};
 use super::{html, methods, pictures, table};
 use crate::paper::sequence::{Sequence, Step, StreamSummary};
 use crate::simulate::layout::{self, Layout, Spec};
+use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate as WindowEstimate, WindowNetwork};
 use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
-use gyronet::window::{Features, WINDOW};
 use std::path::PathBuf;
 
 /// Never corrects anything.

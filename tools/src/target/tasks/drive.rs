@@ -105,7 +105,7 @@ impl Told {
     fn read(&mut self, bytes: &[u8]) {
         for byte in bytes.get(self.read..).unwrap_or_default() {
             if let Some(Ok((_, Reply::Counters(AllCounters { pipeline, fog, .. })))) =
-                self.deframer.push(*byte)
+                self.deframer.receive(*byte)
             {
                 (self.samples, self.windows, self.messages) =
                     (pipeline.samples, pipeline.windows, fog.samples);

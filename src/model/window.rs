@@ -11,7 +11,7 @@ pub const FEATURES: usize = 6;
 /// Features of one sample, in the codes of [`crate::units`].
 pub type Features = [i32; FEATURES];
 
-/// Features of a sample, its angular rate less the static bias.
+/// Returns the features of a sample, its angular rate less the static bias.
 #[must_use]
 pub fn features(sample: &ImuSample, gyro_bias: &[AngularRate; 3]) -> Features {
     let [fx, fy, fz] = sample.specific_force;
@@ -34,7 +34,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// No sample yet.
+    /// The window is empty.
     pub const EMPTY: Self = Self { ring: [[0; FEATURES]; WINDOW], next: 0, filled: 0 };
 
     /// Forgets everything: a gap breaks the window.
@@ -44,7 +44,7 @@ impl Window {
     }
 
     /// Adds the newest sample; the oldest one makes way.
-    pub fn push(&mut self, features: Features) {
+    pub fn add(&mut self, features: Features) {
         if let Some(place) = self.ring.get_mut(self.next) {
             *place = features;
         }
@@ -52,13 +52,13 @@ impl Window {
         self.filled = (self.filled + 1).min(WINDOW);
     }
 
-    /// Whether all places are taken.
+    /// Returns whether all places are taken.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.filled == WINDOW
     }
 
-    /// The samples, oldest first; `None` until the window is full.
+    /// Returns the samples, oldest first; `None` until the window is full.
     #[must_use]
     pub fn snapshot(&self) -> Option<[Features; WINDOW]> {
         self.is_full().then(|| core::array::from_fn(|k| self.ring[(self.next + k) % WINDOW]))

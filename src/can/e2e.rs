@@ -29,7 +29,7 @@ pub use p05::P05;
 pub use p11::{P11, P11Mode};
 pub use sequence::{Sequence, Verdict};
 
-/// Why protected data are not to be believed.
+/// The reason why protected data are not to be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -42,13 +42,13 @@ pub enum Fault {
     Crc {
         /// Over what was received.
         computed: u16,
-        /// As received.
+        /// The value as received.
         received: u16,
     },
     /// The part of the identifier that is sent is another one.
     #[error("E2E: identifier nibble {received:x} is foreign")]
     DataId {
-        /// As received.
+        /// The value as received.
         received: u8,
     },
     /// A counter value that does not occur.
@@ -71,7 +71,7 @@ pub enum Profile {
 }
 
 impl Profile {
-    /// Bytes at the start of the data that belong to the profile.
+    /// Returns the number of bytes at the start of the data that belong to the profile.
     #[must_use]
     pub const fn header_len(&self) -> usize {
         match self {
@@ -80,7 +80,7 @@ impl Profile {
         }
     }
 
-    /// Number of counter values; after the last one comes 0.
+    /// Returns the number of counter values; after the last one comes 0.
     #[must_use]
     pub const fn counters(&self) -> u16 {
         match self {
@@ -125,13 +125,13 @@ pub struct Protector {
 }
 
 impl Protector {
-    /// The first message gets counter 0.
+    /// Begins with counter 0.
     #[must_use]
     pub const fn new(profile: Profile) -> Self {
         Self { profile, counter: 0 }
     }
 
-    /// Protects the next message.
+    /// Protects the next message: it sets the counter and the checksum.
     ///
     /// # Errors
     /// [`Fault::Length`]; the counter stays.
@@ -150,8 +150,8 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// `max_delta`: the largest step of the counter that still counts as loss (1: none may be
-    /// lost).
+    /// Begins before the first message. `max_delta` is the largest step of the counter that still counts as loss
+    /// (1: no message may be lost).
     #[must_use]
     pub const fn new(profile: Profile, max_delta: u8) -> Self {
         Self { profile, sequence: Sequence::new(profile.counters(), max_delta) }
@@ -164,6 +164,6 @@ impl Checker {
     /// [`Fault`].
     pub fn check(&mut self, data: &[u8]) -> Result<Verdict, Fault> {
         let counter = self.profile.check(data)?;
-        Ok(self.sequence.process(counter))
+        Ok(self.sequence.check(counter))
     }
 }

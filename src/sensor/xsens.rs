@@ -25,12 +25,12 @@ const STATUS_CLIPPED: u32 = 0x3F << 8;
 #[derive(Debug, Clone, Default)]
 pub struct Mti {
     framer: Framer<Xbus, MAX_FRAME>,
-    /// Of SampleTimeFine: 10 kHz ticks.
+    /// The unit of SampleTimeFine: 10 kHz ticks.
     stamps: StampClock,
 }
 
 impl Mti {
-    /// Nothing received yet.
+    /// Begins before the first sample.
     #[must_use]
     pub const fn new() -> Self {
         Self { framer: Framer::new(), stamps: StampClock::START }
@@ -38,11 +38,11 @@ impl Mti {
 
     /// Takes one byte. Call [`Mti::next_sample`] until `None` before the next one.
     #[inline]
-    pub fn push(&mut self, byte: u8) {
-        self.framer.push(byte);
+    pub fn receive(&mut self, byte: u8) {
+        self.framer.receive(byte);
     }
 
-    /// The next sample, or why an intact data message is none. Other messages are passed over.
+    /// Returns the next sample, or the reason why an intact data message is none. Other messages are skipped.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
         // One byte in 54 ends a message: the others do not pay for what the message takes.
@@ -60,7 +60,7 @@ impl Mti {
         }
     }
 
-    /// Candidates whose checksum did not fit.
+    /// Returns the number of candidates whose checksum did not fit.
     #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.framer.bad_checksums()
@@ -85,7 +85,7 @@ impl Mti {
     }
 }
 
-/// Hundredths of a degree, where the reading is one.
+/// Returns hundredths of a degree, where the reading is one.
 fn centi_celsius(degrees: f32) -> Option<CentiCelsius> {
     let code = libm::roundf(degrees * 100.0);
     (code >= f32::from(i16::MIN) && code <= f32::from(i16::MAX)).then_some(CentiCelsius(code as i16))

@@ -29,7 +29,7 @@ const MAX_BUS_LOAD: u32 = 800;
 /// Most messages that a configuration can have.
 pub const MAX_MESSAGES: usize = 7;
 
-/// What is sent, how often and how protected: [`Settings`] that have been checked.
+/// The messages that are sent, their periods and their protection: [`Settings`] that have been checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
@@ -66,13 +66,13 @@ impl Config {
         if per_mille > MAX_BUS_LOAD { Err(ConfigError::Overload { per_mille }) } else { Ok(config) }
     }
 
-    /// The settings that were checked.
+    /// Returns the checked settings.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Every message that is sent, in the order of sending.
+    /// Returns every message that is sent, in the order of sending.
     #[must_use]
     pub fn messages(&self) -> Vec<Periodic, MAX_MESSAGES> {
         let Settings { bosch, yaw, vdc2, .. } = self.settings;
@@ -101,26 +101,25 @@ impl Config {
         check_ids(ids, |id| self.sends(Id::Standard(id)))
     }
 
-    /// Whether a message with this identifier is ours: an input must not have it.
+    /// Returns whether one of our messages has this identifier; an input must not have it.
     #[must_use]
     pub fn sends(&self, id: Id) -> bool {
         self.messages().iter().any(|message| message.id == id)
     }
 
-    /// Part of the bus that the messages take with the most stuff bits possible, in 1/1000.
+    /// Returns the share of the bus that the messages take with the most stuff bits possible, in 1/1000.
     #[must_use]
     pub fn bus_load_per_mille(&self) -> u32 {
         per_mille(&self.messages(), Periodic::worst_case_bits, self.settings.bits_per_second)
     }
 
-    /// Part of a serial line that the messages take as SLCAN, in 1/1000; over 1000 they do not
-    /// fit.
+    /// Returns the share of a serial line that the messages take as SLCAN, in 1/1000; above 1000 they do not fit.
     #[must_use]
     pub fn line_load_per_mille(&self, line_bits_per_second: u32, stamped: bool) -> u32 {
         per_mille(&self.messages(), |message| message.slcan_bits(stamped), line_bits_per_second)
     }
 
-    /// Samples for each set of our own messages.
+    /// Returns the number of samples for each set of our own messages.
     #[must_use]
     pub fn samples_per_yaw(&self) -> u8 {
         // At most 1000 / 10.
@@ -145,7 +144,7 @@ fn check_yaw(yaw: &YawSettings, bosch: Option<BoschSettings>) -> Result<(), Conf
     check_e2e(&yaw.e2e)
 }
 
-/// All are valid, and none is another one or `taken`.
+/// Checks that all identifiers are valid, and that none equals another one or `taken`.
 fn check_ids(ids: [u16; 3], taken: impl Fn(StandardId) -> bool) -> Result<(), ConfigError> {
     for (k, raw) in ids.into_iter().enumerate() {
         let id = StandardId::new(raw).filter(|_| !DIAGNOSIS.contains(&raw));

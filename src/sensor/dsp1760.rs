@@ -27,7 +27,7 @@ use clock::MessageClock;
 use framing::is_self_test;
 use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity};
 
-/// Why an intact frame gives no sample.
+/// The reason why an intact frame gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -43,7 +43,7 @@ pub enum Dsp1760Error {
     },
 }
 
-/// How often each kind of event happened. They saturate.
+/// The numbers of events. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dsp1760Counters {
@@ -70,13 +70,13 @@ pub struct Dsp1760 {
     last_sequence: Option<u8>,
     /// Counts all messages, lost ones included.
     messages: MessageClock,
-    /// Of format B.
+    /// The fields of format B.
     stamps: StampClock,
     counters: Dsp1760Counters,
 }
 
 impl Dsp1760 {
-    /// Nothing received yet.
+    /// Begins before the first sample.
     #[must_use]
     pub const fn new(config: Dsp1760Config) -> Self {
         Self {
@@ -91,8 +91,8 @@ impl Dsp1760 {
 
     /// Takes one byte. Call [`Dsp1760::next_sample`] until `None` before the next one.
     #[inline]
-    pub fn push(&mut self, byte: u8) {
-        self.framer.push(byte);
+    pub fn receive(&mut self, byte: u8) {
+        self.framer.receive(byte);
     }
 
     /// Returns the next sample, or the reason why an intact frame is none. Built-in-test messages are
@@ -119,13 +119,13 @@ impl Dsp1760 {
         }
     }
 
-    /// Candidates whose checksum did not fit.
+    /// Returns the number of candidates whose checksum did not fit.
     #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.framer.bad_checksums()
     }
 
-    /// Event counters since start.
+    /// Returns the event counters since the start.
     #[must_use]
     pub fn counters(&self) -> &Dsp1760Counters {
         &self.counters

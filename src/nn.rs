@@ -48,14 +48,14 @@ pub const GATES: usize = 4;
 #[repr(C, align(4))]
 pub struct Aligned<T>(pub T);
 
-/// Two consecutive columns in one word, as the kernels load them: the first one lower.
+/// Packs two consecutive columns in one word, as the kernels load them: the first one lower.
 #[inline]
 #[must_use]
 pub const fn pack(first: i16, second: i16) -> u32 {
     first as u16 as u32 | (second as u16 as u32) << 16
 }
 
-/// The two columns of a word.
+/// Returns the two columns of a word.
 #[inline]
 #[must_use]
 pub const fn unpack(word: u32) -> (i32, i32) {

@@ -25,7 +25,7 @@ const RESET_POLLS: u8 = 10;
 /// The gyro needs this long from switched on to good, ms.
 const START_MS: u32 = 45;
 
-/// What can go wrong with the part.
+/// The error of the part or its bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -39,23 +39,23 @@ pub enum Icm42688Error<E> {
     /// Another part answers, or none.
     #[error("ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY)]
     Identity {
-        /// What it says.
+        /// The identity that it reports.
         got: u8,
     },
-    /// A register does not hold what was written: configure the part anew.
+    /// A register does not hold what was written: configure the part again.
     #[error("ICM-42688: register {:02x} of bank {} holds {got:02x}, not {expected:02x}", .register.address, .register.bank)]
     Setting {
-        /// Which register.
+        /// The register.
         register: Register,
-        /// What it holds in the bits that are set.
+        /// The bits that it holds.
         got: u8,
-        /// What was written.
+        /// The bits that were written.
         expected: u8,
     },
     /// A packet in which an axis has no reading.
     #[error("ICM-42688: a packet in which an axis has no reading")]
     NoReading,
-    /// What came out of the FIFO is no packet; the FIFO was emptied.
+    /// The bytes from the FIFO are no packet; the FIFO was emptied.
     #[error(transparent)]
     Packet(PacketError),
 }
@@ -102,12 +102,12 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         Ok(part)
     }
 
-    /// The bus back.
+    /// Returns the bus.
     pub fn destroy(self) -> SPI {
         self.spi
     }
 
-    /// The oldest sample in the FIFO, if there is one. Checks one setting each time.
+    /// Returns the oldest sample in the FIFO, if there is one. It checks one setting each time.
     ///
     /// # Errors
     /// `Bus`, `Setting`, `NoReading` or `Packet`; a sample is not made up.
@@ -160,7 +160,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         self.write(reg::SIGNAL_PATH_RESET.address, reg::FIFO_FLUSH)
     }
 
-    /// Does something in a register's bank and goes back to bank 0.
+    /// Runs an action in a register's bank and goes back to bank 0.
     fn in_bank<T>(
         &mut self,
         register: Register,

@@ -1,17 +1,17 @@
 //! What the gyro reads at rest, and how sure that is.
 //!
-//! [`static_init`] takes the mean of three seconds at the start. [`zero_rate`] goes on whenever
+//! `static_init` takes the mean of three seconds at the start. `zero_rate` goes on whenever
 //! the vehicle stands: it estimates what is left of the rate behind the network, so that the
 //! loop is closed around gyro and network together. That the vehicle stands the wheels prove;
-//! where there are none, [`quiet`] looks at the inertial sensors, within limits that are
-//! tighter than those of the start. [`earth`] keeps the rotation of the Earth from being taken
+//! where there are none, `quiet` looks at the inertial sensors, within limits that are
+//! tighter than those of the start. `earth` keeps the rotation of the Earth from being taken
 //! off twice.
 
-pub mod earth;
-pub mod quiet;
+mod earth;
+mod quiet;
 mod spread;
-pub mod static_init;
-pub mod zero_rate;
+mod static_init;
+mod zero_rate;
 
 pub use earth::{EarthRate, Latitude, ZeroPoint};
 pub use quiet::{QuietConfig, QuietDetector};

@@ -49,7 +49,7 @@ pub struct SignalStatus(pub u8);
 impl SignalStatus {
     /// Good.
     pub const OK: Self = Self(0);
-    /// Not available.
+    /// The signal is not available.
     pub const NOT_AVAILABLE: Self = Self(1);
     /// Failed: do not use.
     pub const FAILURE: Self = Self(2);
@@ -75,12 +75,12 @@ pub struct Tx1 {
     pub counter: u8,
 }
 
-/// Why eight bytes are no good TX1.
+/// The reason why eight bytes are no good TX1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Tx1Error {
-    /// Not eight bytes.
+    /// The frame does not have eight bytes.
     #[error("TX1 has {0} bytes instead of 8")]
     Length(usize),
     /// The checksum does not fit.
@@ -94,13 +94,13 @@ pub enum Tx1Error {
 }
 
 impl Tx1 {
-    /// The eight bytes.
+    /// Returns the eight bytes.
     #[must_use]
     pub fn emit(&self) -> [u8; 8] {
         Message::from(*self).emit()
     }
 
-    /// The frame, in a driver's own type; `None` only if that type cannot hold eight bytes.
+    /// Returns the frame in a driver's own type; `None` only if that type cannot hold it.
     #[must_use]
     pub fn frame<F: Frame>(&self) -> Option<F> {
         F::new(TX1_ID, &self.emit())
@@ -122,7 +122,7 @@ impl Tx1 {
         })
     }
 
-    /// The yaw rate in deg/s.
+    /// Returns the yaw rate in deg/s.
     #[must_use]
     pub fn yaw_rate_deg_per_sec(&self) -> f64 {
         f64::from(i32::from(self.yaw_rate) - ZERO) * 0.005
@@ -141,7 +141,7 @@ pub struct YawRateSignal {
 pub struct OutOfRange(pub u16);
 
 impl YawRateSignal {
-    /// Code of a rate, the residual of the earlier ones included.
+    /// Returns the code of a rate, with the rounding residual of the earlier ones.
     ///
     /// # Errors
     /// [`OutOfRange`]; the residual is then dropped, since the frame is marked bad.
@@ -166,7 +166,7 @@ impl YawRateSignal {
     }
 }
 
-/// Code of a lateral acceleration, nearest, and whether it fits (+-4.18 g).
+/// Returns the nearest code of a lateral acceleration, and whether it fits (+-4.18 g).
 #[must_use]
 pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
     let code = (i64::from(force.0) * AY_PER_CODE_Q32 + (1 << 31)) >> 32;
@@ -177,7 +177,7 @@ pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
     }
 }
 
-/// Code of a temperature: whole degrees from -50, 0xC9 above 150, 0xFF unknown.
+/// Returns the code of a temperature: whole degrees from -50, 0xC9 above 150, 0xFF where it is not known.
 #[must_use]
 pub fn encode_temperature(temperature: Option<CentiCelsius>) -> u8 {
     match temperature {

@@ -42,6 +42,6 @@ pub mod message;
 pub mod standstill;
 mod text;
 
-pub use device::{Device, Drives, MappedSlots};
+pub use device::{Device, MappedSlots, SupportedHardware};
 pub use frame::{Deframer, FrameError};
 pub use message::{Reply, Request};

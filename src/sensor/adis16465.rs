@@ -14,7 +14,7 @@ use embedded_hal::spi::{Operation, SpiDevice};
 /// Asks for a burst.
 const BURST_COMMAND: [u8; 2] = [0x68, 0x00];
 
-/// What can go wrong with a read.
+/// The error of a read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -22,7 +22,7 @@ pub enum AdisError<E> {
     /// The bus failed.
     #[error("ADIS164xx: the bus failed: {0:?}")]
     Bus(E),
-    /// What came over it gives no sample.
+    /// The bytes give no sample.
     #[error(transparent)]
     Burst(BurstError),
 }
@@ -38,18 +38,18 @@ pub struct Adis16465<SPI> {
 }
 
 impl<SPI: SpiDevice> Adis16465<SPI> {
-    /// The part as it comes; it needs no setting. Give it 300 ms after power-up.
+    /// Makes a driver of the part as it is delivered; it needs no setting. Give it 300 ms after power-up.
     #[must_use]
     pub const fn new(spi: SPI, model: Model) -> Self {
         Self { spi, model, last_counter: None, lost: 0 }
     }
 
-    /// The bus back.
+    /// Returns the bus.
     pub fn destroy(self) -> SPI {
         self.spi
     }
 
-    /// Fetches the newest readings. The part carries no time: `now` is the data-ready signal's.
+    /// Reads the newest values. The part carries no time: `now` is the time of the data-ready signal.
     ///
     /// # Errors
     /// [`AdisError`].
@@ -67,7 +67,8 @@ impl<SPI: SpiDevice> Adis16465<SPI> {
         burst.sample(self.model, now).map_err(AdisError::Burst)
     }
 
-    /// Readings that were not fetched. At 2000 a second and 100 reads this grows by 19 a read.
+    /// Returns the number of readings that were not fetched. At 2000 a second and 100 reads this grows by 19 a
+    /// read.
     #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost

@@ -23,9 +23,9 @@ use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Recor
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
 
-/// What an image drives; a configuration of anything else is refused.
+/// The hardware that an image drives; a configuration of anything else is refused.
 #[derive(Debug)]
-pub struct Drives {
+pub struct SupportedHardware {
     /// Inertial sensors.
     pub imus: &'static [ImuPart],
     /// Fibre-optic gyros.
@@ -34,13 +34,13 @@ pub struct Drives {
     pub bits_per_second: &'static [u32],
 }
 
-/// What the board keeps beside the pipeline.
+/// The state that the board keeps beside the pipeline.
 ///
 /// Owns the flash: records in `R`, weight slots in `W`, `None` where nothing can be stored.
 pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
-    drives: &'static Drives,
+    drives: &'static SupportedHardware,
     identity: Identity,
     flash: FlashState,
     writable: bool,
@@ -68,9 +68,10 @@ pub struct Device<R: NorFlash, W> {
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// With built-in values, before [`Device::begin`]. A constant: it can be made where it stays.
+    /// Begins with built-in values, before [`Device::begin`]. It is a constant, so that it can be made in its
+    /// place.
     #[must_use]
-    pub const fn new(drives: &'static Drives) -> Self {
+    pub const fn new(drives: &'static SupportedHardware) -> Self {
         Self {
             store: None,
             slots: None,
@@ -101,25 +102,25 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    /// What the image is to run with.
+    /// Returns the configuration that the image runs with.
     #[must_use]
     pub fn configuration(&self) -> &Configuration {
         &self.configuration
     }
 
-    /// What is known of the sensor.
+    /// Returns the calibration.
     #[must_use]
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
     }
 
-    /// Whether a restart was asked for; the answer should go out first.
+    /// Returns whether a restart was requested; the answer should go out first.
     #[must_use]
     pub fn restart_wanted(&self) -> bool {
         self.restart
     }
 
-    /// How setting the sensor up went; the same again is not noted again.
+    /// Notes how setting the sensor up went; the same result again is not noted again.
     pub fn sensor(&mut self, result: Result<(), SensorFault>) {
         let fault = result.err();
         if fault.is_none() || fault != self.sensor {
@@ -139,8 +140,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
         let (Some(calibrator), Some(sample)) = (self.calibrator.as_mut(), sample) else { return };
         let task = calibrator.task();
-        if let Some(result) = calibrator.process(sample, &self.configuration.mounting, &mut self.calibration)
-        {
+        if let Some(result) = calibrator.add(sample, &self.configuration.mounting, &mut self.calibration) {
             self.calibrator = None;
             self.calibration_state = match result {
                 Ok(()) => State::Found(task),
@@ -152,8 +152,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Takes a byte of the service line; with the last one of a request returns the answer.
     #[inline(never)]
-    pub fn push(&mut self, byte: u8, counters: &AllCounters) -> Option<Frame> {
-        let (number, reply) = match self.deframer.push(byte)? {
+    pub fn receive(&mut self, byte: u8, counters: &AllCounters) -> Option<Frame> {
+        let (number, reply) = match self.deframer.receive(byte)? {
             Ok((number, request)) => (number, self.handle(&request, counters)),
             Err(error) => {
                 count(&mut self.service_errors, 1);
@@ -203,7 +203,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         })
     }
 
-    /// Does what is asked.
+    /// Executes a request.
     #[inline(never)]
     fn act(&mut self, request: &Request) -> Result<(), Refusal> {
         // A board without a flash controller is emulated: nothing can be written, and nothing depends on it.
@@ -237,7 +237,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn note(&mut self, kind: EventKind) {
-        self.log.push(self.tick, kind);
+        self.log.record(self.tick, kind);
     }
 
     fn info(&self) -> Info {

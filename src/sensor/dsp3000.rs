@@ -16,7 +16,7 @@ pub mod binary;
 use crate::sample::FogSample;
 use crate::units::{Angle, Micros};
 
-/// What the number means; set at the part with one letter.
+/// The meaning of the number; it is set at the part with one letter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
@@ -28,7 +28,7 @@ pub enum Mode {
     Integrated,
 }
 
-/// What the part can be told: one letter each.
+/// The commands of the part, one letter each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
@@ -39,7 +39,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// The letter.
+    /// Returns the letter.
     #[must_use]
     pub const fn emit(self) -> u8 {
         match self {
@@ -50,7 +50,7 @@ impl Command {
         }
     }
 
-    /// The command of a letter, if it is one.
+    /// Returns the command of a letter, if it is one.
     #[must_use]
     pub const fn parse(letter: u8) -> Option<Self> {
         match letter {
@@ -63,8 +63,8 @@ impl Command {
     }
 }
 
-/// What a rate or an increment, in degrees, says about the time before `now`. The part's only
-/// axis is the vertical one.
+/// Makes a sample of a rate or an increment, in degrees, over the time before `now`. The part's only axis is the
+/// vertical one.
 fn sample(mode: Mode, degrees: f32, valid: bool, now: Micros, span: u32) -> Option<FogSample> {
     let per_second = match mode {
         Mode::Rate => span as f32 * 1e-6,

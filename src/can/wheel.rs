@@ -1,8 +1,9 @@
 //! Wheel speeds from a vehicle's own frames, wherever they lie in them. Whether the vehicle stands
-//! is decided in [`crate::wheels`].
+//! is decided in [`crate::can::wheel`].
 
 mod layout;
 mod settings;
+mod standstill;
 
 pub use layout::{Checksum, WheelError, WheelFrame, WheelSignal};
 pub use settings::{MAX_FRAMES, WheelConfigError, WheelSettings};
@@ -10,8 +11,8 @@ pub use settings::{MAX_FRAMES, WheelConfigError, WheelSettings};
 use super::e2e::{Sequence, Verdict};
 use crate::sample::WheelSample;
 use crate::units::Micros;
-use crate::wheels::{StandstillRule, Wheels};
 use embedded_can::Frame;
+use standstill::{StandstillRule, Wheels};
 
 /// Frames in, wheel speeds and standstill out.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +47,7 @@ impl WheelReceiver {
     /// # Errors
     /// [`WheelError`]; the wheels of the frame then keep their last speed until it is too old,
     /// except those whose speed is not valid.
-    pub fn process(&mut self, frame: &impl Frame, now: Micros) -> Option<Result<WheelSample, WheelError>> {
+    pub fn decode(&mut self, frame: &impl Frame, now: Micros) -> Option<Result<WheelSample, WheelError>> {
         let id = frame.id();
         let is_meant = |candidate: &Option<WheelFrame>| candidate.is_some_and(|candidate| candidate.id == id);
         let index = self.settings.frames.iter().position(is_meant)?;
@@ -58,14 +59,14 @@ impl WheelReceiver {
         Some(result.map(|()| self.wheels.sample(now)))
     }
 
-    /// What is known now, without a new frame. `None` before the first good one: a vehicle that sends
-    /// none is not at fault.
+    /// Returns the newest speeds without a new frame; `None` before the first good one, because a vehicle that
+    /// sends none is not at fault.
     pub fn poll(&mut self, now: Micros) -> Option<WheelSample> {
         self.wheels.expire(now);
         self.heard.then(|| self.wheels.sample(now))
     }
 
-    /// Frames that counters showed to be missing.
+    /// Returns the number of frames that the counters show to be missing.
     #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost
@@ -81,7 +82,7 @@ impl WheelReceiver {
         if let Some(counter) = layout.check(data)?
             && let Some(sequence) = self.sequences.get_mut(index)
         {
-            match sequence.process(counter) {
+            match sequence.check(counter) {
                 Verdict::Repeated => return Err(WheelError::Repeated),
                 Verdict::Lost(count) => self.lost = self.lost.saturating_add(count.into()),
                 Verdict::First | Verdict::Ok | Verdict::WrongSequence { .. } => {}

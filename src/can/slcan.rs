@@ -22,7 +22,8 @@ const STAMP_MODULUS: u64 = 60_000;
 
 const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
 
-/// `tIIILDD..` for a standard identifier, `TIIIIIIIILDD..` for an extended one, CR at the end.
+/// Encodes a frame as `tIIILDD..` for a standard identifier or `TIIIIIIIILDD..` for an extended one, with CR at the
+/// end.
 ///
 /// `None` for a frame that is no classic data frame (remote, or more than eight bytes).
 #[must_use]
@@ -47,7 +48,7 @@ pub fn emit(frame: &impl Frame) -> Option<Line> {
     Some(line)
 }
 
-/// As [`emit`], with milliseconds modulo a minute in four digits behind the data, as a host
+/// Encodes a frame as [`emit`] does, with milliseconds modulo a minute in four digits behind the data, as a host
 /// asks for with `Z1`.
 #[must_use]
 pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
@@ -62,12 +63,12 @@ pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
     Some(stamped)
 }
 
-/// Two digits.
+/// Writes a byte as two digits.
 fn hex(byte: u8) -> [u8; 2] {
     [DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 0xF)]]
 }
 
-/// Why a line is no data frame.
+/// The reason why a line is no data frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -78,7 +79,7 @@ pub enum SlcanError {
     /// A character is not a hexadecimal digit.
     #[error("no hexadecimal digit at column {at}")]
     Digit {
-        /// Where in the line.
+        /// The column in the line.
         at: usize,
     },
     /// The line is shorter or longer than its length digit says.

@@ -1,23 +1,29 @@
 //! The networks of the paper, with their topology, on top of [`crate::nn`].
 
+#[doc(hidden)]
 pub mod background;
+#[doc(hidden)]
 pub mod blob;
-pub mod file;
+pub(crate) mod file;
 pub mod fognet;
+#[doc(hidden)]
 pub mod fognet_blob;
+#[doc(hidden)]
 pub mod fognet_f32;
 pub mod gyronet;
+#[doc(hidden)]
 pub mod gyronet_f32;
 mod input;
 pub mod weights;
+pub mod window;
 
 pub use blob::{Blob, BlobError};
 pub use fognet::FogNet;
 pub use fognet_blob::FogBlob;
 pub use gyronet::GyroNet;
 
+use crate::model::window::{Features, WINDOW};
 use crate::units::AngularRate;
-use crate::window::{Features, WINDOW};
 
 /// Estimates of the yaw gyro's error, one for each sample of a window, oldest first.
 pub type Corrections = [AngularRate; WINDOW];
@@ -33,7 +39,7 @@ pub trait WindowNetwork {
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate;
 }
 
-/// What a network made of a window: the gyro's error in each sample, and the error to expect of it.
+/// The result of a window: the gyro's error in each sample, and its expected error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {

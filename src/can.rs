@@ -1,19 +1,24 @@
 //! The vehicle bus: message layouts, their checks, and ways to carry them.
 
 pub mod bosch;
-pub mod carry;
+mod carry;
 pub mod config;
 pub mod e2e;
+#[doc(hidden)]
 pub mod encoder;
+#[doc(hidden)]
 pub mod fog_encoder;
-pub mod frame;
+mod frame;
 pub mod j1939;
+#[doc(hidden)]
 pub mod load;
 pub mod queue;
+#[doc(hidden)]
 pub mod signal;
 pub mod slcan;
 pub mod wheel;
 pub mod yaw;
+#[doc(hidden)]
 pub mod yaw_encoder;
 
 pub use frame::DataFrame;

@@ -8,7 +8,7 @@
 use crate::sample::{Standstill, WHEELS, WheelSample};
 use crate::units::{Micros, WheelSpeed};
 
-/// When wheels count as standing, and when as silent.
+/// The limits by which wheels count as standing, and as silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StandstillRule {
@@ -16,7 +16,7 @@ pub struct StandstillRule {
     pub timeout_us: u64,
     /// Up to this speed a wheel may stand still.
     pub still_speed: WheelSpeed,
-    /// So long all wheels must be that slow.
+    /// The time for which all wheels must be that slow.
     pub still_for_us: u64,
 }
 
@@ -31,7 +31,7 @@ pub struct Wheels {
 }
 
 impl Wheels {
-    /// Nothing known yet.
+    /// Begins before the first speed.
     #[must_use]
     pub const fn new(rule: StandstillRule, expected: [bool; WHEELS]) -> Self {
         Self { rule, expected, speeds: [None; WHEELS], still_since: None }
@@ -55,7 +55,7 @@ impl Wheels {
         }
     }
 
-    /// Judges standing or moving anew, by the speeds that have been set.
+    /// Judges standing or moving by the speeds that have been set.
     pub fn judge(&mut self, now: Micros) {
         let limit = self.rule.still_speed.0.unsigned_abs();
         let slow = self.speeds.iter().flatten().all(|(speed, _)| speed.0.unsigned_abs() <= limit);
@@ -66,7 +66,7 @@ impl Wheels {
         }
     }
 
-    /// What is known now.
+    /// Returns the newest speeds, and whether the vehicle stands.
     #[must_use]
     pub fn sample(&self, now: Micros) -> WheelSample {
         let standstill = match self.still_since {
@@ -78,7 +78,7 @@ impl Wheels {
         WheelSample { time: now, speeds: self.speeds.map(|speed| speed.map(|(speed, _)| speed)), standstill }
     }
 
-    /// Every wheel that there is has a fresh speed.
+    /// Returns whether every expected wheel has a fresh speed.
     fn complete(&self) -> bool {
         self.speeds.iter().zip(self.expected).all(|(speed, expected)| speed.is_some() || !expected)
     }

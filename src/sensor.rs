@@ -41,7 +41,7 @@
 //! 3. Turn a frame into a sample: units by the types of [`crate::units`], axes x forward, y
 //!    left, z up, time unwrapped, what the part marks as bad left out, never replaced.
 //! 4. Implement [`Source`] (and [`ByteSource`] for a stream) for it, and
-//!    [`serial::Dialogue`] where it must be told what to send. A part without a clock of its own
+//!    [`serial::Dialogue`] where it must be configured. A part without a clock of its own
 //!    takes the arrival time as an argument instead, as [`adis16465`] and [`dsp3000`] do.
 //! 5. Test it with recorded or published frames both ways, every truncation and every flipped
 //!    bit, noise with frames strewn in, a mocked bus; add a fuzz target (`host-tests/fuzz`) and
@@ -51,9 +51,11 @@
 //!    `src/bin/coprocessor`, the list of what it drives in `start.rs`).
 
 pub mod adis16465;
+#[doc(hidden)]
 pub mod crc;
 pub mod dsp1760;
 pub mod dsp3000;
+#[doc(hidden)]
 pub mod framer;
 pub mod icm42688;
 pub mod serial;
@@ -66,18 +68,18 @@ use crate::sample::{FogSample, ImuSample};
 pub trait Source {
     /// [`ImuSample`] or [`FogSample`].
     type Sample;
-    /// Why a frame or a transfer gave none.
+    /// The error of a frame or a transfer.
     type Error: core::error::Error;
 
-    /// The next sample, or why there is none where one was due; `None`: nothing waits.
+    /// Returns the next sample. `Some(Err)`: a frame is invalid. `None`: no complete frame waits.
     fn next_sample(&mut self) -> Option<Result<Self::Sample, Self::Error>>;
 }
 
 /// A part at the end of a line of bytes.
 pub trait ByteSource: Source {
     /// Takes one byte. Call [`Source::next_sample`] until `None` before the next one.
-    fn push(&mut self, byte: u8);
-    /// Candidates whose checksum did not fit.
+    fn receive(&mut self, byte: u8);
+    /// Returns the number of candidates whose checksum did not fit.
     fn bad_checksums(&self) -> u32;
 }
 
@@ -91,8 +93,8 @@ impl Source for xsens::Mti {
 }
 
 impl ByteSource for xsens::Mti {
-    fn push(&mut self, byte: u8) {
-        self.push(byte);
+    fn receive(&mut self, byte: u8) {
+        self.receive(byte);
     }
 
     fn bad_checksums(&self) -> u32 {
@@ -110,8 +112,8 @@ impl Source for dsp1760::Dsp1760 {
 }
 
 impl ByteSource for dsp1760::Dsp1760 {
-    fn push(&mut self, byte: u8) {
-        self.push(byte);
+    fn receive(&mut self, byte: u8) {
+        self.receive(byte);
     }
 
     fn bad_checksums(&self) -> u32 {

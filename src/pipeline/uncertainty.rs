@@ -7,7 +7,7 @@
 
 use crate::units::AngularRate;
 
-/// From the network's own expectation to the error over a second.
+/// The factors from the network's own expectation to the error over a second.
 #[derive(Debug, Clone, Copy)]
 pub struct UncertaintyConfig {
     /// Sigma of a second's error over the RMS of the scales of its windows.
@@ -24,7 +24,7 @@ impl UncertaintyConfig {
 /// Windows over which the network's expectation is averaged: about a second at the default hop.
 const WINDOWS: f32 = 20.0;
 
-/// What is expected now.
+/// The present expectation.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
     config: UncertaintyConfig,
@@ -33,7 +33,7 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// No window yet.
+    /// Begins before the first window.
     #[must_use]
     pub fn new(config: UncertaintyConfig) -> Self {
         Self { config, scale_square: None }
@@ -47,8 +47,8 @@ impl Uncertainty {
         self.scale_square = Some(before + (square - before) / WINDOWS);
     }
 
-    /// Of a rate that the network has `corrected` or not, with a bias of this uncertainty, rad/s;
-    /// rounded up.
+    /// Returns the sigma of a rate that the network has `corrected` or not, with a bias of this uncertainty, rad/s;
+    /// it is rounded up.
     #[must_use]
     pub fn sigma(&self, corrected: bool, bias: f32) -> AngularRate {
         let UncertaintyConfig { per_scale, uncorrected } = self.config;

@@ -1,0 +1,9 @@
+//! The parts of a [`Config`](crate::Config), in one place: each stage owns the type that configures it.
+
+pub use crate::align::clock_ratio::ClockRatioConfig;
+pub use crate::bias::{EarthRate, Latitude, QuietConfig, StaticConfig, ZeroRateConfig};
+pub use crate::compensate::{CompensateConfig, Hop, Lag, Mode};
+pub use crate::coprocessor::StorageFaults;
+pub use crate::fog::{FogConfig, seconds::Padding};
+pub use crate::mounting::{Levelling, Rotation};
+pub use crate::pipeline::{PipelineConfig, UncertaintyConfig};
