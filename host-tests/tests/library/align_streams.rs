@@ -99,8 +99,8 @@ fn interpolated_values_are_rounded_to_the_nearest_code() {
     for (last, at, due) in [(10, 20, 7), (-10, 20, -7), (10, 10, 3), (-10, 10, -3), (1, 15, 1), (-1, 15, -1)]
     {
         let mut resampler = Resampler::default();
-        resampler.push(imu(0, 0));
-        resampler.push(imu(30, last));
+        resampler.add(imu(0, 0));
+        resampler.add(imu(30, last));
         let (sample, quality) = resampler.at(Micros(at)).expect("between two samples");
         assert_eq!((sample.angular_rate[2].0, quality), (due, Quality::Interpolated), "{last} at {at} us");
     }

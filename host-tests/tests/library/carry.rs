@@ -203,7 +203,7 @@ fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
             _ => {}
         }
         let gyro = rate(0.002 + 0.001 * noise.normal());
-        compensator.push(tick, gyro, Validity::Good);
+        compensator.add(tick, gyro, Validity::Good);
         if tick == 200 {
             compensator.end_standstill();
         }

@@ -178,7 +178,7 @@ fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
     for step in 1..400 {
         let now = Micros(step * PERIOD_US + PERIOD_US / 2);
         let increment = sample(if (300..350).contains(&step) { 300 } else { step }).increment;
-        fog.push(now, FogSample { time: now, increment, ..sample(step) }).expect("in order");
+        fog.add(now, FogSample { time: now, increment, ..sample(step) }).expect("in order");
         sent.extend(std::iter::from_fn(|| fog.next_step(now, Some([0; 6]), Some(&wheels()))));
     }
     let unusable: Vec<_> =

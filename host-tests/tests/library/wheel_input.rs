@@ -9,7 +9,6 @@ use gyronet::can::wheel::{
 };
 use gyronet::sample::Standstill;
 use gyronet::units::{Micros, WheelSpeed};
-use gyronet::wheels::{StandstillRule, Wheels};
 use proptest::prelude::*;
 
 const MS: u64 = 1000;
@@ -246,18 +245,6 @@ fn by_bits(data: [u8; 8], start: u8, len: u8, order: ByteOrder, signed: bool) ->
     let value = bits.iter().fold(0i64, |value, bit| value << 1 | i64::from(*bit));
     let negative = signed && bits[0] == 1;
     Some(if negative { value - (1 << len) } else { value })
-}
-
-#[test]
-fn a_wheel_without_a_speed_is_no_standing_wheel() {
-    let rule = StandstillRule { timeout_us: 50 * MS, still_speed: WheelSpeed(655), still_for_us: 0 };
-    let mut wheels = Wheels::new(rule, [true; 4]);
-    (0..3).for_each(|wheel| wheels.set(wheel, Some(WheelSpeed(0)), Micros(0)));
-    wheels.judge(Micros(0));
-    assert_eq!(wheels.sample(Micros(0)).standstill, Standstill::Unknown);
-    wheels.set(3, Some(WheelSpeed(0)), Micros(0));
-    wheels.judge(Micros(0));
-    assert_eq!(wheels.sample(Micros(0)).standstill, Standstill::Still);
 }
 
 proptest! {

@@ -203,7 +203,7 @@ fn uncertainty_grows_with_time_and_temperature_and_shrinks_at_stops() {
 
 /// Feeds a second of standing by the wheels.
 fn second(zero_rate: &mut ZeroRate, left: f64) -> Option<ZeroRateOutcome> {
-    let sample = |_| zero_rate.process(Some(rate(left)), StandstillSource::Wheels, None);
+    let sample = |_| zero_rate.observe(Some(rate(left)), StandstillSource::Wheels, None);
     (0..RATE_HZ).filter_map(sample).last()
 }
 
@@ -225,9 +225,9 @@ fn a_stop_begins_without_the_offset_of_the_one_before() {
         let _ = second(&mut zero_rate, 0.002);
     }
     let standing = zero_rate.bias();
-    zero_rate.process(None, StandstillSource::None, None);
+    zero_rate.observe(None, StandstillSource::None, None);
     let driving = zero_rate.bias();
     assert!(2 * standing.0 > 3 * driving.0 && driving.0 > 0, "{standing:?} {driving:?}");
-    zero_rate.process(Some(rate(0.002)), StandstillSource::Wheels, None);
+    zero_rate.observe(Some(rate(0.002)), StandstillSource::Wheels, None);
     assert_eq!(zero_rate.bias(), driving);
 }
