@@ -1,4 +1,4 @@
-//! Time stamps onto the common 100 Hz grid.
+//! This module gives each sample a step of the common 100 Hz grid by its time stamp.
 //!
 //! The rule: the first sample sets the grid. A later one belongs to the step nearest to its
 //! time stamp, and must come within [`TOLERANCE_US`] of it; the grid then follows the sample,
@@ -79,6 +79,9 @@ pub struct Aligner {
 }
 
 impl Aligner {
+    /// The aligner before the first sample.
+    pub const START: Self = Self { last: None };
+
     /// Places a sample on the grid.
     ///
     /// # Errors

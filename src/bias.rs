@@ -1,4 +1,4 @@
-//! What the gyro reads at rest, and how sure that is.
+//! These modules estimate what the gyro reads at rest, and how sure that is.
 //!
 //! `static_init` takes the mean of three seconds at the start. `zero_rate` goes on whenever
 //! the vehicle stands: it estimates what is left of the rate behind the network, so that the

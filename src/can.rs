@@ -1,4 +1,4 @@
-//! The vehicle bus: message layouts, their checks, and ways to carry them.
+//! These modules encode and decode the messages on the vehicle's bus, and carry them.
 
 pub mod bosch;
 mod carry;

@@ -1,4 +1,4 @@
-//! From the network's estimates to the rates that go out.
+//! This module computes corrected rates from the network's estimates.
 //!
 //! A sample's best estimate is the mean of what the windows that cover it say ([`Mode`]). It is
 //! known some samples later; two rates go out for every sample all the same:
@@ -152,8 +152,13 @@ pub struct Compensator {
 impl Compensator {
     /// Begins without an estimate.
     #[must_use]
-    pub fn new(config: CompensateConfig) -> Self {
+    pub const fn new(config: CompensateConfig) -> Self {
         Self { config, kept: [None; KEPT], prior: 0, prompt_carry: 0, navigation_carry: 0, held: [0; 2] }
+    }
+
+    /// Sets the configuration, before the first sample.
+    pub fn configure(&mut self, config: CompensateConfig) {
+        self.config = config;
     }
 
     /// Revises the samples of the window that ended [`Mode::delay`] samples before the next one.

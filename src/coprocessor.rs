@@ -1,4 +1,5 @@
-//! The coprocessor: readings, CAN frames and time in; CAN frames, windows for the networks and observations out.
+//! The coprocessor takes readings, CAN frames and time, and returns CAN frames, windows for the networks and
+//! observations.
 //!
 //! [`Coprocessor`] owns the order in which the parts of the product work, and does no input or output itself: the
 //! firmware image, a replay of a recorded drive, the fault campaign and a board of your own are adapters around
@@ -72,7 +73,7 @@ pub struct Observation {
 }
 
 /// The bus as the caller sees it.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Bus {
     lost: u32,
     is_off: bool,
@@ -108,34 +109,55 @@ pub struct Coprocessor {
 }
 
 impl Coprocessor {
-    /// Begins before the first input, at time 0.
-    #[must_use]
-    #[inline(never)]
-    pub fn new(config: Config) -> Self {
-        let mut fog = FogPipeline::new(config.fog, config.has_fognet);
-        if config.fog_expected {
-            fog.expect(Micros(0));
-        }
+    /// The coprocessor of a static, at time 0: configure it before the first input. It is some 10 KB, which
+    /// [`Coprocessor::new`] returns by way of the stack.
+    pub const START: Self = {
+        const CONFIG: Config = Config::DEFAULT;
         Self {
-            clock: config.clock,
-            storage: config.storage,
-            bus: Bus::default(),
-            timeline: Timeline::default(),
-            monitor: SensorMonitor::new(config.clock_ratio.filter(|_| config.clock == Clock::Outside)),
-            handover: Handover::new(config.has_gyronet, config.pipeline.compensate.mode.delay()),
-            pipeline: Pipeline::new(config.pipeline),
-            wheels: config.wheels,
+            clock: CONFIG.clock,
+            storage: CONFIG.storage,
+            bus: Bus { lost: 0, is_off: false, reported: 0 },
+            timeline: Timeline::START,
+            monitor: SensorMonitor::new(CONFIG.clock_ratio),
+            handover: Handover::new(CONFIG.has_gyronet, CONFIG.pipeline.compensate.mode.delay()),
+            pipeline: Pipeline::new(CONFIG.pipeline),
+            wheels: CONFIG.wheels,
             known_wheels: None,
-            fog,
+            fog: FogPipeline::new(CONFIG.fog, CONFIG.has_fognet),
             fog_estimate: None,
-            encoder: CanEncoder::new(config.can),
-            fog_encoder: FogEncoder::new(config.fog_ids),
+            encoder: CanEncoder::START,
+            fog_encoder: FogEncoder::new(CONFIG.fog_ids),
             frames: Deque::new(),
             sample_time: Micros(0),
             heard: Micros(0),
             paused: false,
-            counters: InputCounters::default(),
+            counters: InputCounters::NONE,
         }
+    };
+
+    /// Begins before the first input, at time 0.
+    #[must_use]
+    pub fn new(config: Config) -> Self {
+        let mut coprocessor = Self::START;
+        coprocessor.configure(&config);
+        coprocessor
+    }
+
+    /// Sets the configuration of [`Coprocessor::START`], once and before the first input.
+    #[inline(never)]
+    pub fn configure(&mut self, config: &Config) {
+        self.clock = config.clock;
+        self.storage = config.storage;
+        self.monitor = SensorMonitor::new(config.clock_ratio.filter(|_| config.clock == Clock::Outside));
+        self.handover = Handover::new(config.has_gyronet, config.pipeline.compensate.mode.delay());
+        self.pipeline.configure(config.pipeline);
+        self.wheels = config.wheels;
+        self.fog.configure(config.fog, config.has_fognet);
+        if config.fog_expected {
+            self.fog.expect(Micros(0));
+        }
+        self.encoder = CanEncoder::new(config.can);
+        self.fog_encoder = FogEncoder::new(config.fog_ids);
     }
 
     /// Takes a sample of the inertial sensor that has come at `now`.
@@ -318,9 +340,9 @@ impl Coprocessor {
     }
 
     fn advance(&mut self, now: Micros) -> Result<Micros, InputError> {
-        self.timeline.advance(now).map_err(|by_us| {
+        self.timeline.advance(now).map_err(|by| {
             count(&mut self.counters.clock_back, 1);
-            InputError::ClockWentBack { by_us }
+            InputError::ClockWentBack { by }
         })
     }
 

@@ -1,4 +1,4 @@
-//! The corrected yaw rate and what it is worth. Every frame is made from these values alone.
+//! An estimate is the corrected yaw rate with its quality. Every frame is made from these values alone.
 
 use crate::health::{Faults, Quality, Source, Status};
 use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};

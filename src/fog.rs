@@ -1,4 +1,4 @@
-//! From FoGNet's estimates to the turn that goes out, frame by frame.
+//! This module computes corrected turns from FoGNet's estimates, frame by frame.
 //!
 //! A window covers a minute, and there is a new one every second, so 60 windows cover each
 //! second. The estimate of the newest window is used in the second after next: whoever has time
@@ -107,6 +107,11 @@ impl FogCorrector {
             linear_rest: 0,
             spread_rest: 0,
         }
+    }
+
+    /// Sets the configuration, before the first frame.
+    pub fn configure(&mut self, config: FogConfig) {
+        self.config = config;
     }
 
     /// Takes one frame of 10 ms and corrects its turn.

@@ -1,4 +1,4 @@
-//! What the board thinks of itself: status, source and one counter for each kind of event.
+//! These types are the board's report of itself: status, source and one counter for each kind of event.
 
 use crate::sample::Validity;
 
@@ -158,6 +158,9 @@ pub struct BoardFaults {
 }
 
 impl BoardFaults {
+    /// No fault.
+    pub const NONE: Self = Self { bus: false, clock: false, stored: false, configuration_lost: false };
+
     /// Returns the bits that are sent.
     #[must_use]
     pub const fn faults(self) -> Faults {
@@ -216,6 +219,24 @@ pub struct Counters {
     pub contradicted: u32,
 }
 
+impl Counters {
+    /// No event.
+    pub const NONE: Self = Self {
+        samples: 0,
+        missing: 0,
+        misplaced: 0,
+        clock_jumps: 0,
+        invalid: 0,
+        moving: 0,
+        windows: 0,
+        clamped_inputs: 0,
+        implausible: 0,
+        late: 0,
+        zero_rate_updates: 0,
+        contradicted: 0,
+    };
+}
+
 /// The numbers of faults of the sensor ([`crate::monitor`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -231,6 +252,11 @@ pub struct MonitorCounters {
     pub wrong: u32,
     /// Times that its clock was found too far off the board's ([`crate::align::clock_ratio`]).
     pub clock_off: u32,
+}
+
+impl MonitorCounters {
+    /// No fault.
+    pub const NONE: Self = Self { silences: 0, stuck: 0, held: 0, wrong: 0, clock_off: 0 };
 }
 
 /// The numbers of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
@@ -254,6 +280,20 @@ pub struct InputCounters {
     pub replaced_frames: u32,
     /// Messages that reported "failed" because a value does not fit its signal.
     pub out_of_range: u32,
+}
+
+impl InputCounters {
+    /// No event.
+    pub const NONE: Self = Self {
+        imu_errors: 0,
+        fog_errors: 0,
+        wheel_errors: 0,
+        clock_back: 0,
+        unclaimed_estimates: 0,
+        replaced_windows: 0,
+        replaced_frames: 0,
+        out_of_range: 0,
+    };
 }
 
 /// Adds to a counter without wrapping.

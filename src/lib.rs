@@ -153,7 +153,7 @@ pub use coprocessor::{Clock, Config, Coprocessor, InputError, Observation, Timed
 pub use estimate::{VehicleSample, YawEstimate};
 pub use model::{Blob, FogNet, GyroNet, WindowNetwork, weights};
 pub use sample::{FogSample, ImuSample};
-pub use units::{AngularRate, Micros};
+pub use units::{AngularRate, Duration, Micros};
 
 /// The README's examples run as tests, too.
 #[cfg(doctest)]

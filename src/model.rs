@@ -1,4 +1,4 @@
-//! The networks of the paper, with their topology, on top of [`crate::nn`].
+//! These modules are the networks of the paper, with their topology, on top of [`crate::nn`].
 
 #[doc(hidden)]
 pub mod background;

@@ -54,7 +54,7 @@ pub struct SensorMonitor {
 impl SensorMonitor {
     /// Begins before the first sample. With `clock` the sensor's clock is held against the outside one.
     #[must_use]
-    pub fn new(clock: Option<ClockRatioConfig>) -> Self {
+    pub const fn new(clock: Option<ClockRatioConfig>) -> Self {
         Self {
             repeats: stuck::Repeats::new(),
             jump: jump::Jump::new(),
@@ -62,8 +62,11 @@ impl SensorMonitor {
             recovering: 0,
             heard: None,
             due: None,
-            clock: clock.map(RatioEstimator::new),
-            counters: MonitorCounters::default(),
+            clock: match clock {
+                Some(config) => Some(RatioEstimator::new(config)),
+                None => None,
+            },
+            counters: MonitorCounters::NONE,
         }
     }
 

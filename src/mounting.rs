@@ -1,4 +1,4 @@
-//! How the board sits in the vehicle: a configured rotation, and levelling at standstill.
+//! A rotation turns the sensor's axes into the vehicle's: a configured one, and levelling at standstill.
 //!
 //! Rotations are 3 x 3 matrices of Q30 numbers, applied in integers: the same bits everywhere.
 //!

@@ -1,4 +1,4 @@
-//! Recurrent networks in integers, and the f32 reference beside them.
+//! These modules are recurrent networks in integers, and the f32 reference beside them.
 //!
 //! Weights are immutable slices, apart from the state that the caller owns: one set of weights
 //! can drive many states. The number formats:

@@ -1,5 +1,4 @@
-//! Planar dead reckoning: wheel speeds and a yaw rate to a position (equations 3 to 5 of the
-//! paper).
+//! Planar dead reckoning computes a position from wheel speeds and a yaw rate (equations 3 to 5 of the paper).
 //!
 //! The paper's x grows by v cos(psi) dt, y by v sin(psi) dt and psi by the corrected yaw rate
 //! times dt, with v the mean of the left and the right wheel. Here psi is the heading in the

@@ -1,4 +1,4 @@
-//! One sample of the inertial sensor in, its corrected yaw rates out.
+//! The pipeline computes the corrected yaw rates of one sample of the inertial sensor.
 //!
 //! This file owns the order of the stages (grid, mounting, initialisation, window, compensation, zero-rate
 //! updates, report) and nothing else. The stages do not import each other; they share the types of samples,
@@ -81,26 +81,34 @@ struct Rates {
 impl Pipeline {
     /// Begins before the first sample.
     #[must_use]
-    pub fn new(config: PipelineConfig) -> Self {
+    pub const fn new(config: PipelineConfig) -> Self {
         let state = State {
-            aligner: Aligner::default(),
+            aligner: Aligner::START,
             static_init: StaticInit::new(config.static_init),
             initialised: None,
-            windows: Windows::default(),
+            windows: Windows::START,
             compensator: Compensator::new(config.compensate),
             uncertainty: Uncertainty::new(config.uncertainty),
-            wheels: Wheels::default(),
+            wheels: Wheels::START,
             stood: 0,
-            prompt_yaw: Yaw::default(),
-            navigation_yaw: Yaw::default(),
+            prompt_yaw: Yaw(0),
+            navigation_yaw: Yaw(0),
             clock_ratio: ClockRatio::ONE,
             tick: 0,
             gap_within: 0,
             inertial: None,
-            board: BoardFaults::default(),
-            counters: Counters::default(),
+            board: BoardFaults::NONE,
+            counters: Counters::NONE,
         };
         Self { config, state }
+    }
+
+    /// Sets the configuration, before the first sample.
+    pub fn configure(&mut self, config: PipelineConfig) {
+        self.state.static_init = StaticInit::new(config.static_init);
+        self.state.compensator.configure(config.compensate);
+        self.state.uncertainty = Uncertainty::new(config.uncertainty);
+        self.config = config;
     }
 
     /// Takes one sample of the inertial sensor, whose validity has been judged ([`crate::monitor`]).

@@ -1,4 +1,4 @@
-//! What a sensor delivers and what the pipeline works on.
+//! A sample is what a sensor delivers; a frame is a sample on the grid.
 
 use crate::units::{Angle, AngularRate, CentiCelsius, Micros, SpecificForce, WheelSpeed};
 

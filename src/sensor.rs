@@ -1,4 +1,4 @@
-//! Sensors on the wire: bytes in, samples out.
+//! These modules make samples from the bytes of a sensor.
 //!
 //! What the pipeline sees of a part is its samples alone: [`ImuSample`] or [`FogSample`], in
 //! fixed point, with the part's own time unwrapped. [`Source`] names what every part has in

@@ -1,4 +1,4 @@
-//! The service line: what a person asks of the board, and what it answers.
+//! The service line answers the requests of a person who configures or examines the board.
 //!
 //! # Frames
 //! 115200 8N1. A frame is COBS between two zero bytes, the same both ways; whatever is no frame

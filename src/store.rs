@@ -1,4 +1,4 @@
-//! What outlives a power cut: configuration, calibration, and two slots for weight files.
+//! The store keeps over a power cut: configuration, calibration, and two slots for weight files.
 //!
 //! | what | where | written as | after an interrupted write |
 //! |---|---|---|---|

@@ -1,4 +1,4 @@
-//! Fixed-point physical quantities of the integer pipeline.
+//! The integer pipeline uses these fixed-point physical quantities.
 //!
 //! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a
 //! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
@@ -170,10 +170,37 @@ impl WheelSpeed {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CentiCelsius(pub i16);
 
-/// Device time, unwrapped, in microseconds.
+/// An instant in microseconds: the time of a part by its own clock, unwrapped, or of the caller's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Micros(pub u64);
+
+impl Micros {
+    /// Returns the instant that is later by a duration, the end of time at most.
+    #[must_use]
+    pub const fn after(self, span: Duration) -> Self {
+        Self(self.0.saturating_add(span.0))
+    }
+
+    /// Returns the time since an earlier instant; zero since a later one.
+    #[must_use]
+    pub const fn since(self, earlier: Self) -> Duration {
+        Duration(self.0.saturating_sub(earlier.0))
+    }
+}
+
+/// A duration in microseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Duration(pub u64);
+
+impl Duration {
+    /// Makes a duration of milliseconds.
+    #[must_use]
+    pub const fn from_millis(millis: u32) -> Self {
+        Self(millis as u64 * 1_000)
+    }
+}
 
 /// Scales by a power of two (exact in f32) and rounds to nearest, ties away from zero.
 fn to_code(value: f32, per_unit: f32) -> Result<i32, RangeError> {

@@ -85,7 +85,7 @@ impl Board {
         duration(&answer["time_us"])
     }
 
-    /// What [`Board::run`] returns, or the model's refusal: for a test that expects one.
+    /// Runs as [`Board::run`] does, and returns the model's refusal to a test that expects one.
     ///
     /// # Errors
     /// The model's words.
@@ -201,7 +201,7 @@ impl Board {
         self.ask("memory_write", place(at, json!({ "hex": hex(bytes) })));
     }
 
-    /// Where a symbol is, and its size in bytes.
+    /// Returns the address of a symbol and its size in bytes.
     #[must_use]
     pub fn symbol(&mut self, name: &str) -> (u32, u32) {
         let answer = self.ask("symbol", json!({ "name": name }));

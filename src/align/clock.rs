@@ -1,4 +1,4 @@
-//! A part's clock, taken to the board's.
+//! This module translates the time stamps of a part's clock to the board's clock.
 //!
 //! A time stamp says when a reading was taken, by a clock that started at another time and
 //! runs at another speed than the board's. Its arrival is by the board's clock, but late by a
@@ -67,6 +67,9 @@ pub struct ClockCounters {
 }
 
 impl ClockCounters {
+    /// No event.
+    pub const NONE: Self = Self { samples: 0, late: 0, duplicates: 0, out_of_order: 0, jumps: 0 };
+
     /// Returns the events since `before`.
     #[must_use]
     pub const fn since(&self, before: &Self) -> Self {
@@ -101,6 +104,9 @@ pub struct PartClock {
 }
 
 impl PartClock {
+    /// The clock before the first sample.
+    pub const START: Self = Self { last: None, late_since: None, counters: ClockCounters::NONE };
+
     /// Takes a sample's time stamp and when it arrived.
     ///
     /// # Errors

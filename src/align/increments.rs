@@ -1,4 +1,4 @@
-//! Increments of a fibre-optic gyro, summed from one grid step to the next.
+//! This module sums the increments of a fibre-optic gyro from one grid step to the next.
 //!
 //! The rules:
 //! - An increment belongs to the time since the one before it. One that straddles a grid step
@@ -60,6 +60,9 @@ pub struct IncrementCounters {
 }
 
 impl IncrementCounters {
+    /// No event.
+    pub const NONE: Self = Self { gaps: 0, late: 0, too_long: 0, dropped: 0 };
+
     /// Returns the events since `before`.
     #[must_use]
     pub const fn since(&self, before: &Self) -> Self {
@@ -89,6 +92,9 @@ pub struct Increments {
 }
 
 impl Increments {
+    /// No increment.
+    pub const EMPTY: Self = Self { pieces: Deque::new(), last_end: None, counters: IncrementCounters::NONE };
+
     /// Takes a sample that ended at `time` by the board's clock, later than the last one.
     pub fn add(&mut self, time: Micros, sample: &FogSample) {
         let (end, span) = (time.0, u64::from(sample.span));

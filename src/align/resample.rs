@@ -1,4 +1,4 @@
-//! An inertial sensor of any rate onto the grid: linear between the samples before and after.
+//! This module interpolates an inertial sensor of any rate on the grid, linearly between two samples.
 //!
 //! | samples around the grid step | value |
 //! |---|---|
@@ -53,6 +53,9 @@ pub struct Resampler {
 }
 
 impl Resampler {
+    /// No sample.
+    pub const EMPTY: Self = Self { samples: Deque::new(), dropped: 0 };
+
     /// Takes a sample; its time is the board's and later than the last one's.
     pub fn add(&mut self, sample: ImuSample) {
         if self.samples.is_full() {

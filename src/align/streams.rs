@@ -1,4 +1,4 @@
-//! An inertial sensor and a fibre-optic gyro, each with its own clock and rate, on one grid.
+//! This module puts an inertial sensor and a fibre-optic gyro, each with its own clock and rate, on one grid.
 //!
 //! Grid steps are the multiples of 10 ms of the board's clock. A step comes out as soon as both
 //! streams have passed it, and [`MAX_DELAY_US`] after its time at the latest, with what there
@@ -26,6 +26,12 @@ pub struct Events {
     pub fog: ClockCounters,
     /// The events of its increments.
     pub increments: IncrementCounters,
+}
+
+impl Events {
+    /// No event.
+    pub const NONE: Self =
+        Self { imu: ClockCounters::NONE, fog: ClockCounters::NONE, increments: IncrementCounters::NONE };
 }
 
 /// The values of one grid step.
@@ -70,16 +76,16 @@ pub struct Streams {
 impl Streams {
     /// Begins before the first sample.
     #[must_use]
-    pub fn new(fitted: Fitted) -> Self {
+    pub const fn new(fitted: Fitted) -> Self {
         Self {
             fitted,
-            imu_clock: PartClock::default(),
-            fog_clock: PartClock::default(),
-            imu: Resampler::default(),
-            fog: Increments::default(),
+            imu_clock: PartClock::START,
+            fog_clock: PartClock::START,
+            imu: Resampler::EMPTY,
+            fog: Increments::EMPTY,
             next: None,
             restarts: 0,
-            reported: Events::default(),
+            reported: Events::NONE,
         }
     }
 

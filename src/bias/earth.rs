@@ -1,4 +1,4 @@
-//! The rotation of the Earth, which every gyro sees and no map does.
+//! A gyro senses the rotation of the Earth, which must be subtracted from its rate once and not twice.
 //!
 //! About the vertical it is 15.041 deg/h times the sine of the latitude, 9 deg/h at 37 degrees:
 //! nothing to a MEMS part, nearly all of the error of a fibre-optic gyro. A mean over standing

@@ -1,4 +1,5 @@
-//! Standing still without wheels: a judgement by the inertial sensors, which may only tighten.
+//! Without wheels the inertial sensors judge whether the vehicle stands, and only within tighter limits than at the
+//! start.
 //!
 //! A steady turn looks like a bias, so an estimator that trusts a quiet gyro takes slow turns
 //! for bias and drifts worse than none. What counts as quiet here can therefore never be more

@@ -1,4 +1,4 @@
-//! Mean and spread of a run of readings, in one pass.
+//! This module computes mean and spread of a run of readings in one pass, so that no reading is kept.
 
 /// Sum (exact) and squared deviations (Welford's way: B. P. Welford, Technometrics 4, 1962).
 #[derive(Debug, Clone, Copy, Default)]
@@ -10,6 +10,9 @@ pub(super) struct Spread {
 }
 
 impl Spread {
+    /// The spread of no reading.
+    pub const EMPTY: Self = Self { count: 0, sum: 0, mean: 0.0, squares: 0.0 };
+
     /// Takes a reading as code and as value.
     pub fn add(&mut self, code: i32, value: f32) {
         self.count += 1;

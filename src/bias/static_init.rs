@@ -1,4 +1,4 @@
-//! Static initialisation: the gyro's bias as its mean over the first three seconds.
+//! Static initialisation takes the gyro's bias as its mean over the first three seconds.
 //!
 //! A vehicle with its engine running shakes but goes nowhere, so stillness is judged twice:
 //! the spread inside the three seconds must stay below what an engine does, and the means of
@@ -112,6 +112,8 @@ struct Axis {
 }
 
 impl Axis {
+    const EMPTY: Self = Self { all: Spread::EMPTY, seconds: [0; SECONDS] };
+
     fn add(&mut self, code: i32, value: f32) {
         self.seconds[(self.all.count() / RATE_HZ) as usize % SECONDS] += i64::from(code);
         self.all.add(code, value);
@@ -152,8 +154,8 @@ pub struct StaticInit {
 impl StaticInit {
     /// Starts collecting.
     #[must_use]
-    pub fn new(config: StaticConfig) -> Self {
-        Self { config, gyro: [Axis::default(); 3], accel: [Axis::default(); 3], wheels_refused: false }
+    pub const fn new(config: StaticConfig) -> Self {
+        Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
     }
 
     /// Takes a sample; after [`STATIC_SAMPLES`] of them returns what it reads at rest, or why there

@@ -1,5 +1,4 @@
-//! Zero-rate updates: what is left of the yaw rate, behind the network, while the vehicle
-//! stands.
+//! Zero-rate updates estimate the part of the yaw rate that the network leaves over while the vehicle stands.
 //!
 //! A Kalman filter of two states, fed with one-second means of gyro less static bias less
 //! settled correction:

@@ -113,7 +113,7 @@ mod firmware {
         }
     }
 
-    /// What the pipeline adds to the network: five samples with wheels that stand, one of which
+    /// Counts what the pipeline adds to the network: five samples with wheels that stand, one of which
     /// takes an estimate back and hands out the next window.
     fn pipeline(meter: &mut Meter) {
         let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);

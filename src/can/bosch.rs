@@ -1,4 +1,4 @@
-//! The Bosch MM5.10 yaw-rate message, 0x174 at 100 Hz: a drop-in for sensors that are in cars.
+//! The Bosch MM5.10 yaw-rate message, 0x174 at 100 Hz, makes the board a drop-in for sensors that are in cars.
 //!
 //! | bytes | signal | scale |
 //! |---|---|---|
@@ -141,6 +141,9 @@ pub struct YawRateSignal {
 pub struct OutOfRange(pub u16);
 
 impl YawRateSignal {
+    /// Nothing owed.
+    pub const START: Self = Self { residual: 0 };
+
     /// Returns the code of a rate, with the rounding residual of the earlier ones.
     ///
     /// # Errors

@@ -1,5 +1,4 @@
-//! A rate on a coarser scale, without loss: what rounding takes from one message goes into the
-//! next one.
+//! A coarser scale loses nothing in the sum, because the rounding residual of one message goes into the next one.
 //!
 //! Rounded one by one, the messages of a parked car with a constant rate are all wrong in the
 //! same direction. With the residual carried, the sum of what was sent is never off by more than

@@ -1,4 +1,4 @@
-//! Which messages go out, under which identifiers, how often, and how protected.
+//! A configuration says which messages go out, under which identifiers, how often, and how protected.
 //!
 //! [`Settings`] is what a user writes; [`Config`] is what has been checked, once, at the start.
 

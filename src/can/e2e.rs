@@ -1,5 +1,5 @@
-//! AUTOSAR end-to-end protection (PRS E2E Protocol): a CRC, a counter and an identifier that is
-//! not sent, so that a receiver notices what the path between two ECUs did to the data.
+//! AUTOSAR end-to-end protection (PRS E2E Protocol) adds a CRC, a counter and an identifier that is not sent, so
+//! that a receiver notices what the path between two ECUs did to the data.
 //!
 //! | profile | header | CRC | counter |
 //! |---|---|---|---|

@@ -1,4 +1,4 @@
-//! The frames of one sample of the inertial sensor, as they are configured.
+//! This encoder makes the configured frames of one sample of the inertial sensor.
 
 use super::DataFrame;
 use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};
@@ -21,17 +21,21 @@ pub struct CanEncoder {
 }
 
 impl CanEncoder {
+    /// The encoder before it is configured: it sends no messages of our own.
+    pub const START: Self = Self {
+        config: Config::DEFAULT,
+        bosch: SetEncoder::START,
+        yaw: None,
+        vdc2: Vdc2Encoder::START,
+        out_of_range: 0,
+    };
+
     /// Begins before the first message.
     #[must_use]
     pub fn new(config: Config) -> Self {
         let yaw = config.settings().yaw;
-        Self {
-            config,
-            bosch: SetEncoder::default(),
-            yaw: yaw.map(|yaw| YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw())),
-            vdc2: Vdc2Encoder::default(),
-            out_of_range: 0,
-        }
+        let yaw = yaw.map(|yaw| YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw()));
+        Self { config, yaw, ..Self::START }
     }
 
     /// Returns the number of messages that reported "failed" because a value does not fit its signal.

@@ -1,4 +1,5 @@
-//! The yaw messages of a fibre-optic gyro: sent from when it is heard, from the start where one is configured.
+//! This encoder makes the yaw messages of a fibre-optic gyro. They are sent from its first sample on, or from the
+//! start where one is configured.
 
 use super::DataFrame;
 use super::config::SAMPLE_MS;
@@ -21,14 +22,17 @@ impl FogEncoder {
     /// Begins before the first message. `ids` are the identifiers (11 bits) of rate, angle and detail;
     /// [`super::yaw::FOG_IDS`] as we use them.
     #[must_use]
-    pub fn new(ids: [u16; 3]) -> Self {
+    pub const fn new(ids: [u16; 3]) -> Self {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }
 
     /// Returns the protection of each message.
     #[must_use]
-    pub fn profiles(ids: [u16; 3]) -> [Profile; 3] {
-        ids.map(|data_id| Profile::P01(P01 { data_id, mode: DataIdMode::Both }))
+    pub const fn profiles([rate, angle, detail]: [u16; 3]) -> [Profile; 3] {
+        const fn profile(data_id: u16) -> Profile {
+            Profile::P01(P01 { data_id, mode: DataIdMode::Both })
+        }
+        [profile(rate), profile(angle), profile(detail)]
     }
 
     /// Returns every message of the gyro; none for identifiers of over 11 bits.

@@ -1,4 +1,4 @@
-//! A classic CAN data frame, for where no driver brings its own type.
+//! This type is a classic CAN data frame for code that has no driver's own type.
 
 use embedded_can::{Frame, Id};
 

@@ -1,4 +1,4 @@
-//! SAE J1939: vehicle dynamic stability control 2 (VDC2), the yaw rate on trucks and machines.
+//! SAE J1939 carries the yaw rate on trucks and machines in its message VDC2 (vehicle dynamic stability control 2).
 //!
 //! | bytes | SPN | signal | scale |
 //! |---|---|---|---|
@@ -119,11 +119,14 @@ pub struct Vdc2Encoder {
 
 impl Default for Vdc2Encoder {
     fn default() -> Self {
-        Self { yaw_rate: RoundingCarry::new(YAW_RATE) }
+        Self::START
     }
 }
 
 impl Vdc2Encoder {
+    /// Nothing owed.
+    pub const START: Self = Self { yaw_rate: RoundingCarry::new(YAW_RATE) };
+
     /// Encodes one sample; the specific force points forward, left, up. J1939 has no status beside a value, so a
     /// value that is not valid, or does not fit, is not sent at all.
     pub fn encode(&mut self, rate: AngularRate, validity: Validity, force: &[SpecificForce; 3]) -> Vdc2 {

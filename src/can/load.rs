@@ -1,4 +1,4 @@
-//! What messages cost: bits on the bus at worst, characters on a serial line.
+//! These functions compute the load of messages: bits on the bus at worst, characters on a serial line.
 
 use embedded_can::Id;
 

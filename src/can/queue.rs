@@ -1,4 +1,4 @@
-//! Frames that wait for the bus, and do not wait for ever.
+//! Frames wait here for the bus, and old ones make way for new ones, because nobody needs a late rate.
 //!
 //! A bus that is off, full or gone must not stop the pipeline, and after it comes back nobody
 //! wants to know how the vehicle turned before. So putting a frame in never fails and never

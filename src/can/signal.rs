@@ -1,4 +1,4 @@
-//! Where a value lies in a frame, as DBC files say it.
+//! A bit field is the place of a value in a frame, as DBC files give it.
 
 /// Order of a value's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

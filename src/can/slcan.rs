@@ -1,4 +1,4 @@
-//! CAN over a serial line, the Lawicel way (CAN232 manual): one frame, one line of ASCII.
+//! SLCAN carries CAN over a serial line, the Lawicel way (CAN232 manual): one frame is one line of ASCII.
 
 pub mod assembler;
 pub mod host;

@@ -1,5 +1,5 @@
-//! Wheel speeds from a vehicle's own frames, wherever they lie in them. Whether the vehicle stands
-//! is decided in [`crate::can::wheel`].
+//! The receiver reads wheel speeds from a vehicle's own frames, wherever they lie in them. Whether the vehicle
+//! stands is decided in `standstill`.
 
 mod layout;
 mod settings;
@@ -31,8 +31,8 @@ impl WheelReceiver {
     /// # Errors
     /// [`WheelConfigError`].
     pub fn new(settings: WheelSettings) -> Result<Self, WheelConfigError> {
-        let WheelSettings { timeout_us, still_speed, still_for_us, .. } = settings;
-        let rule = StandstillRule { timeout_us, still_speed, still_for_us };
+        let WheelSettings { timeout, still_speed, still_for, .. } = settings;
+        let rule = StandstillRule { timeout, still_speed, still_for };
         let wheels = Wheels::new(rule, settings.wheels()?);
         let sequences = settings.frames.map(|frame| {
             let counters = frame.map_or(1, |frame| frame.counters());

@@ -1,4 +1,4 @@
-//! Our own yaw messages: full resolution, accumulated yaw, and what the numbers are worth.
+//! Our own yaw messages carry the full resolution, the accumulated yaw, and the quality of both.
 //!
 //! Three messages of eight bytes. Bytes 0 to 2 are the header: bytes 0 and 1, with profile 5
 //! also 2, belong to the E2E profile; with the others byte 2 is the sample counter, the same in

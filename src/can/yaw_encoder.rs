@@ -1,4 +1,4 @@
-//! The sending side of the yaw messages: estimates in, three protected messages out.
+//! This encoder makes three protected messages from each estimate.
 
 use super::DataFrame;
 use super::carry::{RoundingCarry, Scale};
@@ -30,11 +30,11 @@ impl YawEncoder {
     /// Begins before the first message. `profiles` are those of rate, angle and detail; `every` is the number of
     /// samples per set, at least one.
     #[must_use]
-    pub fn new(profiles: [Profile; 3], every: u8) -> Self {
+    pub const fn new([rate, angle, detail]: [Profile; 3], every: u8) -> Self {
         Self {
-            protectors: profiles.map(Protector::new),
+            protectors: [Protector::new(rate), Protector::new(angle), Protector::new(detail)],
             sample_counter: 0,
-            every: every.max(1),
+            every: if every == 0 { 1 } else { every },
             samples: 0,
             rate: Mean::new(Scale::MICRO_DEG_PER_SEC),
             correction: Mean::new(Scale::FIFTH_MILLI_DEG_PER_SEC),

@@ -1,4 +1,4 @@
-//! Which of a window's outputs are used, how often a window runs, and how late the rate goes out.
+//! The mode chooses the outputs of a window that are used, the samples between windows, and the lag of the rate.
 
 use crate::model::window::WINDOW;
 use core::ops::Range;

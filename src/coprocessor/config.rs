@@ -1,4 +1,4 @@
-//! Everything that can be set about a coprocessor, and every way to use it wrongly.
+//! These types are everything that can be set about a coprocessor, and every error of its use.
 
 use crate::align::AlignError;
 use crate::align::clock::ClockError;
@@ -8,6 +8,7 @@ use crate::can::wheel::{WheelError, WheelReceiver};
 use crate::can::yaw::FOG_IDS;
 use crate::fog::FogConfig;
 use crate::pipeline::PipelineConfig;
+use crate::units::Duration;
 
 /// The clock that `now` comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -90,10 +91,10 @@ impl Default for Config {
 #[non_exhaustive]
 pub enum InputError {
     /// `now` is before the newest time; the following times are taken as going on from there.
-    #[error("the clock goes back by {by_us} us")]
+    #[error("the clock goes back by {} us", .by.0)]
     ClockWentBack {
-        /// Microseconds.
-        by_us: u64,
+        /// The time by which it went back.
+        by: Duration,
     },
     /// The time stamp of an inertial sample has no place on the grid.
     #[error("inertial sensor: {0}")]

@@ -1,4 +1,4 @@
-//! GyroNet's window on its way to the network and back, and the rule for late ones.
+//! GyroNet's window waits here on its way to the network and back; a late estimate is not used.
 //!
 //! From when a window is due, its estimate has as many sample periods by the outside clock as the pipeline uses it
 //! later. Until then the sample that wants the estimate stays where it waits, should samples come faster

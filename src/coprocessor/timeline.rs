@@ -1,9 +1,9 @@
-//! The outside clock as a time that never goes back.
+//! The timeline makes an outside clock into a time that never goes back.
 //!
 //! All limits (silence, late windows, old wheel speeds) are differences to the newest time. A clock that is set back
 //! must neither turn them negative nor stop them until it has caught up: its times are shifted from there on.
 
-use crate::units::Micros;
+use crate::units::{Duration, Micros};
 
 /// The end of time, 146,000 years: sums of times and limits do not overflow before it.
 pub(super) const END: Micros = Micros(1 << 62);
@@ -16,15 +16,18 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
+    /// Time 0.
+    pub const START: Self = Self { now: Micros(0), shift_us: 0 };
+
     /// Takes the clock's time and returns the shifted one.
     ///
     /// # Errors
-    /// The microseconds by which the clock went back. The next call goes on from the newest time.
-    pub fn advance(&mut self, clock: Micros) -> Result<Micros, u64> {
+    /// The time by which the clock went back. The next call goes on from the newest time.
+    pub fn advance(&mut self, clock: Micros) -> Result<Micros, Duration> {
         let shifted = clock.0.saturating_add(self.shift_us).min(END.0);
         if let Some(by_us @ 1..) = self.now.0.checked_sub(shifted) {
             self.shift_us = self.shift_us.saturating_add(by_us);
-            return Err(by_us);
+            return Err(Duration(by_us));
         }
         self.now = Micros(shifted);
         Ok(self.now)
@@ -50,10 +53,10 @@ mod tests {
         let mut timeline = Timeline::default();
         assert_eq!(timeline.advance(Micros(1_000)), Ok(Micros(1_000)));
         assert_eq!(timeline.advance(Micros(1_000)), Ok(Micros(1_000)));
-        assert_eq!(timeline.advance(Micros(400)), Err(600));
+        assert_eq!(timeline.advance(Micros(400)), Err(Duration(600)));
         assert_eq!(timeline.advance(Micros(450)), Ok(Micros(1_050)));
         assert_eq!(timeline.advance(Micros(u64::MAX)), Ok(END));
-        assert_eq!(timeline.advance(Micros(0)), Err(END.0 - 600));
+        assert_eq!(timeline.advance(Micros(0)), Err(Duration(END.0 - 600)));
         assert_eq!(timeline.advance(Micros(1)), Ok(END), "it stands still and does not wrap");
     }
 }

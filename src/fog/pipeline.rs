@@ -1,4 +1,4 @@
-//! A fibre-optic gyro from its samples to the rate that is sent every 10 ms.
+//! The pipeline computes the rate that is sent every 10 ms from a fibre-optic gyro's samples.
 //!
 //! The gyro's increments are summed on the grid of the time that the caller gives ([`Streams`]). The newest
 //! readings of inertial sensor and wheels stand for those of the step: they are a step or two old, which is
@@ -57,6 +57,12 @@ pub struct FogCounters {
     pub broken: u32,
 }
 
+impl FogCounters {
+    /// No event.
+    pub const NONE: Self =
+        Self { samples: 0, misplaced: 0, gaps: 0, stuck: 0, windows: 0, late: 0, implausible: 0, broken: 0 };
+}
+
 /// The way from a fibre-optic gyro's samples to its corrected rate.
 #[derive(Debug, Clone)]
 pub struct FogPipeline {
@@ -80,21 +86,27 @@ pub struct FogPipeline {
 impl FogPipeline {
     /// Begins before the first sample. Without a network no window is due, and the messages report that.
     #[must_use]
-    pub fn new(config: FogConfig, has_network: bool) -> Self {
+    pub const fn new(config: FogConfig, has_network: bool) -> Self {
         Self {
             streams: Streams::new(Fitted { imu: false, fog: true }),
             corrector: FogCorrector::new(config),
             has_network,
-            rate: IncrementRate::default(),
-            correction: IncrementRate::default(),
-            yaw: Yaw::default(),
-            repeats: Repeats::default(),
+            rate: IncrementRate::START,
+            correction: IncrementRate::START,
+            yaw: Yaw(0),
+            repeats: Repeats::NONE,
             stuck_in_step: false,
             due: None,
             awaited: false,
             estimate_faults: Faults::NONE,
-            counters: FogCounters::default(),
+            counters: FogCounters::NONE,
         }
+    }
+
+    /// Sets the configuration, before the first sample.
+    pub fn configure(&mut self, config: FogConfig, has_network: bool) {
+        self.corrector.configure(config);
+        self.has_network = has_network;
     }
 
     /// Expects a gyro whether it is heard or not: messages are sent from `now` on, and its silence is reported.
@@ -218,7 +230,7 @@ impl FogPipeline {
 }
 
 /// The newest increment, and the number and time of those that were equal to the one before.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Repeats {
     newest: Option<Angle>,
     equal: u8,
@@ -226,11 +238,14 @@ struct Repeats {
 }
 
 impl Repeats {
+    /// No increment.
+    const NONE: Self = Self { newest: None, equal: 0, equal_us: 0 };
+
     /// Returns the state after a further sample.
     fn after(self, sample: &FogSample) -> Self {
         let [.., newest] = sample.increment;
         if newest.is_none() || newest != self.newest {
-            return Self { newest, ..Self::default() };
+            return Self { newest, ..Self::NONE };
         }
         Self {
             newest,

@@ -1,4 +1,4 @@
-//! Increments to rates and back, without losing anything in the sum.
+//! These types convert increments to rates and back without losing anything in the sum.
 
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, AngularRate};
@@ -15,6 +15,9 @@ pub struct IncrementRate {
 }
 
 impl IncrementRate {
+    /// No frame, and nothing owed.
+    pub const START: Self = Self { rest: 0 };
+
     /// Returns the rate of a frame that turned by this much, saturated at the limits of [`AngularRate`].
     pub fn rate(&mut self, turn: Angle) -> AngularRate {
         let codes = turn.0.saturating_mul(FRAMES).saturating_add(self.rest);

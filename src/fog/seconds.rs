@@ -1,4 +1,4 @@
-//! The last minute in steps of a second, as FoGNet sees it.
+//! FoGNet sees the last minute in steps of a second.
 //!
 //! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged; all
 //! in integers, the gyro's increments to the last bit. A gap in the gyro ends the window, for an
@@ -181,6 +181,30 @@ impl Minute {
 pub struct SecondsWindow<'m> {
     minute: &'m Minute,
     padding: Padding,
+}
+
+/// The copy of a window, for a reader that must not hold up the writer for longer than a copy takes.
+#[derive(Debug, Clone)]
+pub struct WindowCopy {
+    minute: Minute,
+    padding: Padding,
+}
+
+impl WindowCopy {
+    /// The copy of no window.
+    pub const EMPTY: Self = Self { minute: Minute::EMPTY, padding: Padding::Repeat };
+
+    /// Takes a copy of a window.
+    pub fn take(&mut self, window: &SecondsWindow<'_>) {
+        self.minute.clone_from(window.minute);
+        self.padding = window.padding;
+    }
+
+    /// The window; `None` before one was taken.
+    #[must_use]
+    pub fn window(&self) -> Option<SecondsWindow<'_>> {
+        self.minute.window(self.padding)
+    }
 }
 
 impl<'m> SecondsWindow<'m> {

@@ -1,4 +1,4 @@
-//! Which tasks have run: the watchdog is fed only when all of them have.
+//! The supervisor collects the reports of the tasks, because the watchdog is fed only when all of them have run.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 

@@ -1,4 +1,5 @@
-//! Weights in use against their own checksum, a piece at a time.
+//! The background check compares the weights in use with their checksum, a piece at a time, because flash can lose
+//! bits.
 
 use super::blob::{Blob, BlobError, CRC};
 

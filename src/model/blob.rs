@@ -1,4 +1,4 @@
-//! GyroNet's weight file, ready for the kernels, checked before use.
+//! This module checks GyroNet's weight file before use, and reads it in place.
 //!
 //! The header of [`super::file`], then:
 //!

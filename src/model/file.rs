@@ -1,4 +1,4 @@
-//! What the weight files of all networks have in common: header, checks, typed access in place.
+//! The weight files of all networks share their header, their checks and the typed access in place.
 //!
 //! Little-endian; every field on a 4-byte boundary.
 //!

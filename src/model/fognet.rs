@@ -1,4 +1,4 @@
-//! FoGNet in integers: a minute in, what the gyro erred by in that minute out.
+//! This module is FoGNet in integers: it takes a minute and returns the error of the gyro's turn in that minute.
 //!
 //! ```text
 //! 60 x 9 -> LSTM1, 2 x 90 both ways -> FC1 -> f1 (60)

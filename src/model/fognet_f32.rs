@@ -1,4 +1,4 @@
-//! FoGNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
+//! This module is FoGNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
 
 use super::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
 use super::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};

@@ -1,5 +1,5 @@
-//! GyroNet in integers: ten samples in, the yaw gyro's error at each of them out, and how far off
-//! that may be.
+//! This module is GyroNet in integers: it takes ten samples and returns the yaw gyro's error at each of them, and
+//! how far off that may be.
 
 use super::blob::{Blob, HIDDEN};
 use super::input::load_step;

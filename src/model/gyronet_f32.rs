@@ -1,4 +1,4 @@
-//! GyroNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
+//! This module is GyroNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
 
 use super::blob::HIDDEN;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};

@@ -1,4 +1,4 @@
-//! From codes to the input of a first layer, for both networks.
+//! These functions normalise codes to the input of a first layer, for both networks.
 
 use super::file::Normalisation;
 use crate::nn::{bilstm, pack};

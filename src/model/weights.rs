@@ -1,5 +1,4 @@
-//! The weights that come with the library: GyroNet trained on drives of one car, FoGNet trained
-//! on simulated ones.
+//! These weights come with the library: GyroNet trained on drives of one car, FoGNet trained on simulated ones.
 //!
 //! Where they come from stands in their provenance ([`super::Blob::provenance`]). An image
 //! that does not use them does not contain them.

@@ -1,4 +1,4 @@
-//! The last ten samples, as the networks see them.
+//! A window is the last ten samples, as the networks see them.
 
 use crate::sample::ImuSample;
 use crate::units::AngularRate;

@@ -1,4 +1,4 @@
-//! Readings that no vehicle can have.
+//! This module finds readings that no vehicle can have.
 //!
 //! A part without a checksum, or with a short one, delivers a wrong bit as a reading. The largest
 //! steps from one sample to the next on the six drives of training and validation are 0.46 rad/s

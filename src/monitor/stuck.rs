@@ -1,4 +1,4 @@
-//! Readings that repeat themselves.
+//! This module finds readings that repeat themselves.
 
 use crate::sample::ImuSample;
 

@@ -1,4 +1,4 @@
-//! Sigmoid and tanh: tables of straight lines, one word per segment.
+//! Sigmoid and tanh are tables of straight lines, one word per segment.
 //!
 //! The input is a gate's Q14 value, saturated to 18 bits (+-8); the output is Q15 in the upper
 //! half of a word, as the halfword multiplies of the cell update take it. An entry holds the

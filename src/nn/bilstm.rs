@@ -1,4 +1,4 @@
-//! A bidirectional LSTM layer over a whole sequence, in resumable pieces.
+//! This module runs a bidirectional LSTM layer over a whole sequence in resumable pieces.
 //!
 //! Steps are taken in pairs: one input projection serves two of them. The backward direction
 //! takes the pairs, and the steps inside a pair, in reverse. Both start from a zero state, so

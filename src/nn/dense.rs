@@ -1,4 +1,4 @@
-//! The fully-connected layer on top: outputs of a step from both directions' hidden states.
+//! The fully-connected layer on top computes the outputs of a step from both directions' hidden states.
 
 /// Weights of one output over `2 H` hidden values, int16, and how its sum is scaled.
 #[derive(Debug, Clone, Copy)]

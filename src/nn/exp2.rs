@@ -1,4 +1,5 @@
-//! Powers of two in integers: a cubic over one octave, then a shift. The same steps for any input.
+//! This module computes powers of two in integers: a cubic over one octave, then a shift. The same steps for any
+//! input.
 
 /// Fraction bits of the exponent.
 pub const FRACTION_BITS: u32 = 16;

@@ -1,4 +1,4 @@
-//! One LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
+//! This module is one LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
 //!
 //! The portable code here is the definition of the result (formats and packing: [`crate::nn`]).
 //! Where the processor has a faster way (`nn/simd/`), [`project`] and [`step`] take it; the

@@ -1,4 +1,4 @@
-//! The networks in plain f32: what the integer code is measured against. Never optimised.
+//! This module is the networks in plain f32, which the integer code is measured against. Never optimised.
 //!
 //! Equations 7 to 12 of Zhao et al., with the weights as PyTorch lays them out: the rows of
 //! `weight_ih` (4H, I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows

@@ -1,4 +1,4 @@
-//! Which kernel the processor gets. All give the same bits as the portable one.
+//! This module selects the kernel for the processor. All give the same bits as the portable one.
 
 #[cfg(gyronet_dsp)]
 mod cortex_m;

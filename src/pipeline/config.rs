@@ -1,4 +1,4 @@
-//! Everything that can be set.
+//! The configuration holds everything that can be set about the pipeline.
 
 use crate::bias::{EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;

@@ -1,4 +1,4 @@
-//! Static initialisation, and what is known once it has succeeded.
+//! Static initialisation finds the bias and the tilt; this module holds both once it has succeeded.
 
 use super::{Pipeline, PipelineConfig};
 use crate::bias::{QuietDetector, Rest, StaticError, ZeroPoint, ZeroRate};

@@ -1,4 +1,4 @@
-//! The results of one sample.
+//! These types are the results of one sample.
 
 use crate::bias::StaticError;
 use crate::compensate::{Implausible, Settled};

@@ -1,4 +1,5 @@
-//! From compensated rates to the estimates that are sent: yaw, uncertainty, status, faults, the other axes.
+//! This module makes the sent estimates from compensated rates: yaw, uncertainty, status, faults, the other
+//! axes.
 
 use super::{Pipeline, Rates};
 use crate::bias::ZeroRate;

@@ -1,4 +1,4 @@
-//! What a corrected rate is said to be worth.
+//! This module computes the expected error of a corrected rate.
 //!
 //! The number sent with each rate is the expected error of the mean rate over one second, 1
 //! sigma: over a single sample vibration is all there is, and nobody turns a car in 10 ms. Its
@@ -35,7 +35,7 @@ pub struct Uncertainty {
 impl Uncertainty {
     /// Begins before the first window.
     #[must_use]
-    pub fn new(config: UncertaintyConfig) -> Self {
+    pub const fn new(config: UncertaintyConfig) -> Self {
         Self { config, scale_square: None }
     }
 

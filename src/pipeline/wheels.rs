@@ -1,9 +1,9 @@
-//! The wheels as the pipeline needs them: whether the vehicle stands, and whether a wheel has fallen silent.
+//! The pipeline needs two facts of the wheels: whether the vehicle stands, and whether a wheel has fallen silent.
 
 use crate::sample::{Standstill, WHEELS, WheelSample};
 
 /// The newest report of the wheels.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Wheels {
     newest: Option<WheelSample>,
     /// Wheels that have had a speed.
@@ -11,6 +11,9 @@ pub(super) struct Wheels {
 }
 
 impl Wheels {
+    /// Nothing known of the wheels.
+    pub const START: Self = Self { newest: None, seen: [false; WHEELS] };
+
     /// Takes a report.
     pub fn update(&mut self, wheels: WheelSample) {
         for (seen, speed) in self.seen.iter_mut().zip(&wheels.speeds) {

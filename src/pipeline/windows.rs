@@ -1,4 +1,5 @@
-//! GyroNet's windows: the samples of the next one, the one that is out, and whether the newest estimate counts.
+//! This module holds GyroNet's windows: the samples of the next one, the one that is out, and the use of the newest
+//! estimate.
 
 use super::DueWindow;
 use crate::health::Faults;
@@ -6,7 +7,7 @@ use crate::model::Estimate;
 use crate::model::window::{Features, Window};
 
 /// The samples of the next window and the state of the last one.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Windows {
     window: Window,
     /// Samples since the last window.
@@ -18,6 +19,10 @@ pub(super) struct Windows {
 }
 
 impl Windows {
+    /// No sample, and no window out.
+    pub const START: Self =
+        Self { window: Window::EMPTY, since: 0, out: None, accepted: false, faults: Faults::NONE };
+
     /// Adds a good sample.
     pub fn add(&mut self, features: Features) {
         self.window.add(features);
@@ -26,7 +31,7 @@ impl Windows {
 
     /// Drops samples, the window that is out and its estimate.
     pub fn break_off(&mut self) {
-        *self = Self::default();
+        *self = Self::START;
     }
 
     /// Returns the window that ends with this tick, if it is full, `hop` samples after the last one, and no

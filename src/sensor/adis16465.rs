@@ -1,4 +1,4 @@
-//! Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
+//! This driver reads Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
 //!
 //! One burst gives everything: the command 68 00, then the twenty bytes of [`burst`], at 1 MHz
 //! at most. This file fetches it; what it says is [`burst`]'s business, sans I/O.

@@ -1,4 +1,4 @@
-//! Checksums that more than one part uses.
+//! These checksums belong to more than one part.
 
 /// CRC-32/MPEG-2, as the KVH gyros send it: polynomial 04C11DB7, start FFFFFFFF, nothing
 /// reflected, nothing inverted at the end. It is not the CRC-32 of zip and Ethernet. Over a

@@ -1,5 +1,5 @@
-//! KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which speak the same): RS-422,
-//! 921600 8N1 at 1000 messages a second.
+//! This module reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which speak the same):
+//! RS-422, 921600 8N1 at 1000 messages a second.
 //!
 //! The bytes do not say whether rotations are increments or rates, radians or degrees: that is
 //! [`Dsp1760Config`]. Format A and C carry no time, only a sequence number; their time is the

@@ -1,4 +1,4 @@
-//! KVH DSP-3000, a fibre-optic gyro with one axis, in its two variants.
+//! These modules read the KVH DSP-3000, a fibre-optic gyro with one axis, in its two variants.
 //!
 //! One ([`ascii`]) sends 100 lines a second at 38400 8N1, `[-]ddd.dddddd y`; the other
 //! ([`binary`]) 1000 words of four bytes a second at 115200 8N1.

@@ -1,4 +1,4 @@
-//! Frames out of a byte stream that may begin, break and garble anywhere.
+//! The framer finds frames in a byte stream that may begin, break and be damaged anywhere.
 //!
 //! A header alone is no synchronisation: its bytes may occur in a payload. Only header and
 //! checksum together are. So when a candidate fails its check, the search goes on one byte

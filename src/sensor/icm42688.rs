@@ -1,4 +1,4 @@
-//! TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
+//! This driver reads the TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
 //!
 //! [`packet`] is what its FIFO holds, sans I/O; [`registers`] its registers; this file talks to
 //! it. Every wait is bounded by counts of [`DelayNs`]. At each read one register of the

@@ -1,4 +1,4 @@
-//! Parts on a serial line, over the traits of `embedded-io`: the line itself, and the dialogue
+//! This module connects parts on a serial line over the traits of `embedded-io`: the line itself, and the dialogue
 //! that brings a part to send what the pipeline wants. Nothing here knows a part.
 //!
 //! No read blocks: a port must say whether bytes wait ([`ReadReady`]), so a silent part costs a

@@ -1,4 +1,4 @@
-//! A clock of 32 bits that wraps, made one that does not.
+//! This clock counts on where a clock of 32 bits wraps.
 
 /// Ticks of 32 bits (71 minutes of microseconds, 119 hours at 10 kHz) to ones that never wrap. A stamp
 /// that goes back by less than half the range is a step back, not a wrap.

@@ -1,4 +1,4 @@
-//! Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
+//! This module reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
 //! Frames are in [`xbus`], the measurements in a frame in [`mtdata2`], the four forms of their
 //! numbers in [`precision`]; [`dialogue`] brings a part to send what the pipeline wants.

@@ -1,4 +1,4 @@
-//! Calibration at rest: the gyro's bias, and how the sensor is tilted on level ground.
+//! A calibration at rest finds the gyro's bias, or the tilt of the sensor on level ground.
 
 use crate::bias::{StaticConfig, StaticError, StaticInit};
 use crate::mounting::{LevelError, Rotation};

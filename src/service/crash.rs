@@ -1,4 +1,4 @@
-//! A crash of the image: why it stopped and where, kept in RAM over the reset that follows.
+//! A crash record says why and where the image stopped; it stays in RAM over the reset that follows.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! The board's side of the service line: what it keeps, and what it answers.
+//! The device is the board's side of the service line: it holds the stored data and answers requests.
 //!
 //! Some functions are kept out of their callers: what they have on the stack, requests, replies and
 //! records, is then there only while they run.

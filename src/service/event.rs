@@ -1,4 +1,4 @@
-//! What has happened to the board, kept until it is overwritten.
+//! The event log holds what has happened to the board, until it is overwritten.
 
 use super::calibrate::CalibrationFault;
 pub use super::crash::{Crash, CrashKind};

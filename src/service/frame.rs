@@ -1,4 +1,4 @@
-//! Frames of the service line, found and made.
+//! This module finds and makes the frames of the service line.
 
 use crate::model::blob::CRC;
 use cobs::{CobsEncoder, DecodeResult, DecoderState};

@@ -1,4 +1,4 @@
-//! Faults that the board finds in its own hardware while it starts.
+//! These are the faults that the board finds in its own hardware while it starts.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Requests and replies.
+//! These types are the requests and replies.
 
 use super::calibrate::{State, Task};
 use super::event::{CanFault, ClockFault, Crash, LogPage, ResetCause, SensorFault};

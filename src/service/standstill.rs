@@ -1,4 +1,4 @@
-//! Whether the flash may be written: an erase stalls the processor for up to 2 s, so it waits for standstill.
+//! The flash may be written only at standstill, because an erase stalls the processor for up to 2 s.
 //!
 //! Wheels prove standstill or motion. Without wheels the inertial sensor must have been as quiet as at
 //! static initialisation for three seconds. While the sensor is silent no rate is sent that a receiver

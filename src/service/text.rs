@@ -1,4 +1,4 @@
-//! What the board says of itself, in words: for the asking side, the image prints none of it.
+//! The board's reports have a text here for the side that asks; the image prints none of it.
 
 use super::calibrate::CalibrationFault;
 use super::event::{EventKind, ResetCause, SensorFault};

@@ -1,4 +1,4 @@
-//! What the board has found out about its own sensor.
+//! A calibration holds what the board has found out about its own sensor.
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
@@ -85,35 +85,6 @@ impl Calibration {
             }
         }
     }
-
-    /// Returns the bias at a temperature, linear between the table's points and level beyond its ends; the last
-    /// static calibration's where there is no table or no temperature.
-    #[must_use]
-    pub fn bias_at(&self, temperature: Option<CentiCelsius>) -> Option<[AngularRate; 3]> {
-        let (Some(at), Some(first), Some(last)) =
-            (temperature, self.temperature_table.first(), self.temperature_table.last())
-        else {
-            return self.gyro_bias;
-        };
-        let mut points = self.temperature_table.iter().zip(self.temperature_table.iter().skip(1));
-        let between = points.find(|(low, high)| (low.temperature..=high.temperature).contains(&at));
-        Some(match between {
-            Some((low, high)) => interpolate(low, high, at),
-            None if at < first.temperature => first.gyro_bias,
-            None => last.gyro_bias,
-        })
-    }
-}
-
-fn interpolate(low: &BiasPoint, high: &BiasPoint, at: CentiCelsius) -> [AngularRate; 3] {
-    let distance = |from: CentiCelsius, to: CentiCelsius| i64::from(to.0) - i64::from(from.0);
-    let span = distance(low.temperature, high.temperature).max(1);
-    let mut bias = low.gyro_bias;
-    for (bias, high) in bias.iter_mut().zip(high.gyro_bias) {
-        let rise = i64::from(high.0) - i64::from(bias.0);
-        bias.0 += (rise * distance(low.temperature, at)).div_euclid(span) as i32;
-    }
-    bias
 }
 
 impl Record for Calibration {

@@ -1,4 +1,4 @@
-//! What a user sets, whole.
+//! The configuration holds everything that a user sets.
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;

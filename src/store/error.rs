@@ -1,4 +1,4 @@
-//! Why something is not stored, or not read.
+//! These errors are the reasons why something is not stored, or not read.
 
 use crate::can::config::ConfigError;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Where things lie in the flash of an STM32F405xG (RM0090 table 5): 1 MiB, twelve sectors.
+//! The layout places everything in the flash of an STM32F405xG (RM0090 table 5): 1 MiB, twelve sectors.
 //!
 //! | sectors | size | what |
 //! |---|---|---|

@@ -1,4 +1,4 @@
-//! Records in two sectors of flash, each found by its key, the newest of a kind counting.
+//! Records lie in two sectors of flash; each is found by its key, and the newest of a kind counts.
 //!
 //! A sector is a header of two words, then records one behind the other:
 //!

@@ -1,4 +1,4 @@
-//! Two slots for weight files, and which file the network runs on.
+//! There are two slots for weight files, and a record of the file that the network runs on.
 //!
 //! A file is uploaded to the slot that is not in use, checked there, and then accepted: a record
 //! names the slot and the file's checksum. At the next start [`select`] takes the first file

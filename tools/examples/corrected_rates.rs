@@ -9,7 +9,7 @@
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use std::error::Error;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
     // The wheels, where the drive has them, say when it stands still.
     let wheels = WheelFrames::new(&recording);
-    let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, wheels, &mut network, || {})?;
+    let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, wheels, &mut network, || {})?;
 
     println!("t_s,gyro,prompt,navigation,sigma");
     for step in &drive.steps[drive.compared()] {

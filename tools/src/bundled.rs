@@ -1,14 +1,14 @@
-//! What comes inside the binary, so that it works from anywhere: the simulated drive and the
-//! f32 checkpoint of the default weights.
+//! The data that the binary carries, so that it works from anywhere: the simulated drive and the f32 checkpoints of the
+//! default weights.
 
-use crate::drive::recording::{Recording, RecordingError};
-use crate::network::checkpoint::{Checkpoint, CheckpointError};
-use crate::network::fog_checkpoint::FogCheckpoint;
+use crate::drive::error::DataError;
+use crate::drive::recording::Recording;
+use crate::network::checkpoint::{Checkpoint, CheckpointError, FogNet, GyroNet};
 use crate::network::weight_file::WeightFileError;
 use gyronet::model::FogBlob;
 use gyronet::model::weights::FOGNET;
 
-/// What `gyronet simulate --seconds 90 --seed 1` writes.
+/// The drive that `gyronet simulate --seconds 90 --seed 1` writes.
 pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
 
 /// The checkpoint that [`gyronet::model::weights::DEFAULT`] was made from.
@@ -21,7 +21,7 @@ const FOG_CHECKPOINT: &[u8] = include_bytes!("../weights/fognet.safetensors");
 ///
 /// # Errors
 /// Never, unless the repository is broken.
-pub fn simulated_drive() -> Result<Recording, RecordingError> {
+pub fn simulated_drive() -> Result<Recording, DataError> {
     Recording::parse("simulated_drive.csv", SIMULATED_DRIVE.as_bytes())
 }
 
@@ -29,7 +29,7 @@ pub fn simulated_drive() -> Result<Recording, RecordingError> {
 ///
 /// # Errors
 /// Never, unless the repository is broken.
-pub fn checkpoint() -> Result<Checkpoint, CheckpointError> {
+pub fn checkpoint() -> Result<Checkpoint<GyroNet>, CheckpointError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
 }
 
@@ -37,8 +37,8 @@ pub fn checkpoint() -> Result<Checkpoint, CheckpointError> {
 ///
 /// # Errors
 /// Never, unless the repository is broken.
-pub fn fog_checkpoint() -> Result<FogCheckpoint, CheckpointError> {
-    FogCheckpoint::parse("fognet.safetensors", FOG_CHECKPOINT)
+pub fn fog_checkpoint() -> Result<Checkpoint<FogNet>, CheckpointError> {
+    Checkpoint::parse("fognet.safetensors", FOG_CHECKPOINT)
 }
 
 /// FoGNet's weights.

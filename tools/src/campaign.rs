@@ -1,35 +1,35 @@
-//! Faults on purpose: drives as bytes on the board's lines, damaged, and what the board makes of it.
+//! Fault injection: drives become bytes on the board's lines, faults damage them, and a receiver judges the board's
+//! messages.
 //!
-//! A [`drive::Drive`] becomes the bytes that a [`part::Part`] and the vehicle's wheels would send;
+//! A [`drive::Drive`] becomes the bytes that a [`Part`] and the vehicle's wheels would send;
 //! faults disturb what is measured ([`motion`]) or damage bytes on a line ([`wire`]); the
 //! [`board::Board`], the library's own parts in the order of the image, turns them into bytes of
 //! frames; a [`receiver::Receiver`] reads these as an ECU would. Nothing looks inside.
 //!
 //! | word | meaning |
 //! |---|---|
-//! | told | a receiver of our own messages learns of it: quality, fault bits, E2E, silence of 35 ms; with a fibre-optic gyro, of that one's messages |
+//! | reported | a receiver of our own messages sees it: quality, fault bits, E2E, silence of 35 ms; with a fibre-optic gyro, of that one's messages |
 //! | marked good | a set of messages that arrives whole, quality good, no fault bit |
 //! | moved | yaw turned in a second, all of it marked good, less the same second of the same drive undamaged, by the accumulated yaw on the bus |
 //! | limit | the expected error (1 sigma) that is sent with the last set of that second, but at most [`judge::Limits::moved`] |
-//! | undetected | yaw has moved by more than the limit, and nothing had told of the fault |
-//! | harmless | nothing told of it, and yaw has not moved by more than the limit |
+//! | undetected | yaw has moved by more than the limit, and nothing had reported the fault |
+//! | harmless | nothing reported it, and yaw has not moved by more than the limit |
 //! | error | yaw turned in a good second less the drive's reference: what is left of it without faults is the method's |
-//! | recovery | from the end of the fault to the last time that a receiver was told |
+//! | recovery | from the end of the fault to the last report |
 //!
-//! After a receiver has been told, and from 0.2 s after the last telling on, what counts is by how much
+//! After a report, and from 0.2 s after the last one on, what counts is by how much
 //! the error of a good second has grown against the same second undamaged: the network's windows
 //! begin at another sample then, and two estimates that are equally good need not be equal.
 
 pub mod board;
-pub mod draw;
 pub mod drive;
+mod encode;
 pub mod exceptions;
 pub mod fault;
 pub mod input;
 pub mod judge;
 pub mod motion;
 pub mod networks;
-pub mod part;
 pub mod plot;
 pub mod receiver;
 pub mod report;
@@ -38,14 +38,14 @@ pub mod soak;
 pub mod weight_upsets;
 pub mod wire;
 
-use draw::Draw;
+use crate::parts::Part;
+use crate::random::Random;
 use drive::Drive;
 use exceptions::{Exception, excepted};
 use fault::{Fault, Kind, Span};
 use gyronet::model::Blob;
 use judge::Outcome;
 use networks::Integer;
-use part::Part;
 use scene::{STATE_EVERY, Scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -60,15 +60,15 @@ const AFTER: usize = 350;
 const WITH: usize = 400;
 /// Rows before a fault may begin, a second of them to be good in.
 const HEALTHY: usize = 101;
-/// The same where static initialisation is under way.
+/// Rows before a fault may begin in a run that starts with static initialisation.
 const HEALTHY_AT_START: usize = 20;
-/// Every so many runs one is at the start of its drive.
+/// One run in so many starts at the beginning of its drive.
 const START_EVERY: u64 = 8;
-/// Of so many runs [`SINGLE`] are of one fault, the others of two.
+/// Of [`OF`] runs [`SINGLE`] have one fault, the others have two.
 const OF: usize = 5;
 const SINGLE: usize = 3;
 
-/// What to do.
+/// The size of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
     /// Runs.
@@ -79,7 +79,7 @@ pub struct Plan {
     pub threads: usize,
 }
 
-/// One run.
+/// One run of a drive with faults.
 #[derive(Debug, Clone)]
 pub struct Run {
     /// Its number.
@@ -88,36 +88,36 @@ pub struct Run {
     pub drive: String,
     /// The part.
     pub part: Part,
-    /// Where.
+    /// The rows of the drive that it covers.
     pub span: Span,
-    /// One or two faults.
+    /// The one or two faults.
     pub faults: Vec<Fault>,
-    /// What became of it; a panic's text.
+    /// The outcome, or the message of a panic.
     pub outcome: Result<Outcome, String>,
 }
 
 impl Run {
-    /// What became of it, unless it panicked.
+    /// Returns the outcome, unless the run panicked.
     #[must_use]
     pub fn outcome(&self) -> Option<&Outcome> {
         self.outcome.as_ref().ok()
     }
 
-    /// The exception that allows it to go undetected.
+    /// Returns the exception that allows the fault to go undetected.
     #[must_use]
     pub fn exception(&self) -> Option<&'static Exception> {
         let outcome = self.outcome().filter(|outcome| outcome.is_undetected())?;
         excepted(&self.faults, self.part, outcome.moved)
     }
 
-    /// A panic, or a fault that went undetected and is not on the list.
+    /// Returns whether the run panicked, or a fault went undetected that is not on the list.
     #[must_use]
     pub fn is_failure(&self) -> bool {
         self.outcome().is_none_or(|outcome| outcome.is_undetected() && self.exception().is_none())
     }
 }
 
-/// Every drive with every part, undamaged.
+/// Runs every drive with every part, undamaged.
 #[must_use]
 pub fn scenes<'d>(
     drives: &'d [Drive],
@@ -140,7 +140,7 @@ pub fn scenes<'d>(
     )
 }
 
-/// Runs the plan; `tick` is called after each run. The runs come in their order.
+/// Runs the plan and returns the runs in their order; `tick` is called after each of them.
 #[must_use]
 pub fn run(plan: Plan, scenes: &[Scene<'_>], blob: &Blob<'_>, tick: impl Fn() + Sync) -> Vec<Run> {
     on_threads(
@@ -156,7 +156,7 @@ pub fn run(plan: Plan, scenes: &[Scene<'_>], blob: &Blob<'_>, tick: impl Fn() + 
 }
 
 fn one(seed: u64, number: usize, scenes: &[Scene<'_>], networks: &mut Integer<'_>) -> Run {
-    let mut draw = Draw::new(seed, number as u64);
+    let mut draw = Random::new(seed, number as u64);
     let at = draw.below(scenes.len());
     let scene = &scenes[at];
     let last_state = scene.rows().saturating_sub(ROWS) / STATE_EVERY;
@@ -187,7 +187,7 @@ fn one(seed: u64, number: usize, scenes: &[Scene<'_>], networks: &mut Integer<'_
     Run { number, drive: scene.drive.name.clone(), part: scene.part, span, faults, outcome }
 }
 
-/// Does `count` things on some threads, each with a tool of its own; gives them in their order.
+/// Makes `count` things on some threads, each thread with a tool of its own, and returns them in their order.
 fn on_threads<W, T: Send>(
     threads: usize,
     count: usize,

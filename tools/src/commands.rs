@@ -1,4 +1,4 @@
-//! What the binary can do: one file for each subcommand, arguments in, text and files out, and what they share.
+//! The subcommands: one file for each, which reads arguments and writes text and files, and the code that they share.
 
 pub mod bench_target;
 pub mod bus;
@@ -23,19 +23,19 @@ mod weights;
 /// that names the file.
 pub type Result = std::result::Result<(), Box<dyn std::error::Error>>;
 
-/// For programs: as JSON, with a line end.
+/// Writes a value as JSON, with a line end.
 fn print_json(out: &mut impl std::io::Write, value: &impl serde::Serialize) -> Result {
     serde_json::to_writer_pretty(&mut *out, value).map_err(std::io::Error::from)?;
     Ok(writeln!(out)?)
 }
 
-/// A line for people beside the results, on standard error; not with --quiet.
+/// Writes a remark to standard error, unless --quiet is given.
 fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
     use std::io::Write;
     if common.quiet { Ok(()) } else { writeln!(std::io::stderr(), "{line}") }
 }
 
-/// What holds for all subcommands.
+/// The options of all subcommands.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Common {
     /// Print results and errors only: no progress, no remarks.
@@ -46,7 +46,7 @@ pub struct Common {
     pub json: bool,
 }
 
-/// A file that could not be written, named.
+/// The error of a file that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {source}")]
 struct WriteError {

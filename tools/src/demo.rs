@@ -1,4 +1,4 @@
-//! Everything that comes of one drive: what `gyronet demo` prints, and its page.
+//! All results of one drive: the summary that `gyronet demo` prints, and its page.
 
 pub mod board;
 mod can_excerpt;
@@ -19,18 +19,18 @@ pub use can_excerpt::Message;
 pub use costs::Cost;
 pub use trajectory::{Path, Trajectories};
 
-/// What came of a drive.
+/// The results of one drive.
 #[derive(Debug)]
 pub struct Demo<'a> {
     /// The drive.
     pub recording: &'a Recording,
-    /// Nobody drove it.
+    /// The drive is simulated.
     pub simulated: bool,
     /// Its yaw rates.
     pub rates: &'a Rates,
     /// Their errors, where the drive has a reference.
     pub errors: Option<&'a DriveErrors>,
-    /// Where each method sees the vehicle go, where the drive has wheels.
+    /// The path of the vehicle by each method, where the drive has wheels.
     pub trajectories: Option<Trajectories>,
     /// The messages of one sample.
     pub excerpt: Vec<Message>,
@@ -42,7 +42,7 @@ pub struct Demo<'a> {
     pub board: Outcome,
 }
 
-/// The same for programs.
+/// The results as JSON.
 #[derive(Debug, Serialize)]
 pub struct Summary<'a> {
     name: &'a str,
@@ -84,7 +84,7 @@ impl<'a> Demo<'a> {
         }
     }
 
-    /// For programs.
+    /// Returns the results for JSON.
     #[must_use]
     pub fn summary(&self) -> Summary<'_> {
         Summary {

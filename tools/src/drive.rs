@@ -2,6 +2,7 @@
 //! [`replay`] runs it through the coprocessor as the board would, and [`candump`] writes what was sent.
 
 pub mod candump;
+pub mod error;
 pub mod recording;
 pub mod replay;
 pub mod wheel_frames;

@@ -1,4 +1,5 @@
-//! The host's side of gyronet: recorded and simulated drives through the library, and what comes of them.
+//! The host's side of gyronet: tools that run recorded and simulated drives through the library and measure the
+//! results.
 //!
 //! Each product is one module, and an arrow below means "uses". The commands of the `gyronet` binary are
 //! thin adapters over these modules.
@@ -20,5 +21,6 @@ pub mod network;
 pub mod paper;
 pub mod parts;
 pub mod plot;
+mod random;
 pub mod simulate;
 pub mod target;

@@ -7,18 +7,18 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Learned yaw-rate correction on a host: the very code that is flashed, on recorded drives.
+/// Run gyronet on a host: recorded drives through the code that is flashed.
 ///
-/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header; columns in any order, other
-/// columns are ignored:
+/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header. Its columns may be in any order, and
+/// other columns are ignored:
 ///
 ///   t_s                    time, s
 ///   acc_x, acc_y, acc_z    specific force, m/s^2 (x forward, y left, z up)
 ///   gyr_x, gyr_y, gyr_z    angular rate, rad/s
-///   ref_gyr_z              true yaw rate, rad/s; optional, for errors
+///   ref_gyr_z              true yaw rate, rad/s; optional, needed for errors
 ///   wheel1_rate ..4        wheels, rad/s; optional (front right, rear right, front left, rear left)
 ///
-/// Its first 3 s must stand still.
+/// The vehicle must stand still for the first 3 s.
 #[derive(Debug, Parser)]
 #[command(
     name = "gyronet",
@@ -26,7 +26,7 @@ use std::process::ExitCode;
     arg_required_else_help = true,
     verbatim_doc_comment,
     after_help = "\
-Exit status: 0 done; 1 failed, or a check did not hold (the reason is on standard error); 2 wrong arguments.
+Exit status: 0 success; 1 failure or failed check (the reason is on standard error); 2 wrong arguments.
 Colours and progress appear on a terminal only; NO_COLOR=1 turns colours off."
 )]
 struct Cli {
@@ -75,7 +75,7 @@ fn main() -> ExitCode {
         Command::Soak(args) => commands::soak::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
-    // Who reads our output has seen enough: `gyronet replay FILE | head`.
+    // The reader of our output has closed it: `gyronet replay FILE | head`.
     let closed = |error: &std::io::Error| error.kind() == ErrorKind::BrokenPipe;
     if error.downcast_ref().is_some_and(closed) {
         return ExitCode::SUCCESS;

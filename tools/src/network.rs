@@ -2,7 +2,6 @@
 //! that this adds ([`quantization_error`]).
 
 pub mod checkpoint;
-pub mod fog_checkpoint;
 pub mod quantization_error;
 pub mod quantize;
 pub mod tensors;

@@ -1,39 +1,43 @@
-//! A recording through the bytes of a part: its samples encoded as the part would send them,
-//! and read back by the parser that the board runs.
+//! The sensors that a vehicle may have, and what each of them sends.
+//!
+//! A recording goes through the bytes of a part: its samples are encoded as the part would send them and read back by
+//! the parser that the board runs. The fault campaign damages the same bytes.
 //!
 //! | part | what is sent | what is rounded |
 //! |---|---|---|
 //! | Xsens MTi | an MTData2 message a row, single precision | nothing: every code is an f32 |
 //! | KVH DSP-1760 | ten increments a row about each axis; accelerometer as recorded | f32 increments, the code of their sum |
 //! | ICM-42688-P | a 20-bit FIFO packet a row, over a simulated SPI bus | 1/131 deg/s, 1/8192 g |
+//! | ADIS16465-2 | a burst a row, over a simulated SPI bus | 1/40 deg/s, 1/4000 g |
 
+pub(crate) mod adis16465;
 pub mod compare;
 pub(crate) mod dsp1760;
 pub(crate) mod icm42688;
-mod xsens;
+pub(crate) mod xsens;
 
 use crate::drive::recording::{Recording, Row};
 use gyronet::sample::ImuSample;
 use gyronet::units::{AngularRate, SpecificForce};
 
-/// A part that a recording can be sent through.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+/// A sensor of the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Part {
-    /// Xsens MTi: MTData2 in single precision.
+    /// Xsens MTi: MTData2 in single precision, an 8-bit sum.
     Xsens,
-    /// KVH DSP-1760: increments at 1 kHz, summed on the grid beside the recorded accelerometer.
+    /// KVH DSP-1760: increments at 1 kHz with a CRC-32, beside the recorded accelerometer.
     Dsp1760,
-    /// TDK ICM-42688-P: FIFO packets of 20 bits over SPI.
+    /// TDK ICM-42688-P: FIFO packets of 20 bits over SPI, no checksum.
     Icm42688,
+    /// ADIS16465-2: bursts of 16 bits over SPI, a 16-bit sum.
+    Adis16465,
 }
 
 impl std::fmt::Display for Part {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Xsens => "Xsens MTi",
-            Self::Dsp1760 => "KVH DSP-1760",
-            Self::Icm42688 => "ICM-42688-P",
-        })
+        let maker = if *self == Self::Dsp1760 { "KVH " } else { "" };
+        write!(f, "{maker}{}", self.name())
     }
 }
 
@@ -46,7 +50,7 @@ pub struct Quantisation {
     pub force: f64,
 }
 
-/// Why a recording does not come back from a part whole.
+/// The error of a recording that does not come back from a part.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ViaError {
@@ -59,7 +63,7 @@ pub enum ViaError {
         line: u64,
         /// The part.
         part: Part,
-        /// What its parser says.
+        /// The parser's error.
         why: String,
     },
     /// The part did not start.
@@ -67,7 +71,7 @@ pub enum ViaError {
     NoStart {
         /// The part.
         part: Part,
-        /// What its driver says.
+        /// The driver's error.
         why: String,
     },
 }
@@ -75,7 +79,7 @@ pub enum ViaError {
 /// A recording that has been through a part.
 #[derive(Debug, Clone)]
 pub struct Via {
-    /// The same rows, with the samples that the part's parser delivered.
+    /// The rows with the samples that the part's parser delivered.
     pub recording: Recording,
     /// The part's steps.
     pub quantisation: Quantisation,
@@ -84,6 +88,20 @@ pub struct Via {
 }
 
 impl Part {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Xsens, Self::Dsp1760, Self::Icm42688, Self::Adis16465];
+
+    /// The name in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Xsens => "Xsens MTi",
+            Self::Dsp1760 => "DSP-1760",
+            Self::Icm42688 => "ICM-42688-P",
+            Self::Adis16465 => "ADIS16465",
+        }
+    }
+
     /// Sends a recording through the part.
     ///
     /// # Errors
@@ -93,6 +111,7 @@ impl Part {
             Self::Xsens => xsens::send(recording)?,
             Self::Dsp1760 => dsp1760::send(recording)?,
             Self::Icm42688 => icm42688::send(recording)?,
+            Self::Adis16465 => adis16465::send(recording)?,
         };
         let rows = recording.rows.iter().zip(samples).map(|(row, sample)| Row { sample, ..*row }).collect();
         Ok(Via {
@@ -121,6 +140,13 @@ impl Part {
                 rate: icm42688::RATE_STEP + rate_code + 3.0 * ulp * peak,
                 force: icm42688::FORCE_STEP + force_code + 3.0 * ulp * peak_force,
             },
+            Self::Adis16465 => {
+                let [rate, force] = adis16465::steps();
+                Quantisation {
+                    rate: rate + rate_code + 3.0 * ulp * peak,
+                    force: force + force_code + 3.0 * ulp * peak_force,
+                }
+            }
         }
     }
 
@@ -136,5 +162,5 @@ pub fn mti_bytes(recording: &Recording) -> Vec<Vec<u8>> {
     xsens::messages(recording).collect()
 }
 
-/// What a part delivered for each row, and the bytes that it took.
+/// The sample of each row from a part, and the number of bytes that they took.
 type Sent = (Vec<ImuSample>, u64);

@@ -22,7 +22,7 @@ pub mod layout;
 pub mod leg;
 pub mod mems;
 pub mod odometer;
-mod random;
+mod purpose;
 pub mod route;
 pub mod town;
 pub mod vehicles;
@@ -34,16 +34,16 @@ use car::Car;
 use mems::Mems;
 use vibration::Vibration;
 
-/// What to simulate.
+/// The parameters of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Length, s.
     pub seconds: u32,
-    /// Which route, road and part.
+    /// Seed of the route, the road and the part.
     pub seed: u64,
     /// The car.
     pub car: car::Config,
-    /// How it shakes.
+    /// The vibration.
     pub vibration: vibration::Config,
     /// The part.
     pub mems: mems::Config,
@@ -60,14 +60,14 @@ impl Config {
     };
 }
 
-/// One sample of a simulated drive: x forward, y left, z up, but for the part's tilt.
+/// A sample of a simulated drive: x forward, y left, z up, but for the part's tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Since the start, s.
     pub seconds: f64,
-    /// As measured, m/s^2.
+    /// The measured specific force, m/s^2.
     pub specific_force: [f64; 3],
-    /// As measured, rad/s.
+    /// The measured angular rate, rad/s.
     pub angular_rate: [f64; 3],
     /// The truth, rad/s.
     pub reference: [f64; 3],
@@ -87,7 +87,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// At rest.
+    /// Starts at rest.
     #[must_use]
     pub fn new(config: &Config) -> Self {
         Self {

@@ -32,7 +32,7 @@ fn every_help_begins_with_one_line_and_ends_with_examples() {
         let without_files = ["bus", "bench-target", "size"];
         assert!(help.contains("Examples:") || without_files.contains(&name.as_str()), "{name}");
     }
-    assert!(text(&gyronet(&["--help"]).stdout).contains("Exit status: 0 done; 1 failed"));
+    assert!(text(&gyronet(&["--help"]).stdout).contains("Exit status: 0 success; 1 failure"));
 }
 
 #[test]

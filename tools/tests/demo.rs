@@ -52,7 +52,10 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
 fn a_drive_without_reference_and_wheels_has_no_errors_and_no_path() {
     let mut csv = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
     for k in 0..600 {
-        csv += &format!("{:.2},0.0{},0,9.8,0,0,0.001\n", 0.01 * f64::from(k), k % 7);
+        // Every axis flickers as a sensor does; equal readings are stuck ones.
+        let noise = 1e-3 * f64::from(k % 3 - 1);
+        let (time, up, yaw_rate) = (0.01 * f64::from(k), 9.8 + 10.0 * noise, 0.001 + noise);
+        csv += &format!("{time:.2},{noise},{noise},{up},{noise},{noise},{yaw_rate}\n");
     }
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bare <drive>.csv");
     std::fs::write(&file, csv).unwrap();

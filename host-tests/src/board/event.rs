@@ -41,7 +41,7 @@ impl Event {
     }
 }
 
-/// What a board has done since its first power-on.
+/// The counts of a board since its first power-on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counts {
     /// Instructions that ran.
@@ -50,9 +50,9 @@ pub struct Counts {
     pub time: Duration,
     /// Part of it that the core slept.
     pub asleep: Duration,
-    /// Whether there is power.
+    /// True while there is power.
     pub powered: bool,
-    /// Whether the core has locked up after a fault in a fault handler.
+    /// True once the core has locked up after a fault in a fault handler.
     pub locked_up: bool,
     /// Accesses to the flash that [`super::Board::cut_after`] still waits for.
     pub accesses_left: usize,

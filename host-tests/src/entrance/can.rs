@@ -10,7 +10,7 @@ use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage};
 use gyronet::sample::Standstill;
-use gyronet::units::{Micros, WheelSpeed};
+use gyronet::units::{Duration, Micros, WheelSpeed};
 
 const ID: Id = Id::Standard(StandardId::new(0xAA).expect("of eleven bits"));
 const OTHER: Id = Id::Extended(ExtendedId::new(0x18FE_BF0B).expect("of 29 bits"));
@@ -51,9 +51,9 @@ pub fn wheels(mut data: &[u8]) {
     let own = two_wheels(ID, checksum);
     let settings = WheelSettings {
         frames: [Some(own), None, None, None],
-        timeout_us: 50_000,
+        timeout: Duration(50_000),
         still_speed: WheelSpeed(655),
-        still_for_us: 200_000,
+        still_for: Duration(200_000),
     };
     let settings = if choice & 0x80 == 0 { settings } else { WheelSettings::TOYOTA };
     let mut receiver = WheelReceiver::new(settings).expect("settings of ours");
@@ -82,10 +82,7 @@ pub fn wheels(mut data: &[u8]) {
             |speed: Option<WheelSpeed>| speed.is_none_or(|speed| speed.0.abs() <= settings.still_speed.0);
         assert!(sample.standstill != Standstill::Still || sample.speeds.into_iter().all(slow));
         let mut later = receiver;
-        assert_eq!(
-            later.poll(Micros(now + settings.timeout_us + 1)).map(|late| late.speeds),
-            Some([None; 4])
-        );
+        assert_eq!(later.poll(Micros(now + settings.timeout.0 + 1)).map(|late| late.speeds), Some([None; 4]));
     }
 }
 

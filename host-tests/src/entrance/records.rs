@@ -21,9 +21,6 @@ pub fn flash(mut data: &[u8]) {
     let mut store = Store::open(flash, 0, false).expect("the flash answers");
     let calibration = store.get::<Calibration>().ok().flatten().unwrap_or_default();
     calibration.check().expect("what is read was checked");
-    for temperature in [i16::MIN, 0, 2_500, i16::MAX] {
-        let _ = calibration.bias_at(Some(CentiCelsius(temperature)));
-    }
     if let Ok(Some(configuration)) = store.get::<Configuration>() {
         configuration.check().expect("what is read was checked");
         run(&configuration, &calibration);

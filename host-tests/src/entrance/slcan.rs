@@ -64,7 +64,7 @@ pub fn host(data: &[u8]) {
     let mut splitter = Splitter::default();
     let mut monitor = Monitor::new(&Config::DEFAULT);
     for (k, byte) in data.iter().enumerate() {
-        let Some(line) = splitter.push(*byte) else { continue };
+        let Some(line) = splitter.feed(*byte) else { continue };
         let _ = monitor.take_line(&line, k as f64 * 1e-3);
         if let Ok((_, frame)) = parse_line(&line) {
             let line = emit(&frame).expect("a data frame");

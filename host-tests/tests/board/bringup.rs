@@ -106,3 +106,30 @@ fn sensor_missing_and_sector_in_use() {
     assert!(verdict == "----" && text.starts_with("no ICM-42688-P answers"), "{verdict} {text}");
     assert_eq!(check(&lines, "flash"), ("----", "sector 11 holds a weight file: not tried"));
 }
+
+#[test]
+fn panic_leaves_its_reason_on_the_line_and_starts_again() {
+    const TEST: &str = "panic_leaves_its_reason_on_the_line_and_starts_again";
+    /// A place in memory that the image does not use, for the panic's location: file, its length, line, column.
+    const LOCATION: u32 = 0x1000_0000;
+    const FILE: &[u8] = b"src/provoked.rs";
+    let Some(elf) = image::firmware(TEST, env!("CARGO_TARGET_TMPDIR"), "bringup") else { return };
+    let Some(mut board) = Board::boot(TEST, &elf) else { return };
+    board.run(Duration::from_millis(300));
+    let _ = (board.sent(REPORT), board.events());
+    let location = [LOCATION + 16, FILE.len() as u32, 42, 7].map(u32::to_le_bytes).concat();
+    board.patch(At::Address(LOCATION), &[&location, FILE].concat());
+    // The image calls this where a cell is borrowed twice.
+    let (panic, _) = board.symbol("panic_already_borrowed");
+    board.set_register("r0", LOCATION);
+    board.set_register("pc", panic);
+    let reset = board.run_until("reset", SECOND);
+    let text = String::from_utf8(board.sent(REPORT)).expect("text");
+    println!("{text}");
+    assert!(reset.is_some(), "it starts again");
+    assert!(text.contains("bringup      FAIL  panicked at src/provoked.rs:42:7"), "{text}");
+    assert_eq!(
+        board.events().last().map(|event| event.text("cause").to_owned()).as_deref(),
+        Some("software")
+    );
+}

@@ -1,7 +1,7 @@
 //! CAN on the virtual board: what goes out is what the host makes, what comes in is heard, and a bus that is
 //! away gets nothing old when it is back.
 
-use crate::common::{self, SAMPLE, SET, START, boot, counters, drive, frames, host, resets};
+use crate::common::{self, SAMPLE, SET, SLCAN, START, boot, counters, drive, frames, host, resets};
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::yaw::{AngleMessage, RateMessage};
@@ -157,6 +157,37 @@ fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
     let later = flags(&frames(&board.can_frames()));
     println!("wheels: {} of {} sets without wheels; then {}", silent, faults.len(), later.len());
     assert!(silent < 3, "{silent} of {} sets miss the wheels", faults.len());
+}
+
+/// The status byte that SLCAN answers to `F`.
+fn status(board: &mut Board) -> String {
+    let _ = board.sent(SLCAN);
+    board.send(SLCAN, b"F\r");
+    board.run(2 * MS);
+    let text = String::from_utf8(board.sent(SLCAN)).expect("ASCII");
+    // An answer is sent between two frames.
+    let status = text.split('\r').find_map(|line| line.strip_prefix('F'));
+    status.unwrap_or_else(|| panic!("no status in {text:?}")).to_owned()
+}
+
+#[test]
+fn slcan_reports_warning_passive_and_bus_off() {
+    let Some(mut board) = boot("slcan_reports_warning_passive_and_bus_off") else { return };
+    common::send(&mut board, &drive(80), START);
+    board.run(START + 50 * MS);
+    assert_eq!(status(&mut board), "00");
+    // Each attempt adds 8 to the error counter, up to 128: passive. Each frame that gets through takes 1 off.
+    board.configure("CAN1.acknowledge", false);
+    board.run(50 * MS);
+    assert_eq!(status(&mut board), "20", "passive from 128 on");
+    board.configure("CAN1.acknowledge", true);
+    board.run(20 * MS);
+    assert_eq!(status(&mut board), "04", "warning from 96 on");
+    board.run(200 * MS);
+    assert_eq!(status(&mut board), "00");
+    board.configure("CAN1.short", "recessive");
+    board.run(20 * MS);
+    assert_eq!(status(&mut board), "80", "off the bus");
 }
 
 #[test]

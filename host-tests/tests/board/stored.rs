@@ -111,6 +111,22 @@ fn invalid_configuration_is_refused_and_changes_nothing() {
 }
 
 #[test]
+fn stale_error_flags_of_the_flash_controller_refuse_no_store() {
+    /// OPERR, WRPERR, PGAERR, PGPERR and PGSERR of FLASH_SR, as an operation before this image may leave them.
+    const ERRORS: u32 = 0xF2;
+    let Some(mut board) = common::boot("stale_error_flags_of_the_flash_controller_refuse_no_store") else {
+        return;
+    };
+    board.run(START);
+    board.configure("FLASH.error_flags", ERRORS);
+    assert_eq!(ask(&mut board, &storing(latitude(3))), Ok(Reply::Done));
+    board.configure("FLASH.error_flags", ERRORS);
+    assert_eq!(ask(&mut board, &storing(latitude(4))), Ok(Reply::Done), "where no sector is erased");
+    restart(&mut board);
+    assert_eq!(service::configuration(&mut board), latitude(4));
+}
+
+#[test]
 fn board_time_goes_on_over_an_erase() {
     const TEST: &str = "board_time_goes_on_over_an_erase";
     let Some(mut board) = common::boot(TEST) else { return };

@@ -13,7 +13,7 @@ use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{image, qemu, replay};
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -75,7 +75,7 @@ fn compare(test: &str, elf: &Path, arguments: &[&str], bytes: &[u8]) {
 fn wire_against_file(path: &Path) {
     let recording = Recording::read(path).expect("a recording");
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-    let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
+    let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
         .expect("it stands still first");
     let mut encoder = CanEncoder::new(replay::CONFIG);
     let file: Vec<DataFrame> = drive.steps.iter().flat_map(|step| encoder.encode(&step.vehicle)).collect();

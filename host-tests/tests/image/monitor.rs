@@ -119,7 +119,7 @@ fn lines_of_a_log_are_frames_or_refused() {
 fn bytes_become_lines() {
     let mut splitter = Splitter::default();
     let bytes = [&b"V0101\r\r\x07t1230\r\n"[..], &[b'x'; 1_000_000], b"\rN\r", b"\xFF\r", b"no end"].concat();
-    let lines: Vec<String> = bytes.iter().filter_map(|byte| splitter.push(*byte)).collect();
+    let lines: Vec<String> = bytes.iter().filter_map(|byte| splitter.feed(*byte)).collect();
     let long = "x".repeat(128);
     assert_eq!(lines, ["V0101", "t1230", &long, "N", "\u{FFFD}"]);
 }

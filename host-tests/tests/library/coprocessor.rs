@@ -15,7 +15,7 @@ use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::DueWindow;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill};
-use gyronet::units::{Angle, AngularRate, Micros};
+use gyronet::units::{Angle, AngularRate, Duration, Micros};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::idling;
@@ -154,7 +154,7 @@ fn a_clock_that_goes_back_is_an_error_and_followed_from_there() {
     for _ in 0..400 {
         let _ = car.sample();
     }
-    let back = Err(InputError::ClockWentBack { by_us: 1_000_000 });
+    let back = Err(InputError::ClockWentBack { by: Duration(1_000_000) });
     assert_eq!(car.coprocessor.poll(Micros(at(car.tick).0 - 1_000_000)), back);
     assert_eq!(car.counted().clock_back, 1);
     // 20 ms later by the clock that was set back nothing is missing yet; 30 ms later the sensor is silent.

@@ -10,7 +10,7 @@ use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init};
 use gyronet::pipeline::Output;
 use gyronet::sample::PERIOD_US;
-use gyronet::units::{Micros, WheelSpeed};
+use gyronet::units::{Duration, Micros, WheelSpeed};
 use gyronet_host_tests::stream::{faults, new, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
 
@@ -31,9 +31,9 @@ fn receiver() -> WheelReceiver {
     };
     WheelReceiver::new(WheelSettings {
         frames: [Some(frame), None, None, None],
-        timeout_us: TIMEOUT,
+        timeout: Duration(TIMEOUT),
         still_speed: WheelSpeed(0),
-        still_for_us: 500_000,
+        still_for: Duration(500_000),
     })
     .expect("two wheels")
 }

@@ -8,7 +8,7 @@ use gyronet::can::wheel::{
     Checksum, WheelConfigError, WheelError, WheelFrame, WheelReceiver, WheelSettings, WheelSignal,
 };
 use gyronet::sample::Standstill;
-use gyronet::units::{Micros, WheelSpeed};
+use gyronet::units::{Duration, Micros, WheelSpeed};
 use proptest::prelude::*;
 
 const MS: u64 = 1000;
@@ -46,9 +46,9 @@ fn two_wheels(checksum: Checksum) -> WheelFrame {
 fn settings(frame: WheelFrame) -> WheelSettings {
     WheelSettings {
         frames: [Some(frame), None, None, None],
-        timeout_us: 50 * MS,
+        timeout: Duration(50 * MS),
         still_speed: WheelSpeed(655),
-        still_for_us: 200 * MS,
+        still_for: Duration(200 * MS),
     }
 }
 

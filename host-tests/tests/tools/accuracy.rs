@@ -21,7 +21,7 @@ const SCALE: f64 = 0.02;
 /// 1 s yaw error over that of static initialisation, trials 09 and 11, by `cargo gyronet evaluate`: the README's rows of
 /// what is sent. A change for the worse by more than [`WORSE`] fails, and one for the better is worth a new number.
 const HEADLINE: [(Method, [f64; 2]); 2] =
-    [(Method::Prompt, [1.100, 0.687]), (Method::Default, [0.711, 0.491])];
+    [(Method::PROMPT, [1.100, 0.687]), (Method::NAVIGATION, [0.711, 0.491])];
 const WORSE: f64 = 0.05;
 
 #[test]
@@ -41,7 +41,7 @@ fn rates_are_as_good_as_the_readme_says() {
             rates.rates.map(|rates| YawError::new(rates, reference).expect("whole seconds").mean_1s_rad);
         let (mut rows, mut failures) = (String::new(), Vec::new());
         for (method, readme) in HEADLINE {
-            let (ratio, due) = (errors[method] / errors[Method::Static], readme[*drive]);
+            let (ratio, due) = (errors[method] / errors[Method::STATIC], readme[*drive]);
             let trial = TRIALS[*drive];
             rows += &format!("{trial:02}      {method:?}   {ratio:.3}   {due:.3}\n");
             if ratio > due * (1.0 + WORSE) {
@@ -65,13 +65,13 @@ fn judge(trial: u32, path: &Path) -> (String, Vec<String>) {
     let rates = Rates::new(&recording, &mut float, &mut both, || {}).expect("it stands still first");
     let reference = rates.reference.as_ref().expect("the trials have a reference");
     let errors = rates.rates.map(|rates| YawError::new(rates, reference).expect("whole seconds").mean_1s_rad);
-    let ratio = errors[Method::GyronetInt] / errors[Method::GyronetF32];
+    let ratio = errors[Method::GYRONET_INT] / errors[Method::GYRONET_F32];
     let difference = both.error();
     let row = format!(
         "{trial:02}      {:.6}  {:.6}  {:.6}  {ratio:.4}      {:.4}     {:.4}   {:6}  {:7}\n",
-        errors[Method::Static],
-        errors[Method::GyronetF32],
-        errors[Method::GyronetInt],
+        errors[Method::STATIC],
+        errors[Method::GYRONET_F32],
+        errors[Method::GYRONET_INT],
         difference.relative_rms(),
         difference.scale_rms(),
         difference.windows,

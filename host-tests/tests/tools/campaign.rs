@@ -7,10 +7,10 @@ use gyronet_tools::campaign::drive::Drive;
 use gyronet_tools::campaign::fault::{Axes, Fault, Kind, Line, Span};
 use gyronet_tools::campaign::judge::Outcome;
 use gyronet_tools::campaign::networks::Integer;
-use gyronet_tools::campaign::part::Part;
 use gyronet_tools::campaign::report::Report;
 use gyronet_tools::campaign::scene::Scene;
 use gyronet_tools::campaign::{self, Plan, QUICK};
+use gyronet_tools::parts::Part;
 
 fn drive() -> Drive {
     Drive::new(&bundled::simulated_drive().expect("it comes with the tools"))
@@ -37,7 +37,8 @@ fn no_fault_moves_yaw_unseen() {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let scenes = campaign::scenes(&drives, &blob(), threads, || {});
     for scene in &scenes {
-        let good = scene.baseline.good_share();
+        let seconds = scene.baseline.against_truth().expect("a reference").seconds;
+        let good = 100.0 * seconds as f64 / scene.rows() as f64;
         assert!(good > 0.9, "{}: {good} of the undamaged drive is good", scene.part.name());
         let undamaged = outcome(scene, None);
         let seen = (undamaged.told_after, undamaged.counted, undamaged.moved, undamaged.grown);

@@ -5,12 +5,12 @@ use gyronet::model::fognet_blob::{HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogLayerOutputs;
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
-use gyronet_tools::network::fog_checkpoint::FogCheckpoint;
+use gyronet_tools::network::checkpoint::{Checkpoint, FogNet};
 
 #[test]
 fn every_layer_equals_pytorch() {
     let path = workspace().join("tools/weights/fognet.safetensors");
-    let checkpoint = FogCheckpoint::read(&path).expect("the committed checkpoint");
+    let checkpoint = Checkpoint::<FogNet>::read(&path).expect("the committed checkpoint");
     let network = checkpoint.network();
     let golden = Golden::read("fognet");
 

@@ -6,7 +6,7 @@ use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet::odometry::Track;
 use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
-use gyronet_tools::paper::fog_drive;
+use gyronet_tools::paper::fog_replay;
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set, Spec};
 use std::path::Path;
@@ -39,7 +39,7 @@ fn fognet_brings_dead_reckoning_nearer_to_the_true_path() {
     let sequence = simulated();
     let mut state = FogNetState::ZERO;
     let mut network = FogNet::new(FogBlob::new_checked(&weights::FOGNET.0).expect("checked"), &mut state);
-    let drive = fog_drive::run(&sequence, &mut network, FogConfig::DEFAULT, || {});
+    let drive = fog_replay::run(&sequence, &mut network, FogConfig::DEFAULT, || {});
     assert!((u64::from(SECONDS) - 5..=u64::from(SECONDS)).contains(&drive.windows), "{}", drive.windows);
     assert_eq!([drive.implausible, drive.broken, drive.clamped_inputs], [0; 3]);
     let alone = error(&sequence, sequence.steps.iter().map(|step| step.fog));

@@ -7,12 +7,12 @@ use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
-use gyronet_tools::network::checkpoint::Checkpoint;
+use gyronet_tools::network::checkpoint::{self, Checkpoint};
 
 #[test]
 fn every_layer_equals_pytorch() {
     let path = workspace().join("tools/weights/gyronet.safetensors");
-    let checkpoint = Checkpoint::read(&path).expect("the committed checkpoint");
+    let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&path).expect("the committed checkpoint");
     let network = checkpoint.network();
     let golden = Golden::read("gyronet");
 

@@ -11,7 +11,7 @@ use gyronet_host_tests::stream;
 use gyronet_host_tests::synthetic::{force, rate, turning};
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use proptest::prelude::*;
 
@@ -43,7 +43,7 @@ fn yaw_rates(recording: &Recording, mounting: Rotation, levelling: Levelling) ->
     let config = PipelineConfig { mounting, levelling, ..PipelineConfig::DEFAULT };
     let mut network =
         GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-    let drive = Drive::run(recording, &config, WheelFrames::new(recording), &mut network, || {});
+    let drive = Replay::run(recording, &config, WheelFrames::new(recording), &mut network, || {});
     drive.expect("it stands still first").navigation().map(|rate| rate.rate.rad_per_sec()).collect()
 }
 

@@ -5,10 +5,11 @@ use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled::SIMULATED_DRIVE;
-use gyronet_tools::drive::recording::{Recording, RecordingError, ValueError};
-use gyronet_tools::drive::replay::{Drive, DriveError};
+use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::{Replay, ReplayError};
 
-fn parse(text: &str) -> Result<Recording, RecordingError> {
+fn parse(text: &str) -> Result<Recording, DataError> {
     Recording::parse("drive.csv", text.as_bytes())
 }
 
@@ -33,9 +34,9 @@ fn cut(text: &str, skip: usize) -> String {
     format!("{header}\n{}\n", rows.join("\n"))
 }
 
-fn run(recording: &Recording) -> Result<Drive, DriveError> {
+fn run(recording: &Recording) -> Result<Replay, ReplayError> {
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-    Drive::run(recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
+    Replay::run(recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
 }
 
 #[test]
@@ -48,13 +49,10 @@ fn the_drive_itself_is_good() {
 fn missing_columns_are_named() {
     for missing in ["t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"] {
         let error = parse(&with(400, 1, missing, "other")).expect_err("a column is missing");
-        assert!(
-            matches!(error, RecordingError::MissingColumn { column, .. } if column == missing),
-            "{error}"
-        );
+        assert!(matches!(error.fault, DataFault::MissingColumn(column) if column == missing), "{error}");
         assert_eq!(error.to_string(), format!("drive.csv: column {missing} is missing"));
     }
-    assert!(matches!(parse(""), Err(RecordingError::Empty { .. })));
+    assert!(matches!(parse(""), Err(DataError { fault: DataFault::Empty, .. })));
 }
 
 #[test]
@@ -71,13 +69,13 @@ fn fields_that_are_no_reading_are_named() {
         let error = parse(&with(400, 123, "gyr_z", field)).expect_err("it is no reading");
         if field == "1,5" {
             // A decimal comma is a field too many.
-            assert!(matches!(error, RecordingError::Fields { line: 123, .. }), "{error}");
+            assert!(
+                matches!(error, DataError { line: Some(123), fault: DataFault::Fields { .. }, .. }),
+                "{error}"
+            );
             continue;
         }
-        assert!(
-            matches!(error, RecordingError::Value { line: 123, column: "gyr_z", error, .. } if error == expected),
-            "{error}"
-        );
+        assert!(matches!(error.fault, DataFault::Value { error, .. } if error == expected), "{error}");
         assert_eq!(error.to_string(), format!("drive.csv: line 123, column gyr_z: {field:?} is {text}"));
     }
 }
@@ -89,7 +87,7 @@ fn time_that_does_not_rise_is_refused() {
         ("1.20", "drive.csv: line 123: time goes nowhere from 1.2000 s to 1.2000 s"),
     ] {
         let error = parse(&with(400, 123, "t_s", field)).expect_err("time does not rise");
-        assert!(matches!(error, RecordingError::Time { line: 123, .. }), "{error}");
+        assert!(matches!(error, DataError { line: Some(123), fault: DataFault::Time { .. }, .. }), "{error}");
         assert_eq!(error.to_string(), text);
     }
 }
@@ -97,17 +95,17 @@ fn time_that_does_not_rise_is_refused() {
 #[test]
 fn less_than_three_seconds_are_refused() {
     let error = parse(&with(299, 1, "t_s", "t_s")).expect_err("2.99 s are too short");
-    assert!(matches!(error, RecordingError::TooShort { .. }), "{error}");
+    assert!(matches!(error.fault, DataFault::TooShort { .. }), "{error}");
     assert_eq!(error.to_string(), "drive.csv: is 2.99 s long, static initialisation alone needs 3 s");
     assert!(parse(&with(300, 1, "t_s", "t_s")).is_ok());
-    assert!(matches!(parse(&with(0, 1, "t_s", "t_s")), Err(RecordingError::Empty { .. })));
+    assert!(matches!(parse(&with(0, 1, "t_s", "t_s")), Err(DataError { fault: DataFault::Empty, .. })));
 }
 
 #[test]
 fn a_simulated_drive_that_starts_moving_is_refused() {
     // With its wheel rates the recording itself is refused.
     let error = parse(&cut(SIMULATED_DRIVE, 2_000)).expect_err("the car drives");
-    assert!(matches!(error, RecordingError::Moving { .. }), "{error}");
+    assert!(matches!(error.fault, DataFault::Moving { .. }), "{error}");
     assert!(error.to_string().starts_with("drive.csv: starts moving: line "), "{error}");
 }
 
@@ -122,10 +120,10 @@ fn real_drives_that_start_moving_are_refused() {
         for skip in (3_000..9_000).step_by(500) {
             let place = format!("{} from row {skip}", path.display());
             let error = parse(&cut(&text, skip)).expect_err(&place);
-            assert!(matches!(error, RecordingError::Moving { .. }), "{place}: {error}");
+            assert!(matches!(error.fault, DataFault::Moving { .. }), "{place}: {error}");
             let recording = parse(&cut(&without_wheels, skip)).expect("nothing else is wrong with it");
             let error = run(&recording).expect_err(&place);
-            assert!(matches!(error, DriveError::StartsMoving { line: 301, .. }), "{place}: {error}");
+            assert!(matches!(error, ReplayError::StartsMoving { line: 301, .. }), "{place}: {error}");
             let start =
                 "drive.csv: starts moving: line 301: the vehicle moves during static initialisation: ";
             assert!(error.to_string().starts_with(start), "{error}");

@@ -8,19 +8,17 @@ use gyronet::units::{AngularRate, Micros};
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::{Recording, Row};
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::parts::compare::{Bound, Difference};
 use gyronet_tools::parts::{Part, Quantisation, Via};
-
-const PARTS: [Part; 3] = [Part::Xsens, Part::Dsp1760, Part::Icm42688];
 
 fn network() -> GyroNet<'static> {
     GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"))
 }
 
-fn drive(recording: &Recording) -> Drive {
-    Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), &mut network(), || {})
+fn drive(recording: &Recording) -> Replay {
+    Replay::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), &mut network(), || {})
         .expect("it stands still first")
 }
 
@@ -45,7 +43,7 @@ fn same_time_and_place(one: &Row, other: &Row) -> bool {
 /// Replays one recording through all parts.
 fn check(recording: &Recording) {
     let direct = drive(recording);
-    for part in PARTS {
+    for part in Part::ALL {
         let via = part.send(recording).expect("every row comes back");
         assert_eq!(via.recording.rows.len(), recording.rows.len());
         assert!(recording.rows.iter().zip(&via.recording.rows).all(|(a, b)| same_time_and_place(a, b)));
@@ -119,7 +117,7 @@ fn gaps_and_jitter_come_back_as_they_are() {
         row.sample.time = Micros((u64::from(u32::MAX) * 100 / PERIOD_US + n + gaps) * PERIOD_US + jitter);
         row.sample.validity = Validity::reported(n == 1_500);
     }
-    for part in PARTS {
+    for part in Part::ALL {
         let via = part.send(&recording).expect("every row comes back");
         for (row, back) in recording.rows.iter().zip(&via.recording.rows) {
             // An ICM-42688-P counts 32/30 us.

@@ -19,7 +19,7 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::{Drive, Step};
+use gyronet_tools::drive::replay::{Replay, Step};
 use gyronet_tools::evaluate::metrics::YawError;
 use std::path::Path;
 
@@ -109,7 +109,7 @@ impl Rates {
     fn new(recording: &Recording, seen: Unit) -> Self {
         let network =
             GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-        let drive = Drive::run(recording, &PipelineConfig::DEFAULT, None, &mut Seen(network, seen), || {});
+        let drive = Replay::run(recording, &PipelineConfig::DEFAULT, None, &mut Seen(network, seen), || {});
         let drive = drive.expect("it stands still first");
         let steps = &drive.steps[drive.start..];
         let reference = steps.iter().map(|step| recording.rows[step.row].reference);

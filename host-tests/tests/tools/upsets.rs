@@ -5,9 +5,9 @@ use gyronet::model::{Blob, weights};
 use gyronet_tools::bundled;
 use gyronet_tools::campaign::drive::Drive;
 use gyronet_tools::campaign::networks::Integer;
-use gyronet_tools::campaign::part::Part;
 use gyronet_tools::campaign::scene::Scene;
 use gyronet_tools::campaign::weight_upsets::WeightUpsets;
+use gyronet_tools::parts::Part;
 
 const BITS: usize = 1_000;
 const SEED: u64 = 1;

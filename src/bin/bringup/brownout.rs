@@ -12,7 +12,7 @@ const LEVEL_3: u8 = 0b00;
 /// Polls before the option bytes are given up; they take as long as an erase of 16 KiB.
 const POLLS: u32 = 20_000_000;
 
-/// Whether the option byte holds level 3.
+/// Returns whether the option byte holds level 3.
 pub fn is_level_3(flash: &pac::FLASH) -> bool {
     flash.optcr().read().bor_lev().bits() == LEVEL_3
 }

@@ -9,7 +9,7 @@ use core::fmt::{self, Write};
 /// Polls before a byte is given up: several byte times at 115200.
 const POLLS: u32 = 100_000;
 
-/// Where lines go.
+/// The place where lines go.
 pub struct Report {
     usart: Usart,
     failed: u32,

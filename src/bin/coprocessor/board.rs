@@ -55,10 +55,10 @@ pub struct Board {
     /// The CAN controller; `None` where it does not answer, or the clock is not exact enough.
     pub can: Option<Can>,
     pub spi: Spi,
-    /// Whether the board is emulated without a clock tree: its sensors send at the host's pace.
+    /// True where the board is emulated without a clock tree: its sensors send at the host's pace.
     pub emulated: bool,
     pub clocks: Clocks,
-    /// What the board reports of itself.
+    /// The board's report of itself.
     pub identity: Identity,
 }
 

@@ -1,50 +1,76 @@
 //! FoGNet in idle time: a piece of its window with every turn.
 
 use gyronet::coprocessor::Coprocessor;
+use gyronet::fog::seconds::WindowCopy;
 use gyronet::model::FogNet;
 use gyronet::model::fognet::FogEstimate;
 
-/// The network, and the number of the window that it works on.
+/// The network with its working memory.
+pub struct FogParts {
+    pub network: FogNet<'static, 'static>,
+    /// The window that is due: the network loads it from here, since that takes longer than the output task may wait.
+    pub window: WindowCopy,
+}
+
+/// The network, and how far it is with its window.
 pub struct FogNetwork {
-    network: Option<&'static mut FogNet<'static, 'static>>,
-    number: Option<u32>,
+    parts: Option<&'static mut FogParts>,
+    stage: Stage,
+}
+
+/// The window that is worked on, by its number.
+#[derive(Clone, Copy, PartialEq)]
+enum Stage {
+    Waiting,
+    Copied(u32),
+    Running(u32),
 }
 
 impl FogNetwork {
-    /// Nothing to do yet; without good weights there never is.
-    pub fn new(network: Option<&'static mut FogNet<'static, 'static>>) -> Self {
-        Self { network, number: None }
+    /// Begins without a window; without good weights none is ever taken.
+    pub fn new(parts: Option<&'static mut FogParts>) -> Self {
+        Self { parts, stage: Stage::Waiting }
     }
 
-    /// Whether it could begin a window.
+    /// Returns whether it could take a window.
     pub fn is_waiting(&self) -> bool {
-        self.network.is_some() && self.number.is_none()
+        self.parts.is_some() && self.stage == Stage::Waiting
     }
 
-    /// Whether a window is being worked on.
+    /// Returns whether a window is being worked on.
     pub fn is_running(&self) -> bool {
-        self.number.is_some()
+        self.stage != Stage::Waiting
     }
 
-    /// Begins the window that is due, if one is: reads it, which is all that it needs the coprocessor for.
+    /// Copies the window that is due, if one is, which is all that it needs the coprocessor for.
     #[inline(never)]
-    pub fn begin(&mut self, coprocessor: &mut Coprocessor) -> bool {
-        let (Some(network), Some((number, window))) = (self.network.as_mut(), coprocessor.fog_window())
-        else {
-            return false;
+    pub fn take(&mut self, coprocessor: &mut Coprocessor) {
+        let (Some(parts), Some((number, window))) = (self.parts.as_mut(), coprocessor.fog_window()) else {
+            return;
         };
-        network.start(&window);
-        self.number = Some(number);
-        true
+        parts.window.take(&window);
+        self.stage = Stage::Copied(number);
     }
 
     /// Does a piece (0.23 M modelled cycles at most, which anything may interrupt); gives the estimate
     /// with the last one.
     #[inline(never)]
     pub fn advance(&mut self) -> Option<(u32, FogEstimate)> {
-        let number = self.number?;
-        let estimate = self.network.as_mut()?.advance()?;
-        self.number = None;
-        Some((number, estimate))
+        let FogParts { network, window } = self.parts.as_mut()?;
+        match self.stage {
+            Stage::Waiting => None,
+            Stage::Copied(number) => {
+                self.stage = window.window().map_or(Stage::Waiting, |window| {
+                    network.start(&window);
+                    Stage::Running(number)
+                });
+                None
+            }
+            Stage::Running(number) => {
+                let estimate = network.advance()?;
+                self.stage = Stage::Waiting;
+                Some((number, estimate))
+            }
+        }
     }
 }

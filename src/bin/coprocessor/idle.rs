@@ -1,7 +1,7 @@
 //! What is done when nothing else is to do: the service line, and the weights' own checksum.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::fog_network::FogNetwork;
+use crate::fog_network::{FogNetwork, FogParts};
 use crate::imu::BringUp;
 use crate::regions::{Records, Slots};
 use crate::ring::Ring;
@@ -9,7 +9,6 @@ use crate::stm32f405::{clocks, timer};
 use crate::{board, serial};
 use embedded_io::{Write, WriteReady};
 use gyronet::health::Status;
-use gyronet::model::FogNet;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::{ImuSample, Standstill};
 use gyronet::service::Device;
@@ -21,10 +20,10 @@ use gyronet::service::message::AllCounters;
 const SERVICE_TURN: usize = 16;
 /// Interval at which a failed clock is tried again.
 const RETRY_MS: u32 = 1_000;
-/// How long one pass over the weights takes.
+/// The time that one pass over the weights takes.
 const CHECK_MS: usize = 10_000;
 
-/// What the output task tells of a sample.
+/// The output task's report of a sample.
 pub struct Observation {
     /// `None`: the sensor is silent.
     pub sample: Option<ImuSample>,
@@ -45,7 +44,7 @@ pub struct Idle {
     service: serial::Port<{ board::SERVICE_RING }>,
     fog_network: FogNetwork,
     bring_up: Option<BringUp>,
-    /// Why the internal oscillator runs, and when it was last looked whether that is over, ms.
+    /// The reason why the internal oscillator runs, and the time of the last look whether that is over, ms.
     clock_fault: Option<ClockFault>,
     retried: u32,
     /// An answer on its way out, and how much of it is.
@@ -54,7 +53,7 @@ pub struct Idle {
     milliseconds: u32,
 }
 
-/// What is stored, and the weights to be looked after.
+/// The stored data, and the check of the weights in use.
 pub type Stored = (&'static mut Device<Records, Slots>, Option<BackgroundCheck<'static>>);
 
 impl Idle {
@@ -62,7 +61,7 @@ impl Idle {
     pub fn new(
         (device, check): Stored,
         service: serial::Port<{ board::SERVICE_RING }>,
-        fog_network: Option<&'static mut FogNet<'static, 'static>>,
+        fog_network: Option<&'static mut FogParts>,
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
     ) -> Self {
@@ -81,7 +80,7 @@ impl Idle {
         }
     }
 
-    /// A bounded piece of work; whether the weights were found to be damaged.
+    /// Does a bounded piece of work, and returns whether the weights were found to be damaged.
     #[inline(never)]
     pub fn turn(&mut self, counters: &AllCounters) -> bool {
         while let Some(Observation { sample, tick, status, wheels }) = OBSERVATIONS.pop() {
@@ -95,7 +94,7 @@ impl Idle {
         self.check()
     }
 
-    /// Whether there is more to do before the next interrupt.
+    /// Returns whether there is more to do before the next interrupt.
     pub fn is_busy(&self) -> bool {
         self.fog_network.is_running()
     }
@@ -112,7 +111,7 @@ impl Idle {
         }
     }
 
-    /// FoGNet, for what it shares with the output task.
+    /// Returns FoGNet, for the work that it shares with the output task.
     pub fn fog_network(&mut self) -> &mut FogNetwork {
         &mut self.fog_network
     }
@@ -142,7 +141,7 @@ impl Idle {
             self.answer.clear();
             self.sent = 0;
             if self.device.restart_wanted() {
-                // Bounded; an answer that does not get out keeps nobody from starting anew.
+                // Bounded; an answer that does not get out does not hold up the restart.
                 let _ = self.service.flush();
                 cortex_m::peripheral::SCB::sys_reset();
             }

@@ -12,18 +12,19 @@ use crate::{board, serial};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_hal::delay::DelayNs;
 use gyronet::health::supervisor::Task;
-use gyronet::sample::ImuSample;
+use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::sensor::icm42688::packet::Resolution;
 use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::event::SensorFault;
 use gyronet::store::ImuPart;
+use gyronet::units::Micros;
 
 /// Bytes of a line in one turn: all that can wait.
 pub const TURN: usize = board::IMU_RING;
-/// What a look at the part on SPI counts as: four a turn.
+/// The bytes that a look at the part on SPI counts as: four looks a turn.
 const LOOK: usize = TURN / 4;
-/// From one attempt to bring it up to the next one.
+/// The time from one attempt to bring it up to the next one.
 const RETRY_MS: u32 = 1_000;
 /// Looks at the time before a delay is given up, should it stand still: a millisecond has some ten
 /// thousand.
@@ -46,19 +47,18 @@ static WANTED: AtomicBool = AtomicBool::new(true);
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; there is one of them")]
 pub enum Imu {
     Line(serial::Port<{ board::IMU_RING }>, Mti),
-    /// `None`: not brought up.
-    Spi(Option<Part>),
+    Spi(SpiPart),
 }
 
 impl Imu {
-    /// Of the part that is configured. What the image does not drive, no configuration has.
+    /// Returns the end of the part that is configured. A configuration names only parts that the image drives.
     #[inline]
     pub fn new(part: ImuPart, line: serial::Port<{ board::IMU_RING }>) -> Self {
-        if part == ImuPart::Icm42688 { Self::Spi(None) } else { Self::Line(line, Mti::new()) }
+        if part == ImuPart::Icm42688 { Self::Spi(SpiPart::default()) } else { Self::Line(line, Mti::new()) }
     }
 
-    /// The next sample, or that there is none where one was due; `None`: nothing waits, or the turn
-    /// is over.
+    /// Returns the next sample, or an error where one was due and is damaged; `None` when nothing waits or the turn is
+    /// over.
     pub fn next_sample(&mut self, turn: &mut usize) -> Option<Result<ImuSample, ()>> {
         match self {
             Self::Line(port, mti) => loop {
@@ -70,12 +70,12 @@ impl Imu {
             },
             Self::Spi(part) => {
                 *turn = turn.checked_sub(LOOK)?;
-                look(part)
+                part.look()
             }
         }
     }
 
-    /// Bytes that came damaged, and bytes that had to wait.
+    /// Returns the numbers of bytes that came damaged and of bytes that had to wait.
     pub fn line_faults(&self) -> [u32; 2] {
         match self {
             Self::Line(port, _) => [port.lost(), port.held()],
@@ -84,21 +84,52 @@ impl Imu {
     }
 }
 
-/// Looks whether the part on SPI has a sample.
-#[inline(never)]
-fn look(part: &mut Option<Part>) -> Option<Result<ImuSample, ()>> {
-    if part.is_none() {
-        *part = READY.pop();
-    }
-    match part.as_mut()?.next_sample().transpose()? {
-        Ok(sample) => Some(Ok(sample)),
-        Err(Icm42688Error::Packet(_) | Icm42688Error::NoReading) => Some(Err(())),
-        // It must be set anew.
-        Err(_) => {
-            *part = None;
-            WANTED.store(true, Ordering::Release);
-            Some(Err(()))
+/// The part on SPI.
+///
+/// Its clock begins at 0 with each reset of the part, so the first sample after one would be older than the newest one
+/// before. It is placed on the sensor's grid instead, as many steps after that one as the board's clock has counted.
+#[derive(Default)]
+pub struct SpiPart {
+    /// `None`: not brought up.
+    part: Option<Part>,
+    /// No sample has come since the part was brought up.
+    is_fresh: bool,
+    /// The time that is added to the part's clock, microseconds.
+    offset: u64,
+    /// The newest sample's time, and the board's time at which it came.
+    newest: Option<(Micros, u64)>,
+}
+
+impl SpiPart {
+    /// Looks whether there is a sample.
+    #[inline(never)]
+    fn look(&mut self) -> Option<Result<ImuSample, ()>> {
+        if self.part.is_none() {
+            self.part = READY.pop();
+            self.is_fresh = true;
         }
+        match self.part.as_mut()?.next_sample().transpose()? {
+            Ok(sample) => Some(Ok(self.placed(sample))),
+            Err(Icm42688Error::Packet(_) | Icm42688Error::NoReading) => Some(Err(())),
+            // It must be set up again.
+            Err(_) => {
+                self.part = None;
+                WANTED.store(true, Ordering::Release);
+                Some(Err(()))
+            }
+        }
+    }
+
+    /// Returns the sample with a time that goes on from before the part's last reset.
+    fn placed(&mut self, sample: ImuSample) -> ImuSample {
+        let now = timer::micros();
+        if let (true, Some((newest, came))) = (core::mem::take(&mut self.is_fresh), self.newest) {
+            let steps = (now.saturating_sub(came) + PERIOD_US / 2) / PERIOD_US;
+            self.offset = (newest.0 + steps.max(1) * PERIOD_US).wrapping_sub(sample.time.0);
+        }
+        let time = Micros(sample.time.0.wrapping_add(self.offset));
+        self.newest = Some((time, now));
+        ImuSample { time, ..sample }
     }
 }
 
@@ -109,7 +140,7 @@ pub struct BringUp {
 }
 
 impl BringUp {
-    /// Where such a part is configured.
+    /// Returns idle's end where such a part is configured.
     pub fn new(part: ImuPart, spi: Spi) -> Option<Self> {
         (part == ImuPart::Icm42688).then_some(Self { spi, tried: None })
     }

@@ -129,7 +129,7 @@ mod app {
 
     #[init(local = [
         network_state: GyroNetState = GyroNetState::ZERO,
-        coprocessor_place: MaybeUninit<Coprocessor> = MaybeUninit::uninit(),
+        coprocessor: Coprocessor = Coprocessor::START,
         sender_place: MaybeUninit<Output> = MaybeUninit::uninit(),
         rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),
     ])]
@@ -137,7 +137,8 @@ mod app {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST, start::received());
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
         let start::Parts { output, config, weights, fog_network, device } = parts;
-        let coprocessor = start::place(cx.local.coprocessor_place, || Coprocessor::new(config));
+        let coprocessor = cx.local.coprocessor;
+        coprocessor.configure(&config);
         let network = weights.map(|blob| GyroNet::with_state(blob, cx.local.network_state));
         let service = board.service;
         let bring_up = BringUp::new(output.part, board.spi);
@@ -237,9 +238,10 @@ mod app {
                 cx.shared.coprocessor.lock(|coprocessor| coprocessor.weights_damaged());
             }
             let fog_network = cx.local.rest.fog_network();
-            let begun = fog_network.is_waiting()
-                && cx.shared.coprocessor.lock(|coprocessor| fog_network.begin(coprocessor));
-            if let (false, Some((number, estimate))) = (begun, fog_network.advance()) {
+            if fog_network.is_waiting() {
+                cx.shared.coprocessor.lock(|coprocessor| fog_network.take(coprocessor));
+            }
+            if let Some((number, estimate)) = fog_network.advance() {
                 // One that is late is counted.
                 let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver_fog(number, estimate));
             }

@@ -20,7 +20,7 @@ use gyronet::units::Micros;
 /// Half a period of the LED, ms; a power of two.
 const BLINK_MS: u32 = 512;
 
-/// What the configuration says of the output task's lines.
+/// The configuration of the output task's lines.
 pub struct OutputParts {
     pub part: ImuPart,
     pub bits_per_second: u32,
@@ -34,7 +34,7 @@ pub struct Output {
     outgoing: Outgoing,
     /// The millisecond in which the other lines were looked at.
     looked: u32,
-    /// Whether CAN takes part in the bus.
+    /// True once CAN takes part in the bus.
     joined: bool,
     lines: LineCounters,
 }

@@ -30,7 +30,7 @@ pub fn announced<T>(work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Whether rates are withheld now. For the output task, which sends a message set without a rate first.
+/// Returns whether rates are withheld now. For the output task, which sends a message set without a rate first.
 pub fn is_requested() -> bool {
     STATE.load(Ordering::Relaxed) != RUNNING
 }

@@ -88,13 +88,13 @@ impl<T, const N: usize> Ring<T, N> {
         Some(value)
     }
 
-    /// Whether nothing waits.
+    /// Returns whether nothing waits.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether there is no room.
+    /// Returns whether there is no room.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.len() >= N

@@ -36,7 +36,7 @@ pub struct Handler<const N: usize> {
     received: &'static Ring<u8, N>,
     sending: &'static Ring<u8, SENDING>,
     faults: &'static Faults,
-    /// Whether room for a byte raises the interrupt.
+    /// True while room for a byte raises the interrupt.
     room_requested: bool,
     emulated: bool,
 }

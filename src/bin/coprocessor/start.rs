@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "a peripheral that is taken; the block says why it is sound")]
 
 use crate::board::Board;
+use crate::fog_network::FogParts;
 use crate::idle::Stored;
 use crate::output::OutputParts;
 use crate::regions::{self, Records, Slots};
@@ -10,6 +11,7 @@ use core::mem::MaybeUninit;
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::{Clock, Config, StorageFaults};
+use gyronet::fog::seconds::WindowCopy;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{Blob, FogBlob, FogNet, weights};
@@ -22,7 +24,7 @@ const DRIVES: SupportedHardware = SupportedHardware {
     fogs: &[FogPart::Dsp1760],
     bits_per_second: &[BITS_PER_SECOND],
 };
-/// Whose wheel frames are understood.
+/// The maker whose wheel frames are understood.
 pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
 
 /// The identifiers of the frames that CAN receives.
@@ -30,17 +32,17 @@ pub fn received() -> impl Iterator<Item = embedded_can::Id> {
     WHEELS.frames.into_iter().flatten().map(|frame| frame.id)
 }
 
-/// What each task gets.
+/// The parts that the tasks get.
 pub struct Parts {
     pub output: OutputParts,
     pub config: Config,
     /// To be put under the network.
     pub weights: Option<Blob<'static>>,
-    pub fog_network: Option<&'static mut FogNet<'static, 'static>>,
+    pub fog_network: Option<&'static mut FogParts>,
     pub device: Stored,
 }
 
-/// `None` when they have been made before.
+/// Makes the parts; `None` when they have been made before.
 #[inline(never)]
 pub fn parts(board: &Board) -> Option<Parts> {
     // SAFETY: the clock tree is done with the controller, and this runs once.
@@ -78,10 +80,11 @@ pub fn parts(board: &Board) -> Option<Parts> {
 
 /// FoGNet on its built-in weights; `None` when they are damaged.
 #[inline(never)]
-fn fog_network() -> Option<&'static mut FogNet<'static, 'static>> {
+fn fog_network() -> Option<&'static mut FogParts> {
     let state = cortex_m::singleton!(: FogNetState = FogNetState::ZERO)?;
     let blob = FogBlob::new_checked(&weights::FOGNET.0).ok()?;
-    cortex_m::singleton!(: FogNet<'static, 'static> = FogNet::new(blob, state))
+    let network = FogNet::new(blob, state);
+    cortex_m::singleton!(: FogParts = FogParts { network, window: WindowCopy::EMPTY })
 }
 
 /// Makes a value where it stays; what that takes of the stack is given back.

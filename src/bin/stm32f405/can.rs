@@ -35,10 +35,10 @@ const LAST_RESTART_MS: u32 = 1_280;
 /// Frames that left a mailbox unsent. The transmit interrupt alone counts.
 static ABORTED: AtomicU32 = AtomicU32::new(0);
 
-/// How the controller takes part in the bus.
+/// The way in which the controller takes part in the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// As a node.
+    /// It sends and acknowledges as a node.
     Normal,
     /// It hears its own frames and nothing else; the pin stays recessive.
     Loopback,
@@ -57,7 +57,7 @@ pub enum State {
     Off,
 }
 
-/// What is done about bus-off.
+/// The state of the recovery from bus-off.
 #[derive(Debug, Clone, Copy)]
 enum Recovery {
     /// The controller takes part in the bus since a time, ms.
@@ -258,7 +258,7 @@ pub fn transmitted() {
 pub struct Received {
     /// The frame; `None`: a remote frame.
     pub frame: Option<DataFrame>,
-    /// Whether at least one frame was lost before it.
+    /// True where at least one frame was lost before it.
     pub lost: bool,
 }
 

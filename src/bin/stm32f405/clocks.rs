@@ -31,7 +31,7 @@ pub struct Clocks {
     /// The crystal's frequency as measured against the internal oscillator; 0 where it was not measured.
     #[allow(dead_code, reason = "bringup alone prints it")]
     pub measured_hz: u32,
-    /// Why the crystal does not drive them.
+    /// The reason why the crystal does not drive them.
     pub fault: Option<ClockFault>,
 }
 
@@ -68,7 +68,7 @@ impl Clocks {
         }
     }
 
-    /// Whether the crystal drives them.
+    /// Returns whether the crystal drives them.
     pub fn exact(&self) -> bool {
         self.fault.is_none()
     }

@@ -23,7 +23,7 @@ const POLLS: u32 = 10_000_000;
 const FLAGS: u32 = 0xF3;
 const ERRORS: u32 = 0xF2;
 
-/// Why the flash was not changed, or not as asked.
+/// The reason why the flash was not changed, or not as requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlashError {
     /// The region has no such bytes.
@@ -61,7 +61,7 @@ impl Flash {
         Self(RefCell::new(registers))
     }
 
-    /// Whether the controller answers. It is locked now; in an emulator without one the lock reads as open.
+    /// Returns whether the controller answers. It is locked now; in an emulator without one the lock reads as open.
     pub fn writable(&self) -> bool {
         self.0.try_borrow().is_ok_and(|registers| locked(&registers))
     }

@@ -21,13 +21,13 @@ pub use stm32f4::stm32f405 as pac;
 use clocks::Clocks;
 use gyronet::service::event::ResetCause;
 
-/// What the chip reports of itself once its clocks run.
+/// The chip's report of itself once its clocks run.
 pub struct Chip {
     /// Frequencies, and why they are not the full ones.
     pub clocks: Clocks,
     /// DBGMCU_IDCODE (RM0090 38.6.1); `None` where it reads as zero, as in QEMU.
     pub device_id: Option<u32>,
-    /// Why the chip has started.
+    /// The reason why the chip has started.
     pub reset: ResetCause,
 }
 

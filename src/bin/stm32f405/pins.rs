@@ -26,7 +26,7 @@ enum Port {
     C,
 }
 
-/// How fast a pin's edges are (OSPEEDR).
+/// The speed of a pin's edges (OSPEEDR).
 #[derive(Debug, Clone, Copy)]
 pub enum Speed {
     /// Up to 2 MHz.

@@ -32,22 +32,22 @@ impl Status {
         self.0 & flags != 0
     }
 
-    /// Whether a byte has come, or one was lost because it was not taken in time.
+    /// Returns whether a byte has come, or one was lost because it was not taken in time.
     pub fn received(self) -> bool {
         self.any(Self::RECEIVED | Self::OVERRUN)
     }
 
-    /// Whether the byte that has come is damaged, or one behind it was lost.
+    /// Returns whether the byte that has come is damaged, or one behind it was lost.
     pub fn damaged(self) -> bool {
         self.any(Self::PARITY | Self::FRAMING | Self::NOISE | Self::OVERRUN)
     }
 
-    /// Whether the data register takes a byte.
+    /// Returns whether the data register takes a byte.
     pub fn room(self) -> bool {
         self.any(Self::ROOM)
     }
 
-    /// Whether everything written has left the line.
+    /// Returns whether everything written has left the line.
     pub fn sent(self) -> bool {
         self.any(Self::SENT)
     }

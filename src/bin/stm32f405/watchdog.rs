@@ -46,7 +46,7 @@ pub fn start(dbgmcu: &pac::DBGMCU) {
     set(Limit::Long);
 }
 
-/// Whether the long limit counts.
+/// True while the long limit counts.
 static LONG: AtomicBool = AtomicBool::new(true);
 
 /// Does something that takes up to 2 s with the long limit, and goes back to the limit before it.

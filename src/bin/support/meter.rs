@@ -9,7 +9,7 @@ use cortex_m_semihosting::hprintln;
 const PAINT: u32 = 0xC0DE_57AC;
 
 unsafe extern "C" {
-    /// Where the stack ends (memory.x); below it is no memory.
+    /// The end of the stack (memory.x); below it is no memory.
     static _stack_end: u32;
 }
 

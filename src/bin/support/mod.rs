@@ -78,7 +78,7 @@ pub const fn input_words(units: usize, inputs: usize) -> usize {
     DirectionWeights::input_words(units, inputs)
 }
 
-/// As [`input_words`], for the recurrent records.
+/// Returns the same as [`input_words`] for the recurrent records.
 pub const fn recurrent_words(units: usize) -> usize {
     DirectionWeights::recurrent_words(units)
 }

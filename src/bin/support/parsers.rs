@@ -107,7 +107,7 @@ fn dsp3000(meter: &mut Meter) {
     hprintln!("sensor/dsp3000_word bytes={}", word.len());
 }
 
-/// What an SPI transfer has brought, from bytes to sample.
+/// Parses the bytes of an SPI transfer into a sample.
 fn bursts(meter: &mut Meter) {
     let packet = Packet {
         resolution: Resolution::Bits20,

@@ -1,4 +1,4 @@
-//! The whole MM5.10 set: three messages of one shape, each with one rate and one acceleration.
+//! The whole MM5.10 set has three messages of one shape, each with one rate and one acceleration.
 //!
 //! | message | identifier | rate | acceleration | byte 2, low nibble | byte 3 |
 //! |---|---|---|---|---|---|
@@ -170,6 +170,9 @@ pub struct SetEncoder {
 }
 
 impl SetEncoder {
+    /// Nothing owed.
+    pub const START: Self = Self { rates: [YawRateSignal::START; 3] };
+
     /// Encodes the three messages of one sample, in the order of [`LAYOUTS`]. A value that does not fit its signal
     /// is sent as the nearest limit and marked as failed.
     pub fn encode(&mut self, motion: &Motion) -> [Message; 3] {

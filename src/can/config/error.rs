@@ -1,4 +1,4 @@
-//! Why settings are refused.
+//! This error names the reason why settings are refused.
 
 use super::{MAX_PERIOD_MS, SAMPLE_MS};
 

@@ -1,4 +1,4 @@
-//! What a user sets.
+//! These are the settings of the bus that a user can change.
 
 use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 

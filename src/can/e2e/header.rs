@@ -1,5 +1,5 @@
-//! The two-byte header of profiles 1, 2 and 11: CRC in byte 0, counter in the low nibble of
-//! byte 1. What enters the CRC besides the data is the profile's own.
+//! Profiles 1, 2 and 11 share a two-byte header: CRC in byte 0, counter in the low nibble of byte 1. What enters
+//! the CRC besides the data is the profile's own.
 
 use super::Fault;
 

@@ -1,4 +1,5 @@
-//! Profile 1: byte 0 CRC, low nibble of byte 1 counter, four ways to bring in the identifier.
+//! Profile 1 has its CRC in byte 0, its counter in the low nibble of byte 1, and four ways to include the
+//! identifier.
 //!
 //! AUTOSAR describes the CRC by the interface of its CRC library, whose start and final XOR
 //! values cancel: what is on the bus is polynomial 0x1D with start 0 and no final XOR.

@@ -1,4 +1,4 @@
-//! Profile 2: byte 0 CRC, low nibble of byte 1 counter; the counter selects one of sixteen
+//! Profile 2 has its CRC in byte 0 and its counter in the low nibble of byte 1; the counter selects one of sixteen
 //! identifiers, which enters the CRC last. Profile 22 puts the same bytes on the bus.
 
 use super::Fault;

@@ -1,4 +1,4 @@
-//! Profile 5: bytes 0 and 1 CRC, little-endian, byte 2 counter.
+//! Profile 5 has its CRC in bytes 0 and 1, little-endian, and its counter in byte 2.
 
 use super::Fault;
 

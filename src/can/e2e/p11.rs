@@ -1,4 +1,4 @@
-//! Profile 11: the same bytes as profile 1 with its modes Both and Nibble.
+//! Profile 11 sends the same bytes as profile 1 in its modes Both and Nibble.
 
 use super::Fault;
 use super::p01::{DataIdMode, P01};

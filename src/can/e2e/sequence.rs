@@ -1,4 +1,4 @@
-//! What a message counter says of the messages before it.
+//! A message counter shows whether messages before it were lost or repeated.
 
 /// Judgement of an undamaged message by its counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Lines out of bytes: up to CR, bounded.
+//! The assembler makes lines from bytes, each up to CR and of bounded length.
 
 use heapless::Vec;
 

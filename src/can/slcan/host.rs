@@ -1,4 +1,4 @@
-//! What a host says on an SLCAN line, and what it expects to hear.
+//! A session executes the commands of a host on an SLCAN line and makes the answers that it expects.
 //!
 //! python-can sends `C`, `S6`, an empty line and `O` and reads frames; slcand writes `C`, `S6`,
 //! `O` and hands the line to the kernel. Neither waits for the answers, but both stumble over an

@@ -1,4 +1,4 @@
-//! The device's end of an SLCAN line: frames out, commands answered, frames in.
+//! A port is the device's end of an SLCAN line: it sends frames and executes commands.
 //!
 //! [`Port`] keeps the bytes and does no I/O; [`Port::service`] moves them over any line that can
 //! say whether it is ready (`embedded_io`'s `ReadReady` and `WriteReady`). It never waits: what

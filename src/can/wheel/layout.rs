@@ -1,4 +1,4 @@
-//! Where wheel speeds lie in a frame, and how the frame is protected.
+//! A layout gives the places of wheel speeds in a frame, and the frame's protection.
 
 use crate::can::bosch;
 use crate::can::e2e::{Fault, Profile};

@@ -1,8 +1,8 @@
-//! Which frames the wheel speeds come in.
+//! The settings name the frames that carry the wheel speeds.
 
 use super::layout::{Checksum, WheelFrame};
 use crate::sample::WHEELS;
-use crate::units::WheelSpeed;
+use crate::units::{Duration, WheelSpeed};
 use embedded_can::Id;
 
 /// Most frames that wheel speeds may be spread over.
@@ -14,11 +14,11 @@ pub struct WheelSettings {
     /// The frames.
     pub frames: [Option<WheelFrame>; MAX_FRAMES],
     /// A speed that is older says nothing.
-    pub timeout_us: u64,
+    pub timeout: Duration,
     /// Up to this speed a wheel may stand still.
     pub still_speed: WheelSpeed,
     /// The time for which all wheels must be that slow.
-    pub still_for_us: u64,
+    pub still_for: Duration,
 }
 
 /// The reason why wheel settings are no configuration.
@@ -49,9 +49,9 @@ impl WheelSettings {
     /// `WHEEL_SPEEDS`). Still below 0.1 km/h for half a second, silent after 0.1 s.
     pub const TOYOTA: Self = Self {
         frames: [Some(WheelFrame::TOYOTA), None, None, None],
-        timeout_us: 100_000,
+        timeout: Duration::from_millis(100),
         still_speed: WheelSpeed(1_820),
-        still_for_us: 500_000,
+        still_for: Duration::from_millis(500),
     };
 
     /// Returns the wheels that the settings name, each in one signal.

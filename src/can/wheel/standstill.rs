@@ -1,4 +1,4 @@
-//! Wheel speeds from wherever they come, and whether the vehicle stands.
+//! The wheels decide whether the vehicle stands.
 //!
 //! Standing still is decided here, because a bias estimator that trusts the gyro alone takes a
 //! slow turn for bias. It is asserted late and dropped at once: all wheels must have been fresh
@@ -6,18 +6,18 @@
 //! sensors of the passive kind show zero below walking pace, hence the while.
 
 use crate::sample::{Standstill, WHEELS, WheelSample};
-use crate::units::{Micros, WheelSpeed};
+use crate::units::{Duration, Micros, WheelSpeed};
 
 /// The limits by which wheels count as standing, and as silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StandstillRule {
     /// A speed that is older says nothing.
-    pub timeout_us: u64,
+    pub timeout: Duration,
     /// Up to this speed a wheel may stand still.
     pub still_speed: WheelSpeed,
     /// The time for which all wheels must be that slow.
-    pub still_for_us: u64,
+    pub still_for: Duration,
 }
 
 /// The wheels of a vehicle: the newest speed of each, and since when they have been slow.
@@ -40,7 +40,7 @@ impl Wheels {
     /// Drops what is too old. Call it before new speeds are taken.
     pub fn expire(&mut self, now: Micros) {
         for slot in &mut self.speeds {
-            let old = |(_, at): &(_, Micros)| now.0.saturating_sub(at.0) > self.rule.timeout_us;
+            let old = |(_, at): &(_, Micros)| now.since(*at) > self.rule.timeout;
             *slot = slot.take_if(|speed| !old(speed));
         }
         if !self.complete() {
@@ -70,7 +70,7 @@ impl Wheels {
     #[must_use]
     pub fn sample(&self, now: Micros) -> WheelSample {
         let standstill = match self.still_since {
-            Some(since) if now.0.saturating_sub(since.0) >= self.rule.still_for_us => Standstill::Still,
+            Some(since) if now.since(since) >= self.rule.still_for => Standstill::Still,
             Some(_) => Standstill::Unknown,
             None if self.complete() => Standstill::Moving,
             None => Standstill::Unknown,

@@ -1,4 +1,4 @@
-//! The kernel for hosts, on the `wide` crate's vectors (SSE2, AVX2 or NEON, as compiled).
+//! This is the kernel for hosts, on the `wide` crate's vectors (SSE2, AVX2 or NEON, as compiled).
 //!
 //! Four words of a record are two column pairs of all four gates: (i,f) (g,o) (i,f) (g,o). With
 //! the matching columns copied beside each other, one multiply-add of halfword pairs does all

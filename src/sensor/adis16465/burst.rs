@@ -1,4 +1,4 @@
-//! The burst of an ADIS16465 or ADIS16470: twenty bytes, big-endian.
+//! The burst of an ADIS16465 or ADIS16470 has twenty bytes, big-endian.
 //!
 //! | offset | content |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! The time of a message by its number.
+//! The clock computes the time of a message from its number, because the message carries no time.
 
 use super::config::OutputRate;
 

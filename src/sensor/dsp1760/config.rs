@@ -1,4 +1,4 @@
-//! How a DSP-1760 is set: what its bytes do not say.
+//! The configuration of a DSP-1760 holds what its bytes do not say.
 
 /// Rotation as increment or as rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,4 +1,4 @@
-//! How a DSP-1760 is brought to a configuration.
+//! This dialogue brings a DSP-1760 to a configuration.
 //!
 //! The part acknowledges no setting, so its settings are queried afterwards: the lines of
 //! [`setup`], then the query for the rate, and only then out of configuration mode. The rules:
@@ -13,13 +13,13 @@
 use super::command::{Command, MAX_LINE, Reply, setup};
 use super::config::{Dsp1760Config, OutputRate};
 use crate::sensor::serial::{self, Action};
-use crate::units::Micros;
+use crate::units::{Duration, Micros};
 use heapless::Vec;
 
 /// The pause between two lines.
-pub const PAUSE: Micros = Micros(20_000);
+pub const PAUSE: Duration = Duration::from_millis(20);
 /// The time that the answer may take.
-pub const TIMEOUT: Micros = Micros(500_000);
+pub const TIMEOUT: Duration = Duration::from_millis(500);
 /// The number of attempts before the part is given up.
 pub const ATTEMPTS: u8 = 3;
 
@@ -108,7 +108,7 @@ impl serial::Dialogue for Dialogue {
         }
         self.next += 1;
         let pause = if self.next == leave { TIMEOUT } else { PAUSE };
-        self.due = Micros(now.0.saturating_add(pause.0));
+        self.due = now.after(pause);
         Ok(Action::Send(command.emit().into_bytes().into_iter().collect()))
     }
 }

@@ -1,4 +1,4 @@
-//! The three layouts of a data message, and what only some of them carry.
+//! A data message has one of three layouts, and some fields are only in some of them.
 
 /// The bytes that begin every data message; the format byte follows.
 pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];

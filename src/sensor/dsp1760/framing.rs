@@ -1,4 +1,4 @@
-//! Where messages of the DSP-1760 begin and end in its bytes.
+//! This protocol finds the messages of the DSP-1760 in its bytes.
 
 use super::message::Format;
 use crate::sensor::crc::CRC_32_MPEG_2;

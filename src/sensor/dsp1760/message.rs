@@ -1,4 +1,4 @@
-//! One data message of the DSP-1760, field by field.
+//! A data message of the DSP-1760 is parsed and encoded here, field by field.
 //!
 //! | offset | format A, 36 bytes | format B, 40 bytes | format C, 38 bytes |
 //! |---|---|---|---|

@@ -1,4 +1,4 @@
-//! The DSP-3000's lines of text.
+//! This variant of the DSP-3000 sends lines of text.
 //!
 //! A line is a decimal number, blanks and `1` (valid) or `0` (fault), ended by CR and LF.
 //! Implementations differ in the width of the line, so blanks are trimmed and the line end is

@@ -1,4 +1,4 @@
-//! The DSP-3000's words of 32 bits, most significant byte first.
+//! This variant of the DSP-3000 sends words of 32 bits, most significant byte first.
 //!
 //! | bit | content |
 //! |---|---|

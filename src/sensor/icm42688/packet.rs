@@ -1,4 +1,4 @@
-//! What the FIFO of the ICM-42688-P holds.
+//! A packet is one entry of the ICM-42688-P's FIFO.
 //!
 //! | offset | packet 3, 16 bytes | packet 4, 20 bytes |
 //! |---|---|---|

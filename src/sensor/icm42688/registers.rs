@@ -1,4 +1,4 @@
-//! Registers of the ICM-42688-P that the driver uses, and the values it gives them.
+//! The driver uses these registers of the ICM-42688-P, and writes these values to them.
 
 /// A register: its bank and its address there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

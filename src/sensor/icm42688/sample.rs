@@ -1,4 +1,4 @@
-//! A packet's counts in the pipeline's units.
+//! This module converts a packet's counts to the pipeline's units.
 
 use super::packet::{Packet, Resolution};
 use crate::sample::{ImuSample, Validity};

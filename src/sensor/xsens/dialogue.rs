@@ -1,4 +1,4 @@
-//! How an MTi is brought to send what the pipeline wants.
+//! This dialogue brings an MTi to send what the pipeline needs.
 //!
 //! GoToConfig, SetOutputConfiguration, GoToMeasurement, each answered by its own identifier
 //! plus one. The rules:
@@ -20,10 +20,10 @@ use super::mtdata2::id;
 use super::xbus::{self, MAX_FRAME, Xbus};
 use crate::sensor::framer::Framer;
 use crate::sensor::serial;
-use crate::units::Micros;
+use crate::units::{Duration, Micros};
 
 /// The time that an answer may take.
-pub const TIMEOUT: Micros = Micros(500_000);
+pub const TIMEOUT: Duration = Duration::from_millis(500);
 /// The number of times that a message is sent before the part is given up.
 pub const ATTEMPTS: u8 = 3;
 /// The reason why the dialogue has ended without a part that measures.
@@ -130,7 +130,7 @@ impl Dialogue {
             State::Due(step) => {
                 self.attempts += 1;
                 self.last_error = None;
-                self.state = State::Sent(step, Micros(now.0.saturating_add(TIMEOUT.0)));
+                self.state = State::Sent(step, now.after(TIMEOUT));
                 Ok(Action::Send(step.emit()))
             }
             State::Sent(..) => Ok(Action::Wait),

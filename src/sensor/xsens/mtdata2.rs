@@ -1,6 +1,5 @@
-//! MTData2 (MID 36): packets `ID ID LEN DATA..`, big-endian. The low nibble of an ID is
-//! precision and coordinate system. The coordinate system is that of orientations; what is read
-//! here is in the axes of the part.
+//! MTData2 (MID 36) consists of packets `ID ID LEN DATA..`, big-endian. The low nibble of an ID is precision and
+//! coordinate system. The coordinate system is that of orientations; what is read here is in the axes of the part.
 
 use super::precision::Precision;
 use super::xbus;

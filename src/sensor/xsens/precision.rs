@@ -1,4 +1,4 @@
-//! The four forms of a number in MTData2, which bits 0 and 1 of the data identifier distinguish.
+//! A number in MTData2 has one of four forms, which bits 0 and 1 of the data identifier distinguish.
 
 use heapless::Vec;
 

@@ -1,4 +1,4 @@
-//! The messages that bring an MTi to send what the pipeline wants.
+//! These messages bring an MTi to send what the pipeline needs.
 
 use super::mtdata2::id;
 use super::xbus;

@@ -1,4 +1,5 @@
-//! Xbus frames: `FA FF MID LEN DATA.. CS`, all of it after FA adding up to 0 modulo 256.
+//! An Xbus frame is `FA FF MID LEN DATA.. CS`, and all of it after FA adds up to 0 modulo 256. CS`, all of it after
+//! FA adding up to 0 modulo 256.
 
 use crate::sensor::framer::Protocol;
 use heapless::Vec;

@@ -1,4 +1,4 @@
-//! Configuration, calibration and the choice of weights: read at the start, stored when asked.
+//! Configuration, calibration and the choice of weights are read at the start and stored on request.
 
 use super::{Device, MappedSlots, SupportedHardware};
 use crate::service::event::EventKind;

@@ -1,4 +1,4 @@
-//! Weight files: which one to run on, and another one into the slot that is not in use.
+//! The board runs on one weight file, while another one is written to the slot that is not in use.
 
 use super::Device;
 use crate::model::Blob;

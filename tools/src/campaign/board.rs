@@ -1,4 +1,4 @@
-//! The board on the host: bytes of its lines in, bytes of its line out, a millisecond at a time.
+//! The board on the host: bytes of its lines go in and bytes of its CAN line come out, a millisecond at a time.
 //!
 //! It is the image's input and output around the library's [`Coprocessor`]: parsers of the part, SLCAN port, networks.
 
@@ -6,9 +6,9 @@ use super::drive::START_US;
 use super::fault::Line;
 use super::input::{Delivered, Input};
 use super::networks::Networks;
-use super::part::Part;
 use super::wire::Message;
 use crate::drive::wheel_frames;
+use crate::parts::Part;
 use embedded_can::{Frame, Id};
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::slcan::port::Port;
@@ -21,7 +21,7 @@ use gyronet::units::{AngularRate, Micros};
 /// Frames that may wait, as in the image.
 const QUEUE: usize = 24;
 
-/// All state of a board.
+/// The whole state of a board.
 #[derive(Debug, Clone)]
 pub struct Board {
     input: Input,
@@ -57,7 +57,7 @@ impl Board {
         self.coprocessor.pipeline().gyro_bias().unwrap_or_default()
     }
 
-    /// Takes what comes at `now`; what goes out is appended.
+    /// Processes a message that arrives at `now` and appends the messages that the board sends.
     pub fn receive(
         &mut self,
         message: &Message,
@@ -101,7 +101,7 @@ impl Board {
         self.send(now, networks, out);
     }
 
-    /// Everything that the board counts of what went wrong.
+    /// Returns the sum of all counters of errors on the board.
     #[must_use]
     pub fn events(&self) -> u64 {
         let pipeline = self.coprocessor.pipeline().counters();

@@ -1,4 +1,4 @@
-//! Drives to do faults to: what undamaged sensors say, row by row.
+//! The drives that faults are injected into: the readings of undamaged sensors, row by row.
 
 use crate::drive::recording::Recording;
 use crate::drive::wheel_frames::WheelFrames;
@@ -8,41 +8,41 @@ use gyronet::units::{AngularRate, Micros};
 /// Board time of the step before the first row, microseconds.
 pub const START_US: u64 = 1_000_000;
 
-/// What is measured in one row.
+/// The undamaged measurements of one row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// What the part measures; its time is the row's by the board's clock.
+    /// The sample of the part, stamped with the row's time by the board's clock.
     pub sample: ImuSample,
-    /// When its bytes come, microseconds of the board's clock.
+    /// The time at which its bytes arrive, microseconds of the board's clock.
     pub at: u64,
-    /// What a fibre-optic gyro beside the part measures: the reference where there is one.
+    /// The rates of a fibre-optic gyro beside the part, equal to the reference where there is one.
     pub fog: [AngularRate; 3],
-    /// The fibre-optic gyro repeats itself: it has no noise.
+    /// The fibre-optic gyro has no noise and repeats its readings.
     pub fog_stuck: bool,
-    /// What the part's time stamp is off by, microseconds.
+    /// The error of the part's time stamp, microseconds.
     pub stamp_us: i64,
-    /// Axes beyond the range: gyro, accelerometer.
+    /// The saturated axes: gyro, then accelerometer.
     pub saturated: [bool; 6],
-    /// An axis without a number, and the form of it.
+    /// An axis that sends no number, and which form that takes.
     pub no_number: Option<(usize, usize)>,
-    /// Speed of each wheel, km/h.
+    /// The speed of each wheel, km/h.
     pub wheels: [Option<f64>; WHEELS],
 }
 
 /// A drive on a whole grid.
 #[derive(Debug, Clone)]
 pub struct Drive {
-    /// For tables.
+    /// The name in tables.
     pub name: String,
-    /// What undamaged sensors say.
+    /// The readings of undamaged sensors.
     pub readings: Vec<Reading>,
     /// The true yaw turned up to and with each row, rad.
     pub truth: Option<Vec<f64>>,
 }
 
 impl Drive {
-    /// From a recording. Its time stamps go to the nearest grid step: jitter is a fault, and those
-    /// come from the campaign.
+    /// Converts a recording. Its time stamps go to the nearest grid step, because jitter is a fault and the campaign
+    /// adds the faults.
     #[must_use]
     pub fn new(recording: &Recording) -> Self {
         let mut readings = Vec::with_capacity(recording.rows.len());

@@ -1,15 +1,15 @@
-//! Faults that nothing on the board can see, by name and with the most that they may do.
+//! The named faults that nothing on the board can detect, each with a bound of its effect.
 
 use super::fault::{Axes, Fault, Kind, Line};
-use super::part::Part;
+use crate::parts::Part;
 use crate::parts::icm42688::WRAP_US;
 
 /// A fault that may go undetected.
 #[derive(Debug, Clone, Copy)]
 pub struct Exception {
-    /// For tables.
+    /// The name in tables.
     pub name: &'static str,
-    /// Why nothing sees it, and what bounds it.
+    /// The reason why nothing detects it, and what bounds it.
     pub why: &'static str,
     /// The most that a fault of this kind may move yaw in a second, rad; `None` where it is not
     /// of this kind.

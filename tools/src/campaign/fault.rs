@@ -1,7 +1,7 @@
-//! What is done to a drive, and how it is drawn.
+//! The kinds of faults, and how a seed draws one.
 
-use super::draw::Draw;
-use super::part::Part;
+use crate::parts::Part;
+use crate::random::Random;
 use serde::Serialize;
 
 /// Kinds of faults.
@@ -20,7 +20,7 @@ pub enum Kind {
     Truncation,
     /// A message overtakes those before it.
     Reordering,
-    /// Nothing comes for a while; then all of it at once, or none of it.
+    /// Nothing comes for a while; then everything at once, or nothing of it.
     Stall,
     /// The part's clock, and with it its sampling, is too fast or too slow.
     ClockDrift,
@@ -63,7 +63,7 @@ impl Kind {
         Self::CanLoss,
     ];
 
-    /// For tables.
+    /// Returns the name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -86,7 +86,7 @@ impl Kind {
         }
     }
 
-    /// Whether it is bytes on a line that are damaged, not what is measured.
+    /// Returns whether the fault damages bytes on a line rather than the measurements.
     #[must_use]
     pub const fn is_on_a_line(self) -> bool {
         matches!(
@@ -107,9 +107,9 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Line {
-    /// Of the sensor; where there are two, of the accelerometer.
+    /// The line of the sensor; of the accelerometer where there are two sensors.
     Sensor,
-    /// Of the fibre-optic gyro.
+    /// The line of the fibre-optic gyro.
     Gyro,
     /// Wheel speeds in, SLCAN.
     Wheels,
@@ -117,20 +117,20 @@ pub enum Line {
     Out,
 }
 
-/// What is affected of a part.
+/// The axes that a fault affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axes {
-    /// All six.
+    /// All six axes.
     All,
-    /// All of the gyro.
+    /// The three axes of the gyro.
     Gyro,
-    /// One: 0 to 2 gyro x, y, z; 3 to 5 accelerometer x, y, z.
+    /// One axis: 0 to 2 are gyro x, y, z; 3 to 5 are accelerometer x, y, z.
     One(usize),
 }
 
 impl Axes {
-    /// Whether gyro (0 to 2) or accelerometer (3 to 5) axis `axis` is among them.
+    /// Returns whether gyro axis 0 to 2 or accelerometer axis 3 to 5 is among them.
     #[must_use]
     pub fn contains(self, axis: usize) -> bool {
         match self {
@@ -141,12 +141,12 @@ impl Axes {
     }
 }
 
-/// One fault.
+/// A fault.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Fault {
-    /// What.
+    /// The kind of fault.
     pub kind: Kind,
-    /// Where, for what happens on a line.
+    /// The line, for a fault on a line.
     pub line: Line,
     /// Row of the drive with which it begins.
     pub from: usize,
@@ -157,20 +157,20 @@ pub struct Fault {
     /// Clock: microseconds of a jump, ppm of a drift. Bias: rad/s or m/s^2. Burst: bytes.
     /// Reordering: places. Slip: factor of the wheels' speed.
     pub size: f64,
-    /// Of the sensor.
+    /// The axes of the sensor.
     pub axes: Axes,
-    /// One of a few forms of the same: see where it is used.
+    /// One of four forms of the same kind; the code that applies the fault says which.
     pub form: usize,
-    /// For what is drawn while it lasts.
+    /// The seed of everything that is drawn while the fault lasts.
     pub seed: u64,
 }
 
-/// Where a run lies in its drive.
+/// The rows of a drive that a run covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Span {
     /// First row.
     pub from: usize,
-    /// One behind the last.
+    /// The row after the last one.
     pub to: usize,
     /// Rows before which no fault begins.
     pub healthy: usize,
@@ -179,7 +179,7 @@ pub struct Span {
 impl Fault {
     /// Draws one of a kind.
     #[must_use]
-    pub fn draw(kind: Kind, part: Part, span: Span, draw: &mut Draw) -> Self {
+    pub fn draw(kind: Kind, part: Part, span: Span, draw: &mut Random) -> Self {
         let lines: &[Line] = match (kind, part) {
             (Kind::CanLoss, _) => &[Line::Wheels, Line::Out],
             // What the part sends is what the campaign is about: every second fault is there.
@@ -234,16 +234,16 @@ impl Fault {
         fault
     }
 
-    /// Whether it is there in a row.
+    /// Returns whether the fault is present in a row.
     #[must_use]
     pub fn holds(&self, row: usize) -> bool {
         (self.from..self.from + self.rows).contains(&row)
     }
 
-    /// What is drawn while it lasts.
+    /// Returns the random numbers that are drawn while the fault lasts.
     #[must_use]
-    pub fn draw_on(&self) -> Draw {
-        Draw::new(self.seed, 0)
+    pub fn draw_on(&self) -> Random {
+        Random::new(self.seed, 0)
     }
 }
 

@@ -1,18 +1,15 @@
-//! The board's end of the sensor's line: bytes in, samples out, by the library's parsers.
+//! The board's end of a sensor's line: the library's parsers turn bytes into samples.
 
 use super::fault::Line;
-use super::part::{ADIS, Part};
 use super::wire::Message;
 use crate::parts::icm42688::{Bus, NoDelay};
-use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use crate::parts::{Part, adis16465};
 use gyronet::sample::{FogSample, ImuSample};
 use gyronet::sensor::adis16465::{Adis16465, BURST};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::sensor::xsens::Mti;
 use gyronet::units::Micros;
-use std::convert::Infallible;
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Packets that the board fetches from a FIFO at once.
 const MAX_FETCHED: usize = 32;
@@ -20,17 +17,17 @@ const MAX_FETCHED: usize = 32;
 /// Parser or driver, with its state.
 #[derive(Debug, Clone)]
 pub enum Input {
-    /// Of [`Part::Xsens`].
+    /// The parser of an MTi.
     Xsens(Box<Mti>),
-    /// Of [`Part::Dsp1760`].
+    /// The parser of a DSP-1760, and that of the MTi beside it.
     Dsp1760(Box<(Dsp1760, Mti)>),
-    /// Of [`Part::Icm42688`].
+    /// The driver of an ICM-42688-P.
     Icm42688(Fifo),
-    /// Of [`Part::Adis16465`].
+    /// The driver of an ADIS16465.
     Adis16465(Bursts),
 }
 
-/// What came of some bytes.
+/// The result of some bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delivered {
     /// A sample of the inertial sensor, or bytes that were none.
@@ -51,7 +48,7 @@ impl Input {
         }
     }
 
-    /// Takes a message's bytes at `now`.
+    /// Parses a message that arrives at `now`.
     pub fn receive(&mut self, message: &Message, now: Micros) -> Vec<Delivered> {
         let mut delivered = Vec::new();
         match self {
@@ -97,7 +94,7 @@ pub struct Fifo {
     bus: Bus,
     /// The last good packet and its time.
     last: Option<(Vec<u8>, u64)>,
-    /// What the driver's clock began at.
+    /// The board's time at which the driver's clock started.
     epoch: u64,
 }
 
@@ -142,26 +139,26 @@ impl Clone for Fifo {
 /// An ADIS16465 on its simulated bus.
 #[derive(Debug)]
 pub struct Bursts {
-    driver: Adis16465<Answer>,
-    answer: Answer,
+    driver: Adis16465<adis16465::Bus>,
+    bus: adis16465::Bus,
     last: Option<[u8; BURST]>,
 }
 
 impl Bursts {
     fn new(last: Option<[u8; BURST]>) -> Self {
-        let answer = Answer::default();
-        let mut bursts = Self { driver: Adis16465::new(answer.clone(), ADIS), answer, last: None };
+        let bus = adis16465::Bus::default();
+        let mut bursts = Self { driver: Adis16465::new(bus.clone(), adis16465::MODEL), bus, last: None };
         if let Some(bytes) = last {
             bursts.receive(&bytes, Micros(0));
         }
         bursts
     }
 
-    /// What the part does not send of a burst reads as ones.
+    /// Reads a burst; bytes that the part does not send read as ones.
     fn receive(&mut self, bytes: &[u8], now: Micros) -> Delivered {
         let mut burst = [0xFF; BURST];
         burst.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
-        *self.answer.0.lock().unwrap_or_else(PoisonError::into_inner) = burst;
+        self.bus.answer(burst);
         self.last = Some(burst);
         Delivered::Imu(self.driver.read(now).ok())
     }
@@ -170,25 +167,5 @@ impl Bursts {
 impl Clone for Bursts {
     fn clone(&self) -> Self {
         Self::new(self.last)
-    }
-}
-
-/// Answers every read with the same bytes.
-#[derive(Debug, Clone, Default)]
-struct Answer(Arc<Mutex<[u8; BURST]>>);
-
-impl ErrorType for Answer {
-    type Error = Infallible;
-}
-
-impl SpiDevice for Answer {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
-        let burst = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        for operation in operations {
-            if let Operation::Read(to) = operation {
-                to.iter_mut().zip(burst).for_each(|(to, byte)| *to = byte);
-            }
-        }
-        Ok(())
     }
 }

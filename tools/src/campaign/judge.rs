@@ -1,12 +1,12 @@
-//! A run held against the undamaged one.
+//! The judgement of a run: it is compared with the undamaged run and with the truth.
 
-use super::receiver::{Seen, Told};
+use super::receiver::{Reports, Seen};
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 
 /// Rows of the second over which yaw is compared.
 const SECOND: usize = RATE_HZ as usize;
-/// What is held against the truth, and what a fault may do unseen.
+/// The limits of errors: against the truth, and of undetected faults.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// The most that yaw may move in a second before anything is reported, whatever expected error is sent, rad. It
@@ -27,23 +27,22 @@ impl Limits {
     pub const FIBRE_OPTIC: Self = Self { moved: 1e-4, mean: 1e-4, largest: 2e-4, inside_sigma: [0.0, 1.0] };
 }
 
-/// A sample that was sent as not good owes its estimate to the next ones; so many rows after the
-/// last telling that is paid.
+/// The rows after the last report in which the estimate of a sample that was not good is made up for.
 const PAID: usize = 20;
 const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
 
-/// What a receiver of the undamaged run has of each row.
+/// The messages of the undamaged run, row by row.
 #[derive(Debug, Clone)]
 pub struct Baseline {
     rows: Vec<Row>,
-    /// True yaw at the sample that each row's message tells of, rad.
+    /// The true yaw at the sample of each row's message, rad.
     truth: Option<Vec<f64>>,
     limits: Limits,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Row {
-    told: Told,
+    reports: Reports,
     yaw: Option<i32>,
     sigma: Option<f64>,
     /// Rows in a row, up to this one, that were good.
@@ -51,38 +50,39 @@ struct Row {
     events: u64,
 }
 
-/// What became of a run.
+/// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Outcome {
-    /// From the fault's first effect to the first message (or lack of one) that told of it, s.
+    /// Time from the fault's first effect to the first message, or first missing message, that reports it, s.
     pub told_after: Option<f64>,
     /// The board has counted something; a diagnosis would see it.
     pub counted: bool,
-    /// Largest yaw moved in a second all marked good, before anything was told, rad.
+    /// The largest yaw moved in a second that is all marked good, before the first report, rad.
     pub moved: f64,
-    /// The same over the limit: the smaller one of [`Limits::moved`] and the expected error that was sent with it.
+    /// The largest ratio of that to its limit: the smaller one of [`Limits::moved`] and the expected error that was
+    /// sent with it.
     pub moved_limits: f64,
-    /// From 0.2 s after the last telling on: by how much the error of a good second is larger than
-    /// that of the same second undamaged, rad; where there is no reference, how far it was moved.
+    /// The largest growth of a good second's error over the same second undamaged, from 0.2 s after the last report on,
+    /// rad; without a reference, how far yaw moved.
     pub grown: f64,
-    /// The same over the limit.
+    /// The largest ratio of that to the limit.
     pub grown_limits: f64,
     /// Largest error against the true yaw in a second all marked good, rad.
     pub error: f64,
-    /// From the end of the fault to the last that was told of it, s; 0 where that was before.
+    /// Time from the end of the fault to the last report of it, s; 0 where the last report came before.
     pub recovery: f64,
-    /// It was still told of at the end.
+    /// The fault was still reported at the end.
     pub not_recovered: bool,
 }
 
 impl Outcome {
-    /// Whether the fault moved yaw by more than the limit, and nothing had been reported by then.
+    /// Returns whether the fault moved yaw by more than the limit before anything was reported.
     #[must_use]
     pub fn is_undetected(&self) -> bool {
         self.moved_limits > 1.0
     }
 
-    /// Nothing told of it, and it did nothing that counts.
+    /// Returns whether the fault was not reported and did not move yaw by more than the limit.
     #[must_use]
     pub fn is_harmless(&self) -> bool {
         self.told_after.is_none() && !self.is_undetected()
@@ -100,27 +100,27 @@ pub struct AgainstTruth {
     pub largest: f64,
     /// Share of the errors inside the expected error that was sent; `None` where none is sent.
     pub inside_sigma: Option<f64>,
-    /// Whether all of that is within [`Limits`].
+    /// All of that is within [`Limits`].
     pub in_order: bool,
 }
 
-/// Of one run: where it begins, and when the fault is there.
+/// The times of one run and of its faults.
 #[derive(Debug, Clone, Copy)]
 pub struct Times {
     /// First row of the run.
     pub from: usize,
-    /// One behind the last row.
+    /// The row after the last one.
     pub to: usize,
-    /// When the fault first did something, microseconds.
+    /// The time of the fault's first effect, microseconds.
     pub begin: u64,
-    /// When it was over; the run's end where it lasts.
+    /// The time at which the fault is over, or the run where it lasts.
     pub end: u64,
-    /// When the run ends.
+    /// The time at which the run ends.
     pub last: u64,
 }
 
 impl Baseline {
-    /// From all that was seen of a run of so many rows; `events` after each of them.
+    /// Collects what was seen of a run, and the board's events after each row.
     #[must_use]
     pub fn new(count: usize, seen: &[Seen], events: &[u64], truth: Option<Vec<f64>>, limits: Limits) -> Self {
         let mut rows = vec![Row::default(); count];
@@ -129,41 +129,22 @@ impl Baseline {
         }
         for seen in seen {
             let Some(set) = seen.set else { continue };
-            rows[set.row].told = seen.told;
+            rows[set.row].reports = seen.reports;
             rows[set.row].yaw = Some(set.yaw);
             rows[set.row].sigma = set.sigma;
         }
         let mut good = 0;
         for row in &mut rows {
-            good = if row.yaw.is_some() && row.told.is_nothing() { good + 1 } else { 0 };
+            good = if row.yaw.is_some() && row.reports.is_nothing() { good + 1 } else { 0 };
             row.good = good;
         }
         Self { rows, truth, limits }
     }
 
-    /// What the board had counted when a row was over.
+    /// Returns the board's event count at the end of a row.
     #[must_use]
     pub fn events(&self, row: usize) -> u64 {
         self.rows.get(row).map_or(0, |row| row.events)
-    }
-
-    /// Rows.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
-    /// Share of the rows with a whole good second up to them.
-    #[must_use]
-    pub fn good_share(&self) -> f64 {
-        let good = self.rows.iter().filter(|row| row.good > SECOND).count();
-        good as f64 / self.rows.len().max(1) as f64
     }
 
     /// Holds the undamaged run against the truth, second by second; `None` where there is no truth.
@@ -210,14 +191,14 @@ impl Baseline {
         }
         let mut good = times.from.checked_sub(1).map_or(0, |row| self.rows[row].good);
         let mut last_row = times.from.wrapping_sub(1);
-        let (mut last_told, mut told_row) = (None, 0);
+        let (mut last_report, mut report_row) = (None, 0);
         for seen in seen {
-            let undamaged = seen.set.map_or(Told::default(), |set| self.rows[set.row].told);
-            if !seen.told.beyond(undamaged).is_nothing() && seen.at >= times.begin {
+            let undamaged = seen.set.map_or(Reports::default(), |set| self.rows[set.row].reports);
+            if !seen.reports.beyond(undamaged).is_nothing() && seen.at >= times.begin {
                 let after = (seen.at - times.begin) as f64 * 1e-6;
                 outcome.told_after.get_or_insert(after);
-                last_told = Some(seen.at);
-                told_row = seen.set.map_or(last_row, |set| set.row);
+                last_report = Some(seen.at);
+                report_row = seen.set.map_or(last_row, |set| set.row);
             }
             let Some(set) = seen.set else {
                 good = 0;
@@ -226,7 +207,7 @@ impl Baseline {
             let connected = set.row == last_row.wrapping_add(1);
             last_row = set.row;
             let base = self.rows[set.row].yaw;
-            good = match (seen.told.is_nothing(), connected) {
+            good = match (seen.reports.is_nothing(), connected) {
                 (true, true) => good + 1,
                 (true, false) => 1,
                 (false, _) => 0,
@@ -251,7 +232,7 @@ impl Baseline {
             if outcome.told_after.is_none() {
                 outcome.moved = outcome.moved.max(by);
                 outcome.moved_limits = outcome.moved_limits.max(by / limit);
-            } else if start >= told_row.saturating_add(PAID) {
+            } else if start >= report_row.saturating_add(PAID) {
                 let undamaged = error([self.rows[start].yaw, self.rows[set.row].yaw]);
                 let grown =
                     own.zip(undamaged).map_or(by, |(own, undamaged)| (own - undamaged).clamp(0.0, by));
@@ -259,10 +240,10 @@ impl Baseline {
                 outcome.grown_limits = outcome.grown_limits.max(grown / limit);
             }
         }
-        if let Some(last_told) = last_told {
-            outcome.recovery = last_told.saturating_sub(times.end) as f64 * 1e-6;
+        if let Some(last_report) = last_report {
+            outcome.recovery = last_report.saturating_sub(times.end) as f64 * 1e-6;
             // Half a second of nothing wrong is recovery.
-            outcome.not_recovered = times.end < times.last && last_told + 500_000 > times.last;
+            outcome.not_recovered = times.end < times.last && last_report + 500_000 > times.last;
         }
         outcome
     }

@@ -1,12 +1,12 @@
-//! Faults of what is measured: in the part, in its clock, at the wheels.
+//! Faults of the measurements: in the part, in its clock, at the wheels.
 
 use super::drive::Reading;
 use super::fault::{Fault, Kind};
-use super::part::Part;
+use crate::parts::Part;
 use gyronet::units::{AngularRate, SpecificForce};
 
-/// Lets a fault loose on the readings of the rows from `first_row` on; gives when it first did
-/// something. `gyro_bias`: what is no motion in the readings.
+/// Applies a fault to the readings of the rows from `first_row` on and returns the time of its first effect.
+/// `gyro_bias` is the part of the readings that is no motion.
 pub fn disturb(
     readings: &mut [Reading],
     first_row: usize,
@@ -114,7 +114,7 @@ fn shift(reading: &mut Reading, fault: &Fault, part: Part) {
     }
 }
 
-/// All wheels, the rear axle, the front axle, or one.
+/// Spins or locks all wheels, the rear axle, the front axle, or one wheel.
 fn slip(reading: &mut Reading, fault: &Fault) {
     for (wheel, speed) in reading.wheels.iter_mut().enumerate() {
         let slips = match fault.form {

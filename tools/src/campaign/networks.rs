@@ -1,4 +1,4 @@
-//! Both networks of the board, and a memory of what they say of an undamaged drive.
+//! Both networks of the board, with a memory of their answers to an undamaged drive.
 
 use gyronet::fog::seconds::{Second, SecondsWindow};
 use gyronet::model::fognet::{FogEstimate, FogNetState, MinuteNetwork};
@@ -58,7 +58,7 @@ pub struct Known {
 pub struct Remembering<'a, N> {
     /// The networks themselves.
     pub networks: &'a mut N,
-    /// What they need not be asked twice.
+    /// The answers that are known already.
     pub known: &'a Known,
 }
 

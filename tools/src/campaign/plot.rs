@@ -1,5 +1,5 @@
-//! The runs of single faults in two panels: how soon a receiver learns of each kind of fault, and how far yaw has moved
-//! by then.
+//! The runs of single faults in two panels: how soon a receiver has a report of each kind of fault, and how far yaw has
+//! moved by then.
 
 use super::Run;
 use super::fault::Kind;

@@ -1,12 +1,12 @@
-//! An ECU that reads our own yaw messages, of the inertial sensor or of the fibre-optic gyro: what is reported to it, and
-//! what it takes for good.
+//! An ECU that reads our own yaw messages, of the inertial sensor or of the fibre-optic gyro, and collects the reports
+//! in them.
 //!
 //! It checks E2E, takes a set of rate, angle and detail only where all three carry the same
 //! sample counter, and takes silence for a fault.
 
 use super::fault::Line;
-use super::part::Part;
 use super::wire::Message;
+use crate::parts::Part;
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::config::Config;
 use gyronet::can::e2e::{Checker, Verdict};
@@ -15,16 +15,16 @@ use gyronet::can::slcan::assembler::LineAssembler;
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Quality, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::{DataFrame, slcan};
 
-/// Without a whole set for so long the sender is taken for dead: three periods and a half.
+/// The sender counts as dead after so long without a whole set, microseconds: three periods and a half.
 pub const TIMEOUT_US: u64 = 35_000;
-/// So many lost messages in a row are loss; more are disorder.
+/// Up to so many missing messages in a row are loss; more are disorder.
 const MAX_DELTA: u8 = 10;
 
-/// What a receiver is told, a bit each: 0 to 7 the fault byte.
+/// The reports that a receiver has, one bit each; bits 0 to 7 are the fault byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Told(pub u32);
+pub struct Reports(pub u32);
 
-impl Told {
+impl Reports {
     /// Quality other than good.
     pub const NOT_GOOD: Self = Self(1 << 8);
     /// Quality "not to be used".
@@ -33,16 +33,16 @@ impl Told {
     pub const DAMAGED: Self = Self(1 << 10);
     /// Messages are missing, come twice, or in disorder.
     pub const SEQUENCE: Self = Self(1 << 11);
-    /// No set for [`TIMEOUT_US`].
+    /// The report that no set came for [`TIMEOUT_US`].
     pub const SILENT: Self = Self(1 << 12);
 
-    /// What this says and another one does not.
+    /// Returns the reports in this that are not in another.
     #[must_use]
     pub const fn beyond(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// Whether it says nothing.
+    /// Returns whether there is no report.
     #[must_use]
     pub const fn is_nothing(self) -> bool {
         self.0 == 0
@@ -53,7 +53,7 @@ impl Told {
     }
 }
 
-/// One set of messages.
+/// A set of messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Set {
     /// Row of the sample with which it was sent.
@@ -64,13 +64,13 @@ pub struct Set {
     pub sigma: Option<f64>,
 }
 
-/// Something that the receiver notices.
+/// An observation of the receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
-    /// When, microseconds of the board's clock.
+    /// The time, microseconds of the board's clock.
     pub at: u64,
-    /// What it is told.
-    pub told: Told,
+    /// The reports.
+    pub reports: Reports,
     /// The set, where there is one.
     pub set: Option<Set>,
 }
@@ -105,7 +105,7 @@ impl Receiver {
         }
     }
 
-    /// Takes a line's bytes; what it notices is appended.
+    /// Reads a line's bytes and appends the observations.
     pub fn receive(&mut self, message: &Message, seen: &mut Vec<Seen>) {
         debug_assert_eq!(message.line, Line::Out);
         self.time(message.at, seen);
@@ -121,7 +121,7 @@ impl Receiver {
             };
             match frame {
                 Some(frame) => seen.extend(self.frame(&frame, message)),
-                None => seen.push(Seen { at: message.at, told: Told::DAMAGED, set: None }),
+                None => seen.push(Seen { at: message.at, reports: Reports::DAMAGED, set: None }),
             }
         }
     }
@@ -131,7 +131,7 @@ impl Receiver {
         if let Some(last) = self.last
             && now > last + TIMEOUT_US
         {
-            seen.push(Seen { at: last + TIMEOUT_US, told: Told::SILENT, set: None });
+            seen.push(Seen { at: last + TIMEOUT_US, reports: Reports::SILENT, set: None });
             self.last = Some(now);
         }
     }
@@ -139,15 +139,15 @@ impl Receiver {
     fn frame(&mut self, frame: &DataFrame, message: &Message) -> Option<Seen> {
         let (id, data) = (frame.id(), frame.data());
         let index = self.messages.iter().position(|(own, _)| *own == id)?;
-        let mut seen = Seen { at: message.at, told: Told::default(), set: None };
+        let mut seen = Seen { at: message.at, reports: Reports::default(), set: None };
         match self.messages[index].1.check(data) {
-            Err(_) => seen.told.add(Told::DAMAGED),
+            Err(_) => seen.reports.add(Reports::DAMAGED),
             Ok(Verdict::First | Verdict::Ok) => {}
             Ok(Verdict::Lost(_) | Verdict::Repeated | Verdict::WrongSequence { .. }) => {
-                seen.told.add(Told::SEQUENCE);
+                seen.reports.add(Reports::SEQUENCE);
             }
         }
-        if !seen.told.is_nothing() {
+        if !seen.reports.is_nothing() {
             return Some(seen);
         }
         let counter = data[2];
@@ -167,12 +167,12 @@ impl Receiver {
         }
         let ((_, rate), (_, angle)) = (rate, angle);
         self.last = Some(seen.at);
-        seen.told.add(Told(angle.faults.0.into()));
+        seen.reports.add(Reports(angle.faults.0.into()));
         if rate.quality != Quality::Good {
-            seen.told.add(Told::NOT_GOOD);
+            seen.reports.add(Reports::NOT_GOOD);
         }
         if rate.quality == Quality::Unusable {
-            seen.told.add(Told::UNUSABLE);
+            seen.reports.add(Reports::UNUSABLE);
         }
         // 1e-5 deg/s over a second.
         let sigma = (detail.sigma != SIGMA_UNKNOWN).then(|| (f64::from(detail.sigma) * 1e-5).to_radians());

@@ -1,4 +1,4 @@
-//! What a campaign has shown: a line for each kind of fault.
+//! The results of a campaign: one line for each kind of fault.
 
 use super::Run;
 use super::exceptions::EXCEPTIONS;
@@ -11,7 +11,7 @@ use std::fmt;
 /// Median and most.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Spread {
-    /// Half of them are below.
+    /// The median.
     pub median: f64,
     /// The largest.
     pub most: f64,
@@ -25,18 +25,18 @@ impl Spread {
     }
 }
 
-/// All runs of one kind of fault.
+/// The runs of one kind of fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Line {
     /// The kind.
     pub name: String,
     /// Runs.
     pub runs: usize,
-    /// A receiver was told.
+    /// Runs in which a receiver had a report.
     pub told: usize,
-    /// Nothing told of it, and it did nothing that counts.
+    /// Runs without a report in which yaw did not move by more than the limit.
     pub harmless: usize,
-    /// Of those, the board has counted something.
+    /// Those of them in which the board counted something.
     pub counted: usize,
     /// Undetected, and on the named list.
     pub excepted: usize,
@@ -44,12 +44,12 @@ pub struct Line {
     pub undetected: usize,
     /// Panics.
     pub panics: usize,
-    /// From the first effect to the telling, s.
+    /// Time from the first effect to the report, s.
     pub told_after: Spread,
     /// The most that yaw was moved in a good second before anything was reported, the named ones left
     /// out, rad.
     pub moved: f64,
-    /// The same over the limit.
+    /// The largest ratio of that to the limit.
     pub moved_limits: f64,
     /// The most that the error of a good second has grown after the last report, over the limit.
     pub grown_limits: f64,
@@ -57,9 +57,9 @@ pub struct Line {
     pub grown: usize,
     /// Largest error against the reference in a good second, rad.
     pub error: f64,
-    /// From the end of the fault, s.
+    /// Time from the end of the fault to the last report, s.
     pub recovery: Spread,
-    /// Still told of at the end of the run, though the fault was over.
+    /// Runs that were still reported at their end, though the fault was over.
     pub not_recovered: usize,
 }
 
@@ -68,7 +68,7 @@ pub struct Line {
 pub struct Excepted {
     /// Its name.
     pub name: &'static str,
-    /// Why nothing sees it.
+    /// The reason why nothing detects it.
     pub why: &'static str,
     /// Runs.
     pub runs: usize,
@@ -96,13 +96,13 @@ pub struct Failure {
     pub drive: String,
     /// The part.
     pub part: &'static str,
-    /// What was done to it.
+    /// The faults.
     pub faults: Vec<Fault>,
-    /// What is wrong.
+    /// The failure in words.
     pub what: String,
 }
 
-/// Everything.
+/// The results of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// The seed.
@@ -113,7 +113,7 @@ pub struct Report {
     pub lines: Vec<Line>,
     /// The named list.
     pub exceptions: Vec<Excepted>,
-    /// What must not be.
+    /// Runs that failed.
     pub failures: Vec<Failure>,
 }
 
@@ -216,15 +216,15 @@ impl fmt::Display for Report {
         }
         writeln!(
             f,
-            "{:<15} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6}  {:>13}  {:>7}  {:>8} {:>6}  {:>13} {:>5}",
+            "{:<15} {:>6} {:>8} {:>8} {:>7} {:>10} {:>6}  {:>13}  {:>7}  {:>8} {:>6}  {:>13} {:>5}",
             "fault",
             "runs",
-            "told",
+            "reported",
             "harmless",
             "named",
             "undetected",
             "panics",
-            "told after ms",
+            "reported ms",
             "moved/l",
             "grown/l",
             "runs",
@@ -235,7 +235,7 @@ impl fmt::Display for Report {
             let ms = |value: f64| 1e3 * value;
             writeln!(
                 f,
-                "{:<15} {:>6} {:>6} {:>8} {:>7} {:>10} {:>6}  {:>6.0} {:>6.0}  {:>7.2}  {:>8.2} {:>6}  {:>6.2} {:>6.2} {:>5}",
+                "{:<15} {:>6} {:>8} {:>8} {:>7} {:>10} {:>6}  {:>6.0} {:>6.0}  {:>7.2}  {:>8.2} {:>6}  {:>6.2} {:>6.2} {:>5}",
                 line.name,
                 line.runs,
                 line.told,

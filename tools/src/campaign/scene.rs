@@ -1,15 +1,16 @@
-//! A drive with one part, undamaged: where every run begins, and what it is held against.
+//! An undamaged drive with one part: every run begins at one of its states and is compared with it.
 
 use super::board::Board;
 use super::drive::{Drive, Reading};
+use super::encode::encode;
 use super::fault::{Fault, Line, Span};
 use super::judge::{Baseline, Limits, Outcome, Times};
 use super::motion::disturb;
 use super::networks::{Collecting, Known, Networks, Remembering};
-use super::part::Part;
 use super::receiver::Receiver;
 use super::wire::{Message, damage};
 use crate::drive::wheel_frames;
+use crate::parts::Part;
 use gyronet::can::slcan;
 use gyronet::compensate::{CompensateConfig, Hop, Mode};
 use gyronet::pipeline::PipelineConfig;
@@ -19,7 +20,7 @@ use std::ops::Range;
 
 /// Runs may begin so many rows apart.
 pub const STATE_EVERY: usize = RATE_HZ as usize;
-/// When in a row wheel frames come, microseconds before its end.
+/// Time from a wheel frame to the end of its row, microseconds.
 const WHEEL_BEFORE_US: u64 = 3_000;
 /// The board looks at its clock so often.
 const TURN_US: u64 = 1_000;
@@ -31,9 +32,9 @@ pub struct Scene<'d> {
     pub drive: &'d Drive,
     /// The part.
     pub part: Part,
-    /// What the network says of it.
+    /// The networks' answers for it.
     pub known: Known,
-    /// What a receiver gets.
+    /// The messages of the undamaged run.
     pub baseline: Baseline,
     gyro_bias: [AngularRate; 3],
     /// Before every [`STATE_EVERY`]th row.
@@ -172,7 +173,7 @@ fn messages(readings: &[Reading], first_row: usize, part: Part) -> Vec<Message> 
         if row.is_multiple_of(wheel_frames::FRAME_ROWS) {
             messages.extend(wheel_frame(row, reading));
         }
-        part.send(row, reading, &mut messages);
+        encode(part, row, reading, &mut messages);
     }
     messages.sort_by_key(|message| message.at);
     messages

@@ -1,5 +1,5 @@
-//! Hours of a simulated drive through the whole way of the data, as fast as the host can: bytes
-//! of an MTi in, frames as SLCAN text out, read back as a receiver reads them.
+//! Hours of a simulated drive through all stages, as fast as the host can: bytes of an MTi go in, frames come out as
+//! SLCAN text, and a receiver reads them.
 //!
 //! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
 //! 32-bit microseconds begin half the drive before their end, packet counters and the counters
@@ -29,22 +29,22 @@ const GOOD: u32 = 3;
 const FRAMES: u64 = 6;
 /// Samples until the first one that is corrected, with something to spare.
 const INITIALISED: u32 = 100 * RATE_HZ;
-/// Half a least bit of the angle message, and one of each value that is summed: deg.
+/// Half a least bit of the angle message, and one of each value that is summed, deg.
 const YAW_TOLERANCE: f64 = 1e-6;
 
 /// Half a least bit of the drop-in rate for 10 ms, and what a sum of floats needs: deg.
 const DROP_IN_TOLERANCE: f64 = 2.5e-5 + 1e-9;
 
-/// What came of it.
+/// The results of a soak.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Soak {
     /// Samples sent.
     pub samples: u32,
-    /// What the pipeline counted.
+    /// The pipeline's counters.
     pub pipeline: Counters,
-    /// What the sensor monitor counted.
+    /// The sensor monitor's counters.
     pub watch: MonitorCounters,
-    /// What the receiver counted.
+    /// The receiver's counters.
     pub receiver: Counts,
     /// Samples with each status: initialising, degraded, ready.
     pub statuses: [u32; 3],
@@ -63,8 +63,7 @@ pub struct Soak {
     pub turns: f64,
     /// Times that the part's ticks, the board's and the gyro's 32-bit microseconds wrapped.
     pub wraps: [u32; 3],
-    /// Resident memory after a tenth of the drive and at its end, KiB; `None` where it cannot be
-    /// told.
+    /// Resident memory after a tenth of the drive and at its end, KiB; `None` where the system does not report it.
     pub memory_kib: Option<[u64; 2]>,
 }
 
@@ -225,7 +224,7 @@ impl Drive {
 }
 
 impl Soak {
-    /// What is not as it must be; empty when all is.
+    /// Returns the names of the checks that do not hold.
     #[must_use]
     pub fn faults(&self) -> Vec<String> {
         let samples = u64::from(self.samples);
@@ -291,7 +290,7 @@ impl fmt::Display for Soak {
     }
 }
 
-/// Resident memory of this process, where the system tells it as Linux does.
+/// Returns the resident memory of this process, where the system reports it as Linux does.
 fn resident_kib() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

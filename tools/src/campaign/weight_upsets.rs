@@ -1,10 +1,11 @@
-//! Single bits that flip in a weight file: refused when it is loaded, found in the background when it is in use.
+//! Single bits that flip in a weight file: they are refused when it is loaded, or found in the background when it is in
+//! use.
 //!
 //! Weights lie in flash under a CRC-32, which is checked when they are loaded and again, piece by
 //! piece, while they are used ([`gyronet::model::background`]). Until that finds a flipped bit,
 //! the limits of [`gyronet::compensate::CompensateConfig`] are what bounds its effect.
 
-use super::draw::Draw;
+use crate::random::Random;
 use gyronet::compensate::CompensateConfig;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::blob::{HEADER_LEN, HIDDEN};
@@ -22,20 +23,20 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// Bytes that the image's idle task checks in a millisecond: a pass is 9.7 s.
 pub const PIECE: usize = 13;
 
-/// What flipped bits of a weight file do.
+/// The effects of flipped bits in a weight file.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct WeightUpsets {
     /// Bits of the header, provenance included.
     pub header_bits: usize,
-    /// Of those, refused when loaded.
+    /// Those of them that were refused when loaded.
     pub header_refused: usize,
     /// Bits of weights that were flipped, one at a time.
     pub weight_bits: usize,
-    /// Of those, refused when loaded.
+    /// Those of them that were refused when loaded.
     pub weight_refused: usize,
-    /// What they do when they flip after that.
+    /// The effects of bits that flip after that.
     pub effects: Effects,
-    /// From a flip to the moment that the background check tells, median and most, s.
+    /// Time from a flip to its report by the background check, median and most, s.
     pub found_after: [f64; 2],
     /// Flips that it has not found in two passes.
     pub not_found: usize,
@@ -88,7 +89,7 @@ impl Memory {
     }
 }
 
-/// Where the header and its provenance end.
+/// Returns the end of the header and its provenance.
 fn first_weight(file: &[u8]) -> usize {
     let length =
         file.get(20..24).map_or(0, |bytes| bytes.iter().rev().fold(0, |n, byte| n << 8 | usize::from(*byte)));
@@ -96,8 +97,8 @@ fn first_weight(file: &[u8]) -> usize {
 }
 
 impl WeightUpsets {
-    /// Every bit of the header, and `bits` of the weights, drawn by a seed. Each damaged network is
-    /// asked about some windows. `tick` is called once for each bit.
+    /// Flips every bit of the header, and `bits` of the weights that a seed draws. Each damaged network estimates some
+    /// windows. `tick` is called once for each bit.
     #[must_use]
     pub fn new(
         file: &[u8],
@@ -118,7 +119,7 @@ impl WeightUpsets {
         }
         let mut network = GyroNet::new(*loaded);
         let undamaged: Vec<Estimate> = windows.iter().map(|window| network.estimate(window)).collect();
-        let mut draw = Draw::new(seed, 0);
+        let mut draw = Random::new(seed, 0);
         let mut found = Vec::new();
         for _ in 0..bits {
             let bit = first + draw.below(8 * (file.len() - 4) - first);
@@ -146,7 +147,7 @@ impl WeightUpsets {
     }
 }
 
-/// Whether the estimates are believed, and what a second of the worst of them moves yaw by, rad and
+/// Returns whether the estimates are rejected, and by how much a second of the worst of them moves yaw, in rad and in
 /// stated sigmas.
 fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate]) -> (bool, f64, f64) {
     let limits = CompensateConfig::DEFAULT;
@@ -169,8 +170,8 @@ fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate
     (told, moved, sigmas)
 }
 
-/// Milliseconds until the background check tells, of a flip that happens when it has come to byte
-/// `at`; `None` after two passes.
+/// Returns the milliseconds until the background check reports a flip that happens when it has come to byte `at`;
+/// `None` after two passes.
 ///
 /// Only the bytes of the pass in which the flip is seen need be looked at: the sum of a pass does
 /// not fit from that pass on.
@@ -192,26 +193,26 @@ impl fmt::Display for WeightUpsets {
         writeln!(f, "flipped in use: {}", self.effects)?;
         writeln!(
             f,
-            "background check: told after {median:.1} s, at most {most:.1} s; {} not found",
+            "background check: reports after {median:.1} s, at most {most:.1} s; {} not found",
             self.not_found
         )
     }
 }
 
-/// What flipped bits did.
+/// The numbers of flipped bits by effect.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Effects {
     /// Bits flipped.
     pub bits: usize,
-    /// Nothing changed.
+    /// Bits that changed nothing.
     pub nothing: usize,
-    /// The estimate was not believed: a receiver is told.
+    /// Bits whose estimate was rejected, which a receiver sees.
     pub told: usize,
     /// Yaw moved by no more than the stated sigma.
     pub within: usize,
-    /// It moved further, and nothing told.
+    /// Bits that moved yaw further without a report.
     pub beyond: usize,
-    /// The most that it moved in a second where nothing told, rad.
+    /// The most that yaw moved in a second without a report, rad.
     pub most: f64,
     /// Arithmetic that overflowed; the board's wraps.
     pub panics: usize,
@@ -239,7 +240,7 @@ impl fmt::Display for Effects {
         write!(
             f,
             "{bits} bits: {nothing} changed nothing, {within} moved yaw by at most the stated sigma, {beyond} by \
-             more, at most {most:.1e} rad in a second, {told} were told of, {panics} panics"
+             more, at most {most:.1e} rad in a second, {told} were reported, {panics} panics"
         )
     }
 }

@@ -1,26 +1,26 @@
-//! Messages on a line, and what a line does to them.
+//! Messages on a line, and the faults of a line.
 
 use super::fault::{Fault, Kind, Line};
+use crate::random::Random;
 
 /// Bytes that came over a line together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
-    /// Which line.
+    /// The line.
     pub line: Line,
-    /// Row of the drive that it tells of.
+    /// The row of the drive that it describes.
     pub row: usize,
-    /// When it comes, microseconds of the board's clock.
+    /// The time of its arrival, microseconds of the board's clock.
     pub at: u64,
-    /// What comes.
+    /// The bytes.
     pub bytes: Vec<u8>,
 }
 
-/// Lets a fault loose on messages, which are in the order of their coming; gives when it first
-/// did something.
+/// Applies a fault to messages in the order of their arrival and returns the time of its first effect.
 pub fn damage(messages: &mut Vec<Message>, fault: &Fault) -> Option<u64> {
     let mut draw = fault.draw_on();
     let mut first = None;
-    let mut hit = |message: &Message, draw: &mut super::draw::Draw| {
+    let mut hit = |message: &Message, draw: &mut Random| {
         let hit = message.line == fault.line
             && fault.holds(message.row)
             && (first.is_none() || draw.chance(fault.share));

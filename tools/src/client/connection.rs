@@ -7,24 +7,24 @@ use std::time::Duration;
 /// Longest wait for a connection, and for what is written to be taken.
 const CONNECT: Duration = Duration::from_secs(5);
 
-/// Why there is none.
+/// The error of a connection that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConnectError {
-    /// Nothing that can be opened.
+    /// The name is neither host:port nor a serial port that can be opened.
     #[error("{name}: not host:port, and not a serial port that can be opened: {source}")]
     Serial {
-        /// As asked for.
+        /// The name as given.
         name: String,
-        /// What the system says.
+        /// The system's error.
         source: serialport::Error,
     },
-    /// Nobody listens.
+    /// The host does not accept the connection.
     #[error("{name}: cannot be connected: {source}")]
     Tcp {
-        /// As asked for.
+        /// The name as given.
         name: String,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }
@@ -75,7 +75,7 @@ fn connect(name: &str, wait: Duration) -> io::Result<TcpStream> {
     Err(last)
 }
 
-/// Whether a read has only waited in vain.
+/// Returns whether a read has only timed out.
 #[must_use]
 pub fn is_silence(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)

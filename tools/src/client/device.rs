@@ -1,4 +1,4 @@
-//! The asking side of the service line: requests out, replies in, over whatever carries bytes.
+//! The client of the service line: it sends requests and reads replies over anything that carries bytes.
 
 pub mod calibration;
 pub mod line;
@@ -12,14 +12,14 @@ use gyronet::service::{Reply, Request};
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
-/// How long an answer may take.
+/// The longest time that an answer may take.
 const ANSWER: Duration = Duration::from_secs(2);
-/// How long the board may take to erase a slot: twice the datasheet's worst case.
+/// The longest time that the board may take to erase a slot: twice the datasheet's worst case.
 const ERASURE: Duration = Duration::from_secs(8);
 /// Times that a question is put.
 const ATTEMPTS: u32 = 3;
 
-/// Why there is no answer, or not the one that was hoped for.
+/// The error of a question without the expected answer.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     /// The line cannot be opened.
@@ -30,10 +30,10 @@ pub enum DeviceError {
     Line {
         /// Its name.
         port: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Nothing that is an answer came.
+    /// No answer came.
     #[error(
         "{port}: no answer to {ATTEMPTS} attempts; is this the service line, and is the board \
          running? ({strays} frames were no answers{})",
@@ -44,7 +44,7 @@ pub enum DeviceError {
         port: String,
         /// Frames that came and were no answer.
         strays: u32,
-        /// Why the last of them was none.
+        /// The reason why the last of them was none.
         last: Option<FrameError>,
     },
     /// The board said no.

@@ -1,4 +1,4 @@
-//! What a receiver of our messages sees: rate, yaw, quality, and everything that was lost.
+//! The CAN messages as a receiver sees them: rate, yaw, quality, and every lost message.
 //!
 //! [`mod@line`] reads text, [`source`] opens what it comes from; [`Monitor`] checks the frames as an
 //! ECU would and keeps the accounts.
@@ -25,7 +25,7 @@ const MAX_DELTA: u8 = 10;
 /// Frames are counted for so long, in seconds, to say how many come in one.
 const PACE_SECONDS: f64 = 1.0;
 
-/// What happened to the messages so far.
+/// The numbers of messages by what happened to them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Counts {
     /// Frames that are ours, those of a fibre-optic gyro included.
@@ -67,7 +67,7 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// For messages sent with a configuration; those of a fibre-optic gyro are under [`FOG_IDS`].
+    /// Expects the messages of a configuration; those of a fibre-optic gyro have the identifiers of [`FOG_IDS`].
     #[must_use]
     pub fn new(config: &Config) -> Self {
         Self {
@@ -85,8 +85,8 @@ impl Monitor {
         }
     }
 
-    /// Takes a line; gives the time, in seconds, where it completed a set of our own messages: the
-    /// line's own where it has one, else `time`.
+    /// Reads a line and returns the time, in seconds, where it completed a set of our own messages: the line's own
+    /// where it has one, else `time`.
     ///
     /// Answers to commands are passed over; what begins as a frame and is none is counted.
     pub fn take_line(&mut self, line: &str, time: f64) -> Option<f64> {
@@ -103,7 +103,7 @@ impl Monitor {
         }
     }
 
-    /// Takes a frame; gives whether it completed a set of our own messages. `time` in seconds.
+    /// Checks a frame at a time in seconds and returns whether it completed a set of our own messages.
     pub fn take(&mut self, frame: &impl Frame, time: f64) -> bool {
         self.keep_pace(time);
         let (id, data) = (frame.id(), frame.data());

@@ -11,16 +11,16 @@ use std::path::Path;
 
 /// Count instructions and modelled cycles on the target, in QEMU.
 ///
-/// Of every kernel, network and sensor parser, on a Cortex-M4F. Needs qemu-system-arm; cycles need a C
-/// compiler too. Prints one line each, `name instructions=N cycles=N cycles_5ws=N stack=BYTES`, then
-/// sizes, then what the parsers cost for a byte and of the processor's time. Cycles are modelled, not
-/// measured on silicon: at zero wait states, and on an STM32F405 at 168 MHz, whose flash has five. Then
-/// every task and interrupt of the flashed image, counted while it runs, and whether each meets its
-/// deadline at 168 MHz and 5 wait states with a quarter of it to spare. Exit status 1 when the count of
-/// a window depends on its input, or a deadline can be missed.
+/// The command measures every kernel, network and sensor parser on a Cortex-M4F. It needs qemu-system-arm, and a
+/// C compiler for cycles. It prints one line each, `name instructions=N cycles=N cycles_5ws=N stack=BYTES`, then
+/// sizes, then the parsers' cost for a byte and their share of the processor's time. Cycles are modelled, not
+/// measured on silicon: at zero wait states, and on an STM32F405 at 168 MHz, whose flash has five. Then follow all
+/// tasks and interrupts of the flashed image, counted while it runs, and whether each meets its deadline at 168 MHz
+/// and 5 wait states with a quarter of it to spare. The exit status is 1 when the count of a window depends on its
+/// input, or a deadline can be missed.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Print instead how far the cycles depend on what ST's manual leaves open of the flash accelerator.
+    /// Print how the cycles depend on policies of the flash accelerator that ST's manual leaves open.
     #[arg(long)]
     policies: bool,
 }
@@ -46,9 +46,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let image = bench::build(&workspace, "coprocessor", &folder)?;
     let coprocessor = ImageSize::read(&image)?;
-    let tasks = if counts.exact() { Some(schedule(&workspace, &image)?) } else { None };
+    let tasks = if counts.exact() { Some(schedule(&workspace, &image, &counts)?) } else { None };
     let out = &mut io::stdout().lock();
-    let told = if common.json {
+    let written = if common.json {
         writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))
     } else {
         print(out, &counts, &coprocessor, tasks.as_ref())
@@ -60,7 +60,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if tasks.is_some_and(|(_, schedule)| !schedule.met()) {
         return Err("a task of the image can miss its deadline".into());
     }
-    Ok(told?)
+    Ok(written?)
 }
 
 /// Cycles of the networks, the pipeline and the parsers under each policy, a line each.
@@ -87,14 +87,18 @@ fn policies(workspace: &Path, folder: &Path) -> super::Result {
     Ok(())
 }
 
-/// What the image's handlers cost, and whether that is in time.
+/// The costs of the image's handlers, and their response times.
 type Timing = (Tasks, Schedule);
 
 /// The tasks of the image that is flashed, counted while it runs.
-fn schedule(workspace: &Path, image: &Path) -> Result<Timing, Box<dyn std::error::Error>> {
+fn schedule(workspace: &Path, image: &Path, counts: &Counts) -> Result<Timing, Box<dyn std::error::Error>> {
     let plugin = bench::plugin(workspace).ok_or("the instruction counter cannot be built")?;
     let tasks = tasks::measure(image, &plugin)?;
-    let schedule = Schedule::new(&tasks);
+    let fognet = counts.get("fognet/window").and_then(|count| {
+        let cycles = Cycles { zero: count.cycles?, five: count.cycles_5ws? };
+        Some((count.instructions, cycles))
+    });
+    let schedule = Schedule::new(&tasks, fognet);
     let schedule = schedule.ok_or("the image has other tasks than the table of deadlines")?;
     Ok((tasks, schedule))
 }

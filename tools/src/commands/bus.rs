@@ -1,4 +1,4 @@
-//! `gyronet bus`: what is sent, and what it costs.
+//! `gyronet bus`: the CAN messages and the bus load.
 
 use super::{Common, print_json};
 use embedded_can::Id;
@@ -8,11 +8,11 @@ use gyronet::can::load::{Periodic, per_mille};
 use gyronet::can::yaw::FOG_IDS;
 use std::io::{self, Write};
 
-/// Print what is sent on CAN, and what it costs.
+/// Print the CAN messages and the bus load.
 ///
-/// For each configuration that comes with the library: identifiers, periods (ms), the load of the bus
-/// with as many stuff bits as there can be, and of SLCAN lines. The messages of a fibre-optic gyro are
-/// sent from when it is heard, from the start where one is configured.
+/// For each configuration that comes with the library the command prints identifiers, periods (ms), the load of
+/// the bus with the most stuff bits possible, and that of SLCAN lines. The messages of a fibre-optic gyro are sent
+/// once its first data arrive, or from the start where one is configured.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {}
 

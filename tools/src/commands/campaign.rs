@@ -1,4 +1,4 @@
-//! `gyronet campaign`: faults on purpose.
+//! `gyronet campaign`: fault injection.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
@@ -6,21 +6,21 @@ use gyronet::model::{Blob, weights};
 use gyronet_tools::bundled;
 use gyronet_tools::campaign::drive::Drive;
 use gyronet_tools::campaign::networks::Integer;
-use gyronet_tools::campaign::part::Part;
 use gyronet_tools::campaign::report::Report;
 use gyronet_tools::campaign::scene::Scene;
 use gyronet_tools::campaign::weight_upsets::WeightUpsets;
 use gyronet_tools::campaign::{self, Plan, plot};
 use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::parts::Part;
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Damage drives on purpose and see what a receiver is told.
+/// Damage drives on purpose and count which faults a receiver sees.
 ///
-/// The bundled simulated drive, and recordings where they are given, go through the bytes of four
-/// parts and through SLCAN; faults are drawn by a seed, single and in pairs. Exit status 1 when
-/// one goes undetected that is not on the named list, or anything panics.
+/// The bundled simulated drive and the given recordings go through the bytes of four parts and through SLCAN. A
+/// seed draws faults, single and in pairs. The exit status is 1 when a fault goes undetected that is not on the
+/// named list, or anything panics.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -31,19 +31,19 @@ pub struct Args {
     /// Recordings to damage beside the simulated drive.
     #[arg(value_name = "DRIVE.csv")]
     drives: Vec<PathBuf>,
-    /// How many runs, of 8 s at most.
+    /// Number of runs, each of 8 s at most.
     #[arg(long, default_value_t = 20_000)]
     runs: usize,
-    /// The same seed gives the same runs.
+    /// Seed; the same seed gives the same runs.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// A small part of it: 320 runs.
+    /// Run a small part: 320 runs.
     #[arg(long)]
     quick: bool,
-    /// Flip bits of the weight file instead: every bit of its header, and so many of the weights.
+    /// Flip bits of the weight file instead: every bit of its header, and this many bits of the weights.
     #[arg(long, value_name = "BITS", num_args = 0..=1, default_missing_value = "100000")]
     upsets: Option<usize>,
-    /// Draw the runs of single faults as SVG here.
+    /// Write a picture of the runs of single faults to this file.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }

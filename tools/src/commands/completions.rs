@@ -1,4 +1,4 @@
-//! `gyronet completions`: what a shell needs to complete our arguments.
+//! `gyronet completions`: completions of the arguments for a shell.
 
 use clap_complete::Shell;
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! `gyronet demo`: one drive, everything that comes of it.
+//! `gyronet demo`: all results of one drive.
 
 use super::{Common, WriteError, paint, print_json, progress, replay, weights};
 use gyronet::can::config::Config;
@@ -15,14 +15,14 @@ use gyronet_tools::target::bench;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Show everything on one drive: a table of errors, a page, a CAN log.
+/// Show all results of one drive: a table of errors, a page, a CAN log.
 ///
-/// The page (demo.html) needs nothing but a browser: yaw, errors and path to zoom into, the
-/// table of methods, decoded CAN messages, time and memory. Without FILE the simulated drive
-/// that comes with the binary is taken.
+/// The page (demo.html) needs only a browser. It has charts of yaw, errors and path that can be zoomed, the table
+/// of methods, decoded CAN messages, time and memory. Without FILE the command takes the simulated drive that
+/// comes with it.
 ///
-/// Where qemu-system-arm is installed the firmware image is built (minutes, the first time) and
-/// run on the first 10 s of the drive; exit status 1 if one byte is not as on this machine.
+/// Where qemu-system-arm is installed the firmware image is built (minutes, the first time) and run on the first
+/// 10 s of the drive. The exit status is 1 if one byte differs from the library's on this machine.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -30,13 +30,13 @@ Examples:
   gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns
   gyronet demo drive.csv --json --no-board")]
 pub struct Args {
-    /// A recorded drive (CSV, 100 Hz): ref_gyr_z in it gives errors, wheelN_rate a path.
+    /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z, and a path needs wheelN_rate.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
     /// Folder for demo.html, yaw.svg and can.log [default: target/demo].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Do not run the firmware image, although QEMU is there.
+    /// Do not run the firmware image, even where QEMU is installed.
     #[arg(long)]
     no_board: bool,
     #[command(flatten)]

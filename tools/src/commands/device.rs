@@ -1,4 +1,4 @@
-//! `gyronet device`: what the board is, does and remembers, over its service line.
+//! `gyronet device`: state and configuration of a board, over its service line.
 
 mod calibration;
 mod settings;
@@ -15,7 +15,7 @@ use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Ask and configure a board over its service line.
+/// Query and configure a board over its service line.
 ///
 /// A new configuration or new weights take effect after a restart (`device restart`).
 #[derive(Debug, clap::Args)]
@@ -35,37 +35,37 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Print versions, cause of the last reset, clock, flash, weights, status.
+    /// Print versions, the cause of the last reset, clock, flash, weights and status.
     Info,
     /// Print the configuration.
     Get,
     /// Change the configuration: NAME=VALUE as `get` prints them, or a whole file.
     Set {
-        /// For example `latitude_deg=48.1 mounting.roll_deg=1.5`; values as in JSON.
+        /// Settings, for example `latitude_deg=48.1 mounting.roll_deg=1.5`; values are as in JSON.
         settings: Vec<String>,
         /// A whole configuration, as `get --json` prints it.
         #[arg(long)]
         file: Option<PathBuf>,
     },
-    /// Calibrate the sensor while the vehicle stands (3 s), and print what was found.
+    /// Calibrate the sensor while the vehicle stands still (3 s), and print the result.
     Calibrate {
-        /// What to find, or `show` what is known.
+        /// The task, or `show` for the calibration that is stored.
         #[arg(value_enum)]
         task: calibration::What,
         /// Store the result, so that it survives a restart.
         #[arg(long)]
         store: bool,
     },
-    /// Print what has happened since the start.
+    /// Print the events since the start.
     Log,
-    /// Print everything that is counted.
+    /// Print all counters.
     Counters,
     /// Upload a weight file; the board checks it, and uses it after a restart.
     Weights {
-        /// As `gyronet quantize` writes it.
+        /// Weight file, as `gyronet quantize` writes it.
         file: PathBuf,
     },
-    /// Start the board anew.
+    /// Restart the board.
     Restart,
 }
 

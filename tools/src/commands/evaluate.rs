@@ -11,12 +11,11 @@ use std::path::PathBuf;
 
 /// Measure the yaw error of every method on recorded drives.
 ///
-/// Methods: the raw gyro, static initialisation, a low-pass filter, GyroNet in f32 and in integers.
-/// Printed for each drive, and as a mean: the mean error of the yaw change over 1 s (rad), that
-/// over static initialisation's, and the error of the yaw at the end (rad). The network rows are
-/// settled estimates after static initialisation; the last two are what the board sends: with
-/// the sample (Bosch TX1, J1939 VDC2), and in its own yaw messages some samples later. The wheels
-/// of a drive stand in for the vehicle's bus.
+/// The methods are the raw gyro, static initialisation, a low-pass filter, and GyroNet in f32 and in integers. For
+/// each drive, and as a mean, the command prints the mean error of the yaw change over 1 s (rad), its ratio to that
+/// of static initialisation, and the error of the yaw at the end (rad). The network rows are settled estimates after
+/// static initialisation. The last two rows are the rates that the board sends: with the sample (Bosch TX1, J1939
+/// VDC2), and in its own yaw messages some samples later. The wheels of a drive replace the vehicle's bus.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -27,11 +26,11 @@ pub struct Args {
     /// Recorded drives with ref_gyr_z.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// What each part of the compensation is worth, how often the errors stay inside one, two
+    /// Compare configurations: the error without each part of the compensation, how often errors stay inside one, two
     /// and three sigma, and what the reference shows at standstill.
     #[arg(long, conflicts_with = "lags")]
     ablation: bool,
-    /// The error of the rate for navigation at every lag, 0 to 110 ms (default of the board: 70).
+    /// Print the error of the rate for navigation at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
     #[command(flatten)]
@@ -65,7 +64,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(write!(out, "{}", paint::report(&report))?)
 }
 
-/// One drive's scores.
+/// The scores of one drive.
 #[derive(serde::Serialize)]
 struct Scored {
     name: String,

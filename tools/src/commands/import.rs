@@ -1,6 +1,7 @@
-//! `gyronet import`: a sequence of a data set as one drive.
+//! `gyronet import`: a sequence of a data set, converted to one drive.
 
 use super::{Common, WriteError, print_json, progress, remark};
+use gyronet_tools::drive::error::DataError;
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::paper::tables::pictures;
 use gyronet_tools::simulate::layout::Layout;
@@ -9,30 +10,29 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Read a sequence of KAIST Urban or NCLT: what is in it; a CSV of it.
+/// Summarise a sequence of KAIST Urban or NCLT, and convert it to a CSV.
 ///
-/// The CSV is one that the other subcommands run.
+/// The other subcommands read the CSV.
 ///
-/// KAIST: sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and
-/// global_pose.csv. NCLT: ms25.csv, kvh.csv, wheels.csv and groundtruth_*.csv. Missing files,
-/// wrong columns, text for numbers and time going backwards are errors; rows with NaN, repeated
-/// stamps, gaps and encoder resets are counted and said.
+/// KAIST has sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and global_pose.csv; NCLT has
+/// ms25.csv, kvh.csv, wheels.csv and groundtruth_*.csv. Missing files, wrong columns, text for numbers and time that
+/// goes backwards are errors. Rows with NaN, repeated stamps, gaps and encoder resets are counted and reported.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet import kaist urban14 --out urban14.csv
   gyronet import nclt 2012-01-08 --stamps stamps.svg")]
 pub struct Args {
-    /// Whose layout it has.
+    /// Data set whose layout the sequence has.
     #[arg(value_name = "LAYOUT")]
     layout: Layout,
     /// Folder of the sequence.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Write the drive, at 100 Hz, with gyro, wheels and truth.
+    /// Write the drive, at 100 Hz, with gyro, wheels and truth to this file.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
-    /// Draw the times between stamps of each file (the paper's Fig. 11).
+    /// Write a picture of the times between stamps of each file (the paper's Fig. 11).
     #[arg(long, value_name = "FILE.svg")]
     stamps: Option<PathBuf>,
 }
@@ -89,7 +89,7 @@ fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
 }
 
 /// Reads a sequence under a progress bar.
-pub(super) fn read(folder: &Path, common: Common) -> Result<Sequence, sequence::SequenceError> {
+pub(super) fn read(folder: &Path, common: Common) -> Result<Sequence, DataError> {
     let bar = progress::bar(common, sequence::size(folder) as usize, &folder.display().to_string());
     let sequence = Sequence::read(folder, |bytes| bar.set_position(bytes));
     bar.finish_and_clear();

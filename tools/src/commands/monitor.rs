@@ -1,4 +1,4 @@
-//! `gyronet monitor`: what a receiver of our messages sees.
+//! `gyronet monitor`: the CAN messages as a receiver sees them.
 
 use super::{Common, WriteError};
 use console::Term;
@@ -12,20 +12,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Between two pictures on a terminal, and two lines elsewhere.
+/// Time between two views on a terminal, and between two lines elsewhere.
 const REDRAW: Duration = Duration::from_millis(100);
 const LINE: Duration = Duration::from_secs(1);
 /// --once gives up after so long.
 const ONCE: Duration = Duration::from_secs(10);
 
-/// Show what a receiver of our CAN messages sees.
+/// Show the CAN messages of a board as a receiver sees them.
 ///
-/// The messages are checked as an ECU would: yaw rate, yaw, source, quality, faults, and what was
-/// lost, repeated or damaged on the way. On a terminal a live picture; elsewhere, and with --json, a
-/// line a second. A log is read to its end, then summed up. Ctrl-C ends with the sum, exit status 0.
-/// A fibre-optic gyro's messages make a second block, and `fog` in JSON; the table has the first alone.
-/// Identifiers and protection are those of the default configuration.
-/// Times are the input's own where it has some, else since the start.
+/// The command checks the messages as an ECU would. It shows yaw rate, yaw, source, quality, faults, and the numbers
+/// of lost, repeated and damaged messages. On a terminal it draws a live view; elsewhere, and with --json, it prints
+/// a line each second. A log is read to its end and then summarised. Ctrl-C ends with the summary and exit status 0.
+/// The messages of a fibre-optic gyro make a second block, and `fog` in JSON; the table of --csv leaves them out.
+/// Identifiers and protection are those of the default configuration. Times are the input's own where it has some,
+/// otherwise they count from the start.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -40,13 +40,13 @@ pub struct Args {
     /// Rate of a serial port, bit/s.
     #[arg(long, value_name = "BIT/S", default_value_t = 921_600)]
     baud: u32,
-    /// Write each set of messages as a line of a table.
+    /// Write each set of messages as a line of a table to this file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Show the first whole set of messages and end; an error if none comes within 10 s.
+    /// Show the first whole set of messages and end; fail if none comes within 10 s.
     #[arg(long)]
     once: bool,
-    /// End after so many seconds.
+    /// End after this many seconds.
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds, conflicts_with = "once")]
     duration: Option<Duration>,
 }
@@ -56,7 +56,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }
 
-/// Nothing to show.
+/// The error of a source without messages.
 #[derive(Debug, thiserror::Error)]
 enum MonitorError {
     #[error("{0}: no whole set of messages (rate, angle, detail)")]
@@ -133,7 +133,7 @@ impl Table {
     }
 }
 
-/// What is shown while frames come, and at the end.
+/// The display while frames come and at the end.
 struct View {
     term: Option<Term>,
     silent: bool,

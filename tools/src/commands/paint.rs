@@ -1,4 +1,4 @@
-//! Weight and colour for tables on a terminal; plain text elsewhere and with NO_COLOR.
+//! Bold text and colours for tables on a terminal; plain text elsewhere and with NO_COLOR.
 
 use console::style;
 use gyronet_tools::evaluate::methods::Method;
@@ -12,7 +12,7 @@ pub fn report(report: &Report) -> String {
             style(line).bold()
         } else if line.trim_start().starts_with("yaw error") {
             style(line).dim()
-        } else if line.trim_start().starts_with(Method::Default.name()) {
+        } else if line.trim_start().starts_with(Method::NAVIGATION.name) {
             style(line).green().bold()
         } else {
             style(line)

@@ -7,13 +7,12 @@ use gyronet::model::{FogNet, GyroNet};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Drive;
-use gyronet_tools::network::checkpoint::Checkpoint;
-use gyronet_tools::network::fog_checkpoint::{self, FogCheckpoint};
+use gyronet_tools::drive::replay::Replay;
+use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use gyronet_tools::network::quantization_error::{Both, QuantizationError};
 use gyronet_tools::network::quantize::{Report, fognet, quantize};
 use gyronet_tools::network::weight_file::WeightFile;
-use gyronet_tools::paper::fog_drive;
+use gyronet_tools::paper::fog_replay;
 use gyronet_tools::paper::sequence::Sequence;
 use serde::Serialize;
 use std::fmt;
@@ -22,28 +21,28 @@ use std::path::PathBuf;
 
 /// Turn an f32 checkpoint into a weight file for the board.
 ///
-/// The checkpoint (safetensors, from tools/train) says which network it is. The weight file has int8
-/// rows, packed in the order in which the kernels read them, with its provenance and a CRC-32.
+/// The checkpoint (safetensors, from tools/train) determines the network. The weight file has int8 rows, packed in
+/// the order in which the kernels read them, with its provenance and a CRC-32.
 ///
-/// Prints the error that quantisation adds: RMS of integer less f32 output over RMS of the f32
-/// output, on the drives given, or for GyroNet on the simulated drive that comes with this tool.
+/// The command prints the error that quantisation adds: the RMS of integer less f32 output over the RMS of the f32
+/// output, on the given drives, or for GyroNet on the simulated drive that comes with the tools.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet quantize gyronet.safetensors --out gyronet.blob --drives trial08.csv
   gyronet quantize fognet.safetensors --out fognet.blob --drives sequences/train08")]
 pub struct Args {
-    /// The checkpoint, safetensors.
+    /// Checkpoint (safetensors).
     checkpoint: PathBuf,
-    /// The weight file to write.
+    /// Weight file to write.
     #[arg(long, short, value_name = "BLOB")]
     out: PathBuf,
-    /// Recordings to measure the error on; for FoGNet folders in the layout of KAIST or NCLT.
+    /// Recordings on which the error is measured; for FoGNet folders in the layout of KAIST or NCLT.
     #[arg(long, num_args = 1.., value_name = "PATH")]
     drives: Vec<PathBuf>,
 }
 
-/// What quantisation adds on one drive.
+/// The error that quantisation adds on one drive.
 #[derive(Serialize)]
 struct Added {
     drive: String,
@@ -69,7 +68,7 @@ impl fmt::Display for Added {
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let (bytes, report, added) =
-        if fog_checkpoint::is_fognet(&args.checkpoint)? { fognet(args)? } else { gyronet(args)? };
+        if Checkpoint::is_in(&args.checkpoint)? { fognet(args)? } else { gyronet(args)? };
     std::fs::write(&args.out, &bytes).map_err(WriteError::to(&args.out))?;
     let Report { rows, raised, largest_raise, bytes } = report;
     let mut out = std::io::stdout().lock();
@@ -92,7 +91,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 type Made = Result<(Vec<u8>, Report, Vec<Added>), Box<dyn std::error::Error>>;
 
 fn gyronet(args: &Args) -> Made {
-    let checkpoint = Checkpoint::read(&args.checkpoint)?;
+    let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&args.checkpoint)?;
     let (bytes, report) = quantize(&checkpoint)?;
     let weights = WeightFile::parse(&args.out.display().to_string(), &bytes)?;
     let drives = if args.drives.is_empty() {
@@ -104,7 +103,7 @@ fn gyronet(args: &Args) -> Made {
     for drive in &drives {
         let (mut integer, mut reference) = (GyroNet::new(weights.blob()?), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
-        Drive::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
+        Replay::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
         let error = both.error();
         added.push(Added { scale_rms: Some(error.scale_rms()), ..Added::new(drive.name(), &error) });
     }
@@ -112,7 +111,7 @@ fn gyronet(args: &Args) -> Made {
 }
 
 fn fognet(args: &Args) -> Made {
-    let checkpoint = FogCheckpoint::read(&args.checkpoint)?;
+    let checkpoint = Checkpoint::<checkpoint::FogNet>::read(&args.checkpoint)?;
     let (bytes, report) = fognet::quantize(&checkpoint)?;
     let weights = WeightFile::parse_fognet(&args.out.display().to_string(), &bytes)?;
     let mut added = Vec::new();
@@ -122,7 +121,7 @@ fn fognet(args: &Args) -> Made {
         let (mut integer, mut reference) =
             (FogNet::new(weights.fog_blob()?, &mut state), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
-        fog_drive::run(&sequence, &mut both, FogConfig::DEFAULT, || {});
+        fog_replay::run(&sequence, &mut both, FogConfig::DEFAULT, || {});
         added.push(Added::new(&sequence.name, &both.error()));
     }
     Ok((bytes, report, added))

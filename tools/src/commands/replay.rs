@@ -1,11 +1,11 @@
-//! `gyronet replay`: a recording through the integer pipeline, its CAN frames to a log.
+//! `gyronet replay`: the CAN log of a recording that runs through the integer pipeline.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Drive;
+use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::parts::compare::{Bound, Difference, STAND_INS};
 use gyronet_tools::parts::{Part, Via};
@@ -16,15 +16,13 @@ use std::path::{Path, PathBuf};
 
 /// Write the CAN log of a recorded drive.
 ///
-/// The drive runs through the pipeline that is flashed; the log has the format of `candump -L` and
-/// the recording's own time stamps, and can-utils' canplayer and python-can can play it. It goes to
-/// standard output unless --out names a file; the summary goes to standard error, or with --json to
-/// standard output if the log does not.
+/// The drive runs through the pipeline that is flashed. The log has the format of `candump -L` and the recording's
+/// own time stamps; can-utils' canplayer and python-can can play it. It goes to standard output unless --out names a
+/// file. The summary goes to standard error, or with --json to standard output if the log does not.
 ///
-/// With --via the samples go through the bytes of a part first: encoded as it would send them,
-/// read back by the parser that the board runs. The summary then says how far the corrected yaw
-/// is from that of the direct replay, next to the bound that follows from the part's rounding;
-/// exit status 1 beyond it.
+/// With --via the samples go through the bytes of a part first: they are encoded as the part would send them and
+/// read back by the parser that the board runs. The summary then has the difference of the corrected yaw from that
+/// of the direct replay, next to the bound that follows from the part's rounding. The exit status is 1 beyond it.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -32,16 +30,16 @@ Examples:
   gyronet replay drive.csv | head
   gyronet replay drive.csv --via icm42688 --out can.log")]
 pub struct Args {
-    /// A recorded drive.
+    /// Recorded drive.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where the log goes [default: standard output].
+    /// Write the log to this file [default: standard output].
     #[arg(long, value_name = "FILE.log")]
     out: Option<PathBuf>,
     /// Weight file [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
-    /// Send the recording through the bytes of this part.
+    /// Send the samples through the bytes of this part.
     #[arg(long, value_name = "PART")]
     via: Option<Part>,
 }
@@ -100,12 +98,12 @@ fn replay(
     part: Option<Part>,
     network: &mut GyroNet<'_>,
     mut tick: impl FnMut(),
-) -> Result<(Drive, Option<Detour>), Box<dyn std::error::Error>> {
+) -> Result<(Replay, Option<Detour>), Box<dyn std::error::Error>> {
     let config = PipelineConfig::DEFAULT;
-    let direct = Drive::run(recording, &config, WheelFrames::new(recording), network, &mut tick)?;
+    let direct = Replay::run(recording, &config, WheelFrames::new(recording), network, &mut tick)?;
     let Some(part) = part else { return Ok((direct, None)) };
     let via = part.send(recording)?;
-    let drive = Drive::run(&via.recording, &config, WheelFrames::new(recording), network, &mut tick)?;
+    let drive = Replay::run(&via.recording, &config, WheelFrames::new(recording), network, &mut tick)?;
     let bound = Bound::new(via.quantisation, recording, &direct, network, &mut tick)?;
     let difference = Difference::of_rates(&direct, &drive);
     Ok((drive, Some(Detour { part, via, difference, bound })))
@@ -169,14 +167,14 @@ impl std::fmt::Display for Detour {
 }
 
 /// Writes a drive's frames to a file.
-pub(super) fn write_file(drive: &Drive, path: &Path) -> Result<u64, WriteError> {
+pub(super) fn write_file(drive: &Replay, path: &Path) -> Result<u64, WriteError> {
     let error = WriteError::to(path);
     let file = File::create(path).map_err(&error)?;
     drive.log(BufWriter::new(file)).map_err(&error)
 }
 
-/// All counters that are not zero.
-fn events(drive: &Drive) -> Vec<(&'static str, u32)> {
+/// Returns all counters that are not zero.
+fn events(drive: &Replay) -> Vec<(&'static str, u32)> {
     let c = &drive.counters;
     let all = [
         ("samples", c.samples),

@@ -1,4 +1,4 @@
-//! `gyronet simulate`: a drive that nobody drove.
+//! `gyronet simulate`: simulated drives and sequences.
 
 use super::{Common, WriteError, print_json, progress, remark};
 use gyronet_tools::simulate::layout::{self, Layout, Set, Spec};
@@ -9,34 +9,33 @@ use std::path::{Path, PathBuf};
 
 /// Write a simulated drive whose sensor errors are known.
 ///
-/// A car that stands, pulls away, bends, turns and stops, seen by a MEMS part whose errors are known.
+/// A car stands, pulls away, follows bends, turns and stops; a MEMS part with known errors measures it.
 ///
-/// Without --layout: one CSV with the columns that the other subcommands read, with the true
-/// rates in ref_gyr_*. With --layout: whole sequences of a drive through a town, in the folders
-/// and formats of KAIST Complex Urban or NCLT, with a fibre-optic gyro and wheels; a file
-/// simulated.json says that they are simulated. The same seed gives the same files on every
-/// machine.
+/// Without --layout the command writes one CSV with the columns that the other subcommands read, with the true rates
+/// in ref_gyr_*. With --layout it writes whole sequences of a drive through a town, in the folders and formats of
+/// KAIST Complex Urban or NCLT, with a fibre-optic gyro and wheels; a file simulated.json marks them as simulated.
+/// The same seed gives the same files on every machine.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet simulate --seconds 600 --seed 7 --out drive.csv
   gyronet simulate --layout kaist --set test --out sequences      # four of 20 min")]
 pub struct Args {
-    /// Where the drive goes: a file; with --layout a folder.
+    /// Write the drive to this file, or with --layout to this folder.
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
     /// Length of a CSV drive, s (10 to 36000).
     #[arg(long, default_value_t = 90, conflicts_with = "layout",
         value_parser = clap::value_parser!(u32).range(10..=36_000))]
     seconds: u32,
-    /// Another route, road, noise and bias at power-on for each.
+    /// Seed of the route, the road, the noise and the bias at power-on.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Write a sequence in the layout of this data set.
     #[arg(long)]
     layout: Option<Layout>,
-    /// Write all sequences of this set, each into a folder of its own: train and test share their
-    /// devices, transfer has others.
+    /// Write all sequences of this set, each into a folder of its own; train and test share their devices, transfer
+    /// has others.
     #[arg(long, requires = "layout", conflicts_with_all = ["seed", "minutes", "device"])]
     set: Option<Set>,
     /// Length of a sequence, min (1 to 600).

@@ -1,4 +1,4 @@
-//! `gyronet size`: what the firmware image takes, against its budgets.
+//! `gyronet size`: the sizes of the firmware image against their budgets.
 
 use super::Common;
 use gyronet_tools::target::bench;
@@ -7,11 +7,11 @@ use gyronet_tools::target::stack::{Handler, ImageStack, Way};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Measure the firmware image: flash, static RAM and the worst stack, bytes.
+/// Measure flash, static RAM and the worst stack of the firmware image, bytes.
 ///
-/// Static RAM is SRAM: statics, and the code that runs from there, which counts as flash too.
-/// The stack is an upper bound from the machine code: handlers of all priorities, one inside the
-/// other. Exit status 1 when a budget is exceeded.
+/// Static RAM is SRAM: statics, and the code that runs from there, which counts as flash too. The stack is an upper
+/// bound from the machine code, with handlers of all priorities one inside the other. The exit status is 1 when a
+/// budget is exceeded.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Measure this ELF file [default: the image is built].
@@ -31,12 +31,15 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let measured = [size.flash, size.static_ram, stack.worst().into()];
     let rows: Vec<Row> = ["flash", "static_ram", "stack"].into_iter().zip(measured).zip(BUDGETS).collect();
     let out = &mut io::stdout().lock();
-    let told =
-        if common.json { writeln!(out, "{:#}", json(&rows, &stack)) } else { tell(out, &rows, &stack) };
+    let written = if common.json {
+        writeln!(out, "{:#}", json(&rows, &stack))
+    } else {
+        print_sizes(out, &rows, &stack)
+    };
     let over = rows.iter().filter(|((_, bytes), budget)| bytes > budget);
     let over: Vec<_> = over.map(|((name, _), _)| *name).collect();
     // Whether somebody reads it or not.
-    if over.is_empty() { Ok(told?) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
+    if over.is_empty() { Ok(written?) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
 }
 
 /// Name, bytes, budget.
@@ -57,7 +60,7 @@ fn json(rows: &[Row], stack: &ImageStack) -> serde_json::Value {
     json
 }
 
-fn tell(out: &mut impl Write, rows: &[Row], stack: &ImageStack) -> io::Result<()> {
+fn print_sizes(out: &mut impl Write, rows: &[Row], stack: &ImageStack) -> io::Result<()> {
     for ((name, bytes), budget) in rows {
         writeln!(out, "{name} bytes={bytes} budget={budget}")?;
     }

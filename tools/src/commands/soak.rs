@@ -1,4 +1,4 @@
-//! `gyronet soak`: hours of a drive, every clock and counter wrapping.
+//! `gyronet soak`: hours of a drive in which every clock and counter wraps.
 
 use super::weights::Weights;
 use super::{Common, print_json, progress};
@@ -7,11 +7,10 @@ use gyronet::sample::RATE_HZ;
 use gyronet_tools::campaign::soak;
 use std::io::Write;
 
-/// Run hours of a simulated drive from bytes to bytes, every counter wrapping.
+/// Run hours of a simulated drive, in which every clock and counter wraps.
 ///
-/// From a part's bytes to a receiver of the CAN frames. Every clock and counter on the way wraps. Prints
-/// what was counted; exit status 1 where a sample or frame is lost, a clock or the yaw drifts, or memory
-/// grows.
+/// The drive goes from a part's bytes to a receiver of the CAN frames. The command prints all counters. The exit
+/// status is 1 where a sample or frame is lost, a clock or the yaw drifts, or memory grows.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -33,11 +32,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     bar.finish_and_clear();
     let faults = soak.faults();
     let out = &mut std::io::stdout().lock();
-    let told = if common.json {
+    let written = if common.json {
         print_json(out, &serde_json::json!({ "soak": soak, "faults": faults }))
     } else {
         writeln!(out, "{soak}").map_err(Into::into)
     };
     // Whether somebody reads it or not.
-    if faults.is_empty() { told } else { Err(faults.join("; ").into()) }
+    if faults.is_empty() { written } else { Err(faults.join("; ").into()) }
 }

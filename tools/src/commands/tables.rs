@@ -1,4 +1,4 @@
-//! `gyronet tables`: the paper's evaluation on the sequences at hand.
+//! `gyronet tables`: the paper's evaluation on given sequences.
 
 use super::weights::Weights;
 use super::{Common, WriteError, import, print_json, progress, remark};
@@ -8,7 +8,7 @@ use gyronet_tools::bundled;
 use gyronet_tools::network::weight_file::WeightFile;
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::paper::tables::results::{Results, SequenceErrors};
-use gyronet_tools::paper::tables::{html, methods, pictures, table};
+use gyronet_tools::paper::tables::{estimates, html, pictures, table};
 use gyronet_tools::simulate::layout::Layout;
 use std::fs;
 use std::io::Write;
@@ -16,22 +16,22 @@ use std::path::PathBuf;
 
 /// Compute the paper's tables and figures on sequences of KAIST Urban or NCLT.
 ///
-/// Tables I, II, III, V, VI and VII, as far as the sequences have figures for them, beside what the
-/// paper prints; Figs. 6, 7, 9, 10 and 11.
+/// The command prints tables I, II, III, V, VI and VII, as far as the sequences have figures for them, beside the
+/// paper's own figures, and draws Figs. 6, 7, 9, 10 and 11.
 ///
-/// Sequences are folders in the layout of KAIST Complex Urban or NCLT, real ones or those of
-/// `gyronet simulate --layout`; figures of simulated ones are marked so. The vehicle stands still
-/// for the first 3 s, or what needs static initialisation is left out and the reason said.
+/// Sequences are folders in the layout of KAIST Complex Urban or NCLT, real ones or those of `gyronet simulate
+/// --layout`; figures of simulated ones are marked. Where the vehicle does not stand still for the first 3 s, methods
+/// that need static initialisation are left out, and the reason is printed.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet simulate --layout kaist --set test --out sequences && gyronet tables sequences --out report
   gyronet tables urban14 urban15 --json")]
 pub struct Args {
-    /// Sequences, or folders that hold some.
+    /// Sequences, or folders that hold sequences.
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
-    /// Write report.html (one page with all tables and pictures) and each picture as SVG here.
+    /// Write report.html (one page with all tables and pictures) and each picture as SVG to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Weight file of GyroNet [default: the one that comes with the library].
@@ -70,7 +70,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     for folder in &folders {
         let sequence = import::read(folder, common)?;
         let bar = progress::bar(common, 4 * sequence.steps.len(), &sequence.name);
-        let mut estimates = methods::run(&sequence, &mut network, || bar.inc(1));
+        let mut estimates = estimates::run(&sequence, &mut network, || bar.inc(1));
         estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
         bar.finish_and_clear();
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);

@@ -1,8 +1,8 @@
-//! Which weights to use: those that come with the binary, or a file.
+//! The choice of weights: the bundled ones, or a file.
 
 use gyronet::model::{Blob, weights};
 use gyronet_tools::bundled;
-use gyronet_tools::network::checkpoint::{Checkpoint, CheckpointError};
+use gyronet_tools::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
 use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 pub struct Weights(Option<WeightFile>);
 
 impl Weights {
-    /// From a file, where there is one.
+    /// Opens a file, or chooses the bundled weights.
     pub fn open(path: Option<&Path>) -> Result<Self, WeightFileError> {
         path.map(WeightFile::read).transpose().map(Self)
     }
@@ -25,7 +25,7 @@ impl Weights {
     }
 }
 
-/// Which networks to compare.
+/// The networks to compare.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Files {
     /// Weight file of the integer network [default: the one that comes with the library].
@@ -43,7 +43,7 @@ impl Files {
     }
 
     /// The f32 network's weights.
-    pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
+    pub fn checkpoint(&self) -> Result<Checkpoint<GyroNet>, CheckpointError> {
         self.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read)
     }
 }

@@ -5,7 +5,7 @@
 //! emulated board has no CAN.
 
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, DriveError};
+use crate::drive::replay::{Replay, ReplayError};
 use crate::parts::{self, Part, ViaError};
 use crate::target::bench::{self, BenchError};
 use crate::target::emulator::{self, EmulatorError};
@@ -21,13 +21,13 @@ use std::time::{Duration, Instant};
 
 /// Samples that the image is given: static initialisation and as much again behind it.
 pub const SAMPLES: usize = 1_000;
-/// For all messages of them: a few seconds, on a busy machine more.
+/// The longest wait for all messages of them: a few seconds, more on a busy machine.
 const LIMIT: Duration = Duration::from_secs(180);
 /// The sensor's line, and the one on which the messages go out.
 const SENSOR: usize = 1;
 const SLCAN: usize = 2;
 
-/// Why nothing can be said of the image.
+/// The error of a comparison that cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BoardError {
@@ -45,7 +45,7 @@ pub enum BoardError {
     Stack {
         /// The image.
         path: String,
-        /// Why.
+        /// The reason.
         source: StackError,
     },
     /// The recording does not come back from the sensor's bytes.
@@ -53,23 +53,23 @@ pub enum BoardError {
     Via(#[from] ViaError),
     /// The drive has no corrected rate in so short a time.
     #[error(transparent)]
-    Drive(#[from] DriveError),
+    Replay(#[from] ReplayError),
 }
 
-/// What came of it.
+/// The outcome of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Outcome {
-    /// Something is missing on this machine.
+    /// Something that it needs is missing on this machine.
     NotRun {
-        /// What.
+        /// What is missing.
         why: String,
     },
     /// It ran.
     Run {
-        /// Its bytes against the library's.
+        /// The comparison of its bytes with the library's.
         agreement: Agreement,
-        /// What the image takes.
+        /// The image's size and cost.
         figures: Figures,
     },
 }
@@ -85,7 +85,7 @@ pub struct Agreement {
     pub frames: u64,
     /// Bytes in them, identifiers left out.
     pub payload_bytes: u64,
-    /// What the emulator took, s.
+    /// Time that the emulator took, s.
     pub seconds: f64,
     /// The first one, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -97,13 +97,13 @@ pub struct Agreement {
 pub struct Difference {
     /// Counted from 1.
     pub number: usize,
-    /// As the board sent it.
+    /// The message of the board.
     pub board: String,
-    /// As the library has it.
+    /// The message of the library.
     pub host: String,
 }
 
-/// What the image takes.
+/// The size and cost of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Figures {
     /// Bytes.
@@ -112,15 +112,15 @@ pub struct Figures {
     pub static_ram: u64,
     /// Bytes.
     pub stack: u64,
-    /// Of one GyroNet window.
+    /// Instructions of one GyroNet window.
     pub window_instructions: Option<u64>,
-    /// Modelled, of the same.
+    /// Modelled cycles of the same at 5 wait states.
     pub window_cycles: Option<u64>,
 }
 
 impl Outcome {
-    /// Why the image cannot be run on this machine, if so: the emulator, the target's standard
-    /// library or the repository is missing.
+    /// Returns why the image cannot be run on this machine: the emulator, the target's standard library or the
+    /// repository is missing.
     #[must_use]
     pub fn missing() -> Option<Self> {
         let why = match (emulator::available(), bench::target_installed()) {
@@ -131,7 +131,7 @@ impl Outcome {
         Some(Self::NotRun { why })
     }
 
-    /// Whether it ran, and not as the library does.
+    /// Returns whether the image ran and sent other bytes than the library.
     #[must_use]
     pub fn differs(&self) -> bool {
         matches!(self, Self::Run { agreement, .. } if agreement.difference.is_some())
@@ -152,7 +152,7 @@ impl Agreement {
         let recording = Recording { rows, ..recording.clone() };
         let bytes = parts::mti_bytes(&recording).concat();
         let sent = Part::Xsens.send(&recording)?.recording;
-        let drive = Drive::run(&sent, &PipelineConfig::DEFAULT, None, network, || {})?;
+        let drive = Replay::run(&sent, &PipelineConfig::DEFAULT, None, network, || {})?;
         let frames: Vec<DataFrame> = drive.frames().map(|sent| sent.frame).collect();
 
         let start = Instant::now();

@@ -1,6 +1,6 @@
-//! The messages of one sample, read as a receiver reads them.
+//! The messages of one sample in words.
 
-use crate::drive::replay::Drive;
+use crate::drive::replay::Replay;
 use embedded_can::{Frame, Id};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
@@ -8,24 +8,24 @@ use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage, SIGMA_UNKNOWN}
 use gyronet::can::{DataFrame, j1939::Vdc2};
 use serde::Serialize;
 
-/// One message.
+/// A message in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Message {
-    /// When its sample was taken, since the recording's first, s.
+    /// The time of its sample since the recording's first, s.
     pub time: String,
-    /// As the data base `gyronet.dbc` has it.
+    /// The name in `gyronet.dbc`.
     pub name: String,
     /// Hexadecimal.
     pub id: String,
     /// Hexadecimal.
     pub data: String,
-    /// What it says.
+    /// The content in words.
     pub says: String,
 }
 
 /// The messages that go out when the vehicle turns fastest.
 #[must_use]
-pub fn fastest_turn(drive: &Drive, config: Config) -> Vec<Message> {
+pub fn fastest_turn(drive: &Replay, config: Config) -> Vec<Message> {
     let rate = |index: &usize| drive.steps[*index].vehicle.prompt.rate.0.unsigned_abs();
     let Some(chosen) = drive.compared().max_by_key(rate) else { return Vec::new() };
     let first = drive.steps.first().map_or(0, |step| step.time.0);
@@ -104,7 +104,7 @@ mod tests {
     fn the_two_rates_of_one_sample_are_read_from_the_bytes() {
         let recording = bundled::simulated_drive().unwrap();
         let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
-        let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut network, || {}).unwrap();
+        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut network, || {}).unwrap();
         let messages = fastest_turn(&drive, Config::DEFAULT);
         let names: Vec<&str> = messages.iter().map(|message| message.name.as_str()).collect();
         assert_eq!(

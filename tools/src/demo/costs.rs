@@ -1,4 +1,4 @@
-//! Time and memory: what this command has measured, and what the emulator has counted for it.
+//! Figures of time and memory: those that this command measures, and those that the emulator counts.
 
 use super::board::{Figures, Outcome};
 use crate::drive::recording::Recording;
@@ -12,21 +12,21 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use serde::Serialize;
 
-/// One figure.
+/// A figure of time or memory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Cost {
-    /// Of what.
+    /// The quantity.
     pub what: &'static str,
-    /// With its unit.
+    /// The figure with its unit.
     pub figure: String,
-    /// Where it comes from.
+    /// The source of the figure.
     pub how: String,
 }
 
 /// Clock of the STM32F405, MHz.
 const CLOCK_MHZ: f64 = crate::target::parser_load::CLOCK_HZ * 1e-6;
 
-/// Of a drive, and of the image.
+/// Returns the figures of a drive and of the image.
 #[must_use]
 pub fn all(recording: &Recording, rates: &Rates, config: &Config, board: &Outcome) -> Vec<Cost> {
     let samples = recording.rows.len().max(1) as f64;

@@ -12,7 +12,7 @@ use gyronet::sample::RATE_HZ;
 
 /// Whose curves are drawn, from back to front.
 const DRAWN: [Method; 6] =
-    [Method::Raw, Method::Fir, Method::Static, Method::Prompt, Method::GyronetInt, Method::Default];
+    [Method::RAW, Method::FIR, Method::STATIC, Method::PROMPT, Method::GYRONET_INT, Method::NAVIGATION];
 /// The class and the name of the reference.
 const REFERENCE: &str = "reference";
 
@@ -52,7 +52,7 @@ pub fn page(demo: &Demo<'_>) -> String {
 fn facts(demo: &Demo<'_>) -> String {
     let mut facts = Vec::new();
     if let Some(errors) = demo.errors {
-        let [still, sent] = [Method::Static, Method::Default].map(|method| errors.methods[method]);
+        let [still, sent] = [Method::STATIC, Method::NAVIGATION].map(|method| errors.methods[method]);
         let mrad = |rad: f64| format!("{:.3} <small>mrad</small>", 1e3 * rad);
         facts.push(("yaw error in 1 s, static initialisation", mrad(still.mean_1s_rad)));
         facts.push(("the same, sent for navigation", mrad(sent.mean_1s_rad)));
@@ -79,10 +79,10 @@ fn yaw(demo: &Demo<'_>) -> String {
     for method in DRAWN {
         let yaw = integral(&rates.rates[method]);
         // What still has its bias may run off the errors' scale.
-        let in_scale = !matches!(method, Method::Raw | Method::Fir);
+        let in_scale = !matches!(method, Method::RAW | Method::FIR);
         let curve = |note, values, in_scale| Curve {
-            class: method.key(),
-            label: method.name().into(),
+            class: method.key,
+            label: method.name.into(),
             note,
             points: points(values),
             in_scale,
@@ -128,11 +128,11 @@ fn paths(trajectories: &Trajectories) -> String {
     let mut curves: Vec<Curve> = paths
         .iter()
         .map(|path| Curve {
-            class: path.method.map_or(REFERENCE, Method::key),
-            label: path.method.map_or(REFERENCE, Method::name).into(),
+            class: path.method.map_or(REFERENCE, |method| method.key),
+            label: path.method.map_or(REFERENCE, |method| method.name).into(),
             note: path.error_m.map(|metres| format!("{metres:.2} m off, RMS")).unwrap_or_default(),
             points: path.points.iter().map(|[x, y]| (*x, *y)).collect(),
-            in_scale: path.method != Some(Method::Raw),
+            in_scale: path.method != Some(Method::RAW),
         })
         .collect();
     // The reference behind what is held against it.
@@ -151,11 +151,11 @@ fn methods(demo: &Demo<'_>) -> String {
     let Some(errors) = demo.errors else {
         return "<p>No reference yaw rate, so no errors.</p>\n".into();
     };
-    let still = errors.methods[Method::Static].mean_1s_rad;
+    let still = errors.methods[Method::STATIC].mean_1s_rad;
     let rows = errors.methods.each().map(|(method, error)| {
         let ratio = error.mean_1s_rad / still;
         vec![
-            method.name().to_owned(),
+            method.name.to_owned(),
             format!("{:.6}", error.mean_1s_rad),
             format!("{ratio:.3}"),
             format!("{:.6}", error.final_rad),

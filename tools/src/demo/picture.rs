@@ -11,12 +11,12 @@ const SIZE: (u32, u32) = (1200, 930);
 const AIR: f64 = 0.06;
 /// The colours and widths of the methods. The wider line is drawn first, so that one under another still shows.
 const STYLES: [(Method, Color, u32); 6] = [
-    (Method::Raw, COLORS[4], 2),
-    (Method::Static, COLORS[0], 2),
-    (Method::Fir, COLORS[3], 2),
-    (Method::Prompt, COLORS[6], 1),
-    (Method::GyronetInt, COLORS[2], 4),
-    (Method::Default, COLORS[1], 2),
+    (Method::RAW, COLORS[4], 2),
+    (Method::STATIC, COLORS[0], 2),
+    (Method::FIR, COLORS[3], 2),
+    (Method::PROMPT, COLORS[6], 1),
+    (Method::GYRONET_INT, COLORS[2], 4),
+    (Method::NAVIGATION, COLORS[1], 2),
 ];
 
 /// Draws a drive as SVG.
@@ -34,12 +34,12 @@ pub fn svg(title: &str, rates: &Rates) -> Result<String, PlotError> {
     let mut scale = Vec::new();
     for (method, color, width) in STYLES {
         let (yaw, stroke) = (integral(&rates.rates[method]), Stroke::solid(color, width));
-        let mut label = method.name().to_owned();
+        let mut label = method.name.to_owned();
         if let Some(truth) = &truth {
             let off: Vec<f64> = yaw.iter().zip(truth).map(|(yaw, truth)| 1e3 * (yaw - truth)).collect();
             label += &format!(": ends {:+.1} mrad off", off.last().copied().unwrap_or(0.0));
             errors.push(Marks::Line(stroke, points(&off)));
-            if !matches!(method, Method::Raw | Method::Fir) {
+            if !matches!(method, Method::RAW | Method::FIR) {
                 scale.extend(off);
             }
         }

@@ -1,4 +1,4 @@
-//! Where each method sees the vehicle go: its yaw rate and the speeds of the wheels.
+//! The path of the vehicle by each method: its yaw rate and the speeds of the wheels.
 
 use crate::drive::DT;
 use crate::drive::recording::Recording;
@@ -8,13 +8,13 @@ use crate::evaluate::trajectory_error::{Point, TrajectoryError};
 use gyronet::odometry::Track;
 use serde::Serialize;
 
-/// Those whose paths are drawn.
-const METHODS: [Method; 3] = [Method::Raw, Method::Static, Method::Default];
+/// The methods whose paths are drawn.
+const METHODS: [Method; 3] = [Method::RAW, Method::STATIC, Method::NAVIGATION];
 
 /// A path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Path {
-    /// Whose; the reference's is `None`.
+    /// The method, or `None` for the reference.
     #[serde(serialize_with = "key")]
     pub method: Option<Method>,
     /// m, from where static initialisation ended; turned by right angles so that the way lies
@@ -27,7 +27,7 @@ pub struct Path {
 }
 
 fn key<S: serde::Serializer>(method: &Option<Method>, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(method.map_or("reference", Method::key))
+    serializer.serialize_str(method.map_or("reference", |method| method.key))
 }
 
 /// The paths of a drive.
@@ -42,7 +42,7 @@ pub struct Trajectories {
 }
 
 impl Trajectories {
-    /// `None` of a drive without wheels.
+    /// Computes the paths; `None` for a drive without wheels.
     #[must_use]
     pub fn new(recording: &Recording, rates: &Rates) -> Option<Self> {
         let Speeds { wheels, metre_per_sec } = Speeds::new(recording)?;

@@ -1,5 +1,5 @@
-//! CAN frames as text, one a line, the way can-utils' `candump -L` logs them and `canplayer`
-//! and python-can read them: `(seconds.micros) interface ID#DATA`.
+//! CAN frames as text, one on each line, in the format that can-utils' `candump -L` logs and that `canplayer` and
+//! python-can read: `(seconds.micros) interface ID#DATA`.
 
 use embedded_can::{Frame, Id};
 use gyronet::units::Micros;
@@ -16,7 +16,7 @@ pub struct Log<W> {
 }
 
 impl<W: Write> Log<W> {
-    /// Nothing written yet.
+    /// Starts an empty log.
     pub fn new(out: W) -> Self {
         Self { out, frames: 0 }
     }
@@ -39,7 +39,7 @@ impl<W: Write> Log<W> {
         writeln!(self.out)
     }
 
-    /// Flushes the writer and says how many frames were written.
+    /// Flushes the writer and returns the number of frames.
     ///
     /// # Errors
     /// What the writer says.

@@ -14,12 +14,11 @@
 //! as they do on the sensor's own wire: a recording read from here and the same recording
 //! parsed from MTData2 bytes are the same samples to the last bit.
 
-mod error;
 mod reader;
 
-pub use error::{RecordingError, ValueError};
 pub use reader::Reader;
 
+use crate::drive::error::{DataError, DataFault};
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
 use std::fs::File;
@@ -33,12 +32,12 @@ pub const WHEEL_STANDS: f64 = 0.3;
 /// Largest departure of the median sample period from 10 ms, microseconds.
 const PERIOD_TOLERANCE_US: u64 = 2_000;
 
-/// One row.
+/// A row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// Line of the file, the header being line 1.
     pub line: u64,
-    /// What the sensor said.
+    /// The sample of the sensor.
     pub sample: ImuSample,
     /// The true yaw rate, rad/s.
     pub reference: Option<f64>,
@@ -52,7 +51,7 @@ pub struct Row {
 pub struct Recording {
     /// The file, for messages.
     pub path: String,
-    /// In order of time.
+    /// The rows in order of time.
     pub rows: Vec<Row>,
     /// Rows that are missing between others.
     pub missing: u64,
@@ -62,18 +61,18 @@ impl Recording {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`RecordingError`], which names the file and, where there is one, the line.
-    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+    /// [`DataError`], which names the file and, where there is one, the line.
+    pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|source| RecordingError::Io { path: name.clone(), source })?;
+        let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
         Self::parse(&name, file)
     }
 
-    /// Reads from anything; `path` is for messages.
+    /// Parses any input; messages call it `path`.
     ///
     /// # Errors
-    /// [`RecordingError`] with that path.
-    pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, RecordingError> {
+    /// [`DataError`] with that path.
+    pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, DataError> {
         let rows = Reader::new(path, input)?.collect::<Result<Vec<Row>, _>>()?;
         let mut recording = Self { path: path.to_owned(), rows, missing: 0 };
         recording.check_length()?;
@@ -92,7 +91,7 @@ impl Recording {
         Path::new(&self.path).file_stem().and_then(|stem| stem.to_str()).unwrap_or(&self.path)
     }
 
-    /// From the first sample to the end of the last one, s.
+    /// Returns the time from the first sample to the end of the last one, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         let [first, last] =
@@ -105,30 +104,30 @@ impl Recording {
         self.rows.windows(2).map(|pair| pair[1].sample.time.0 - pair[0].sample.time.0)
     }
 
-    fn check_length(&self) -> Result<(), RecordingError> {
+    fn check_length(&self) -> Result<(), DataError> {
         if self.rows.is_empty() {
-            return Err(RecordingError::Empty { path: self.path.clone() });
+            return Err(DataError::of(&self.path, DataFault::Empty));
         }
         let seconds = self.seconds();
         let needed = f64::from(STATIC_SAMPLES) / f64::from(RATE_HZ);
         if seconds < needed {
-            return Err(RecordingError::TooShort { path: self.path.clone(), seconds, needed });
+            return Err(DataError::of(&self.path, DataFault::TooShort { seconds, needed }));
         }
         Ok(())
     }
 
-    fn check_period(&self) -> Result<(), RecordingError> {
+    fn check_period(&self) -> Result<(), DataError> {
         let mut periods: Vec<u64> = self.periods().collect();
         periods.sort_unstable();
         let Some(median) = periods.get(periods.len() / 2) else { return Ok(()) };
         if median.abs_diff(PERIOD_US) > PERIOD_TOLERANCE_US {
-            return Err(RecordingError::Rate { path: self.path.clone(), hz: 1e6 / *median as f64 });
+            return Err(DataError::of(&self.path, DataFault::Rate { hz: 1e6 / *median as f64 }));
         }
         Ok(())
     }
 
     /// Second by second, so that a car which pulls away late in the three is caught too.
-    fn check_wheels(&self) -> Result<(), RecordingError> {
+    fn check_wheels(&self) -> Result<(), DataError> {
         let still = self.rows.get(..STATIC_SAMPLES as usize).unwrap_or(&self.rows);
         for second in still.chunks(RATE_HZ as usize) {
             for wheel in 0..WHEELS {
@@ -140,12 +139,8 @@ impl Recording {
                 let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
                 // Some rate is above the limit, or the mean would not be.
                 let line = second.iter().find(turns).map_or(0, |row| row.line);
-                return Err(RecordingError::Moving {
-                    path: self.path.clone(),
-                    line,
-                    wheel: wheel + 1,
-                    rate: mean,
-                });
+                let fault = DataFault::Moving { line, wheel: wheel + 1, rate: mean };
+                return Err(DataError::of(&self.path, fault));
             }
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! A recorded drive through the coprocessor, as the board would run it.
+//! A recorded drive that runs through the coprocessor as on the board.
 
 use crate::drive::candump::Log;
 use crate::drive::recording::Recording;
@@ -13,10 +13,10 @@ use gyronet::units::{AngularRate, Micros, Yaw};
 use std::io::{self, Write};
 use std::ops::Range;
 
-/// Why a recording gives no corrected rate.
+/// The error of a recording that gives no corrected rate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum DriveError {
+pub enum ReplayError {
     /// The vehicle does not stand still when static initialisation needs it to.
     #[error("{path}: starts moving: line {line}: {source}")]
     StartsMoving {
@@ -24,7 +24,7 @@ pub enum DriveError {
         path: String,
         /// The line with which the three seconds were over.
         line: u64,
-        /// What gave it away.
+        /// The check that failed.
         source: StaticError,
     },
     /// The recording ends before three seconds without a gap were seen.
@@ -42,7 +42,7 @@ pub struct Step {
     pub row: usize,
     /// The sample's time stamp.
     pub time: Micros,
-    /// Everything that was sent with this row.
+    /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
     /// The navigation rate of this row's sample, which was sent some samples later; `None` before static
     /// initialisation is over, and for the last samples, whose turn never came.
@@ -56,14 +56,14 @@ pub struct Step {
 
 /// A drive with its corrected yaw rate.
 #[derive(Debug, Clone)]
-pub struct Drive {
-    /// One for each row that found its place in time.
+pub struct Replay {
+    /// One step for each row that has a place on the grid.
     pub steps: Vec<Step>,
     /// The first step after static initialisation.
     pub start: usize,
     /// The gyro's static bias.
     pub gyro_bias: [AngularRate; 3],
-    /// What the navigation rates still owe at the end.
+    /// The yaw that the navigation rates still carry at the end.
     pub owed: Yaw,
     /// The numbers of events.
     pub counters: Counters,
@@ -71,19 +71,19 @@ pub struct Drive {
     pub out_of_range: u32,
 }
 
-impl Drive {
+impl Replay {
     /// Runs a recording; every window's estimate is delivered at once. `tick` is called once
     /// for each row. `wheels` stand in for the vehicle's bus.
     ///
     /// # Errors
-    /// [`DriveError`], when static initialisation does not succeed at its first attempt.
+    /// [`ReplayError`], when static initialisation does not succeed at its first attempt.
     pub fn run(
         recording: &Recording,
         config: &PipelineConfig,
         mut wheels: Option<WheelFrames>,
         network: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
-    ) -> Result<Self, DriveError> {
+    ) -> Result<Self, ReplayError> {
         let mut coprocessor = Coprocessor::new(Config {
             pipeline: *config,
             wheels: wheels.as_ref().map(|_| wheel_frames::receiver()),
@@ -104,7 +104,7 @@ impl Drive {
             let Ok(observation) = coprocessor.imu(row.sample, now) else { continue };
             if let Some(source) = observation.refused {
                 let path = recording.path.clone();
-                return Err(DriveError::StartsMoving { path, line: row.line, source });
+                return Err(ReplayError::StartsMoving { path, line: row.line, source });
             }
             let frames = std::iter::from_fn(|| coprocessor.next_frame()).collect();
             if let Some(window) = coprocessor.window() {
@@ -131,7 +131,7 @@ impl Drive {
         let pipeline = coprocessor.pipeline();
         let gyro_bias = pipeline
             .gyro_bias()
-            .ok_or_else(|| DriveError::NeverInitialised { path: recording.path.clone() })?;
+            .ok_or_else(|| ReplayError::NeverInitialised { path: recording.path.clone() })?;
         let start = start.unwrap_or(steps.len());
         let (owed, counters) = (pipeline.owed().navigation, *pipeline.counters());
         let out_of_range = coprocessor.input_counters().out_of_range;
@@ -172,7 +172,7 @@ impl Drive {
         log.finish()
     }
 
-    /// How many steps had each status.
+    /// Returns the number of steps with each status.
     #[must_use]
     pub fn status_counts(&self) -> [(Status, usize); 4] {
         [Status::Init, Status::Degraded, Status::Ready, Status::Clipped].map(|status| {
@@ -221,7 +221,7 @@ mod tests {
         let mut ticks = 0;
         // Nothing ever moves here: zero-rate updates would take the correction back off.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let drive = Drive::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
+        let drive = Replay::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
         assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
         assert_eq!(drive.gyro_bias[2], recording.rows[1].sample.angular_rate[2]);
         // Two estimates of 100 codes: all samples but the last, which no window has covered.
@@ -238,22 +238,24 @@ mod tests {
     #[test]
     fn a_gap_is_no_error() {
         let recording = recording(1_000, |_| 0.01, 700);
-        let drive = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
+        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
         assert_eq!((drive.counters.missing, recording.missing), (1, 1));
     }
 
     #[test]
     fn starting_in_a_turn_is_refused() {
         let recording = recording(1_000, |k| 0.001 * k as f64, usize::MAX);
-        let error = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
-        assert!(matches!(error, DriveError::StartsMoving { line: 301, .. }), "{error:?}");
+        let error =
+            Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
+        assert!(matches!(error, ReplayError::StartsMoving { line: 301, .. }), "{error:?}");
         assert!(error.to_string().starts_with("a.csv: starts moving: line 301: "), "{error}");
     }
 
     #[test]
     fn never_three_seconds_whole() {
         let recording = recording(400, |_| 0.01, 200);
-        let error = Drive::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
-        assert_eq!(error, DriveError::NeverInitialised { path: "a.csv".into() });
+        let error =
+            Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
+        assert_eq!(error, ReplayError::NeverInitialised { path: "a.csv".into() });
     }
 }

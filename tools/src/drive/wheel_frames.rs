@@ -64,8 +64,8 @@ impl WheelFrames {
         Some(Self { source, newest: [None; WHEELS], row: 0 })
     }
 
-    /// Takes a row, and returns the speed of each wheel in km/h as it is known then. A wheel that is too slow to tell from a
-    /// standing one shows zero, as passive sensors do.
+    /// Takes a row and returns the known speed of each wheel in km/h. A wheel that turns too slowly to be distinguished
+    /// from a standing one shows zero, as passive sensors do.
     pub fn speeds(&mut self, row: &Row) -> [Option<f64>; WHEELS] {
         for (newest, rate) in self.newest.iter_mut().zip(row.wheels) {
             let shown = |rate: f64| if rate.abs() > WHEEL_STANDS { rate.abs() } else { 0.0 };
@@ -77,7 +77,7 @@ impl WheelFrames {
             .map(|wheel| self.newest[wheel].filter(|(_, at)| now - at < SILENT_ROWS).map(|(speed, _)| speed))
     }
 
-    /// Takes a row, and returns the frame that comes with it: with every [`FRAME_ROWS`]th, where all wheels are known.
+    /// Takes a row and returns its frame: one with every [`FRAME_ROWS`]th row, where all wheels are known.
     pub fn next(&mut self, row: &Row) -> Option<DataFrame> {
         let is_due = self.row.is_multiple_of(FRAME_ROWS);
         let speeds = self.speeds(row);
@@ -90,7 +90,7 @@ impl WheelFrames {
 pub struct Speeds {
     /// Wheels that it is the mean of.
     pub wheels: usize,
-    /// At each row, m/s, forward positive; a wheel's last known rate holds on.
+    /// The speed at each row, m/s, forward positive; a wheel's last known rate holds on.
     pub metre_per_sec: Vec<f64>,
 }
 

@@ -1,8 +1,8 @@
-//! What each part of the compensation is worth: the navigation rate of one configuration after
-//! another, all of which the board can run.
+//! The worth of each part of the compensation: the navigation rate of one configuration after another, all of which the
+//! board can run.
 
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, DriveError};
+use crate::drive::replay::{Replay, ReplayError};
 use crate::drive::wheel_frames::{self, WheelFrames};
 use crate::evaluate::methods::with_mode;
 use crate::evaluate::metrics::{WINDOW, YawError};
@@ -15,16 +15,16 @@ use gyronet::sample::Standstill;
 use gyronet::units::AngularRate;
 use serde::Serialize;
 
-/// One configuration and what it is called.
+/// A configuration and its name.
 #[derive(Debug, Clone)]
 pub struct Variant {
-    /// For people.
+    /// The name in tables.
     pub name: String,
-    /// What runs.
+    /// The configuration.
     pub config: PipelineConfig,
-    /// Whether windows go through the network; else its corrections are zero.
+    /// Windows go through the network; otherwise its corrections are zero.
     pub network: bool,
-    /// Whether the vehicle's bus has wheel speeds.
+    /// The vehicle's bus has wheel speeds.
     pub wheels: bool,
 }
 
@@ -34,7 +34,7 @@ impl Variant {
     }
 }
 
-/// No network: nothing is corrected.
+/// A network that corrects nothing.
 struct Nothing;
 
 impl WindowNetwork for Nothing {
@@ -80,7 +80,7 @@ pub fn lags() -> Vec<Variant> {
         .collect()
 }
 
-/// How one variant did, on one drive or as a mean.
+/// The score of one variant, on one drive or as a mean.
 #[derive(Debug, Clone, Serialize)]
 pub struct Score {
     /// The variant's name.
@@ -96,8 +96,7 @@ pub struct Score {
     pub sigma_rad: f64,
 }
 
-/// What the reference shows in whole seconds in which the wheels stand: nothing can be told
-/// from it that is smaller.
+/// The reference's own error in whole seconds in which the wheels stand; smaller errors cannot be measured with it.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Floor {
     /// Whole seconds.
@@ -111,21 +110,21 @@ pub struct Floor {
 /// Runs variants over one drive.
 ///
 /// # Errors
-/// [`DriveError`].
+/// [`ReplayError`].
 pub fn run(
     recording: &Recording,
     network: &mut impl WindowNetwork,
     variants: &[Variant],
     mut tick: impl FnMut(),
-) -> Result<Vec<Score>, DriveError> {
+) -> Result<Vec<Score>, ReplayError> {
     variants
         .iter()
         .filter_map(|Variant { name, config, network: with_network, wheels }| {
             let wheels = wheels.then(|| WheelFrames::new(recording)).flatten();
             let drive = if *with_network {
-                Drive::run(recording, config, wheels, network, &mut tick)
+                Replay::run(recording, config, wheels, network, &mut tick)
             } else {
-                Drive::run(recording, config, wheels, &mut Nothing, &mut tick)
+                Replay::run(recording, config, wheels, &mut Nothing, &mut tick)
             };
             let drive = match drive {
                 Ok(drive) => drive,

@@ -11,7 +11,7 @@
 use gyronet::sample::RATE_HZ;
 use std::f64::consts::PI;
 
-/// What the filter should do.
+/// The requirements of a filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Design {
     /// End of the pass band, Hz.

@@ -1,7 +1,8 @@
-//! The ways of getting a yaw rate that are compared with each other.
+//! The ways of getting a yaw rate that are compared with each other: one list of names for the tables of drives and for
+//! the paper's, and the rates of one drive by each of them.
 
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, DriveError};
+use crate::drive::replay::{Replay, ReplayError};
 use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::fir;
 use gyronet::compensate::{CompensateConfig, Mode};
@@ -11,90 +12,102 @@ use gyronet::sample::ImuSample;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::time::{Duration, Instant};
 
-/// One way.
+/// The gyro that a method starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// The gyro as it is.
-    Raw,
-    /// The gyro less its mean over the first 3 s.
-    Static,
-    /// The gyro through a low-pass ([`crate::evaluate::fir`]).
-    Fir,
-    /// Static initialisation and the newest output of a window every sample.
-    Newest,
-    /// Static initialisation and the middle outputs of a window every five samples.
-    Middle,
-    /// Static initialisation and GyroNet in f32: the mean of both windows over each sample,
-    /// which is known 110 ms later.
-    GyronetF32,
-    /// The same in integers.
-    GyronetInt,
-    /// What the board sends at once: Bosch TX1, VDC2.
-    Prompt,
-    /// What the board sends in its own yaw messages, some samples later.
-    Default,
+pub enum Gyro {
+    /// The gyro of the inertial sensor.
+    Mems,
+    /// The fibre-optic gyro.
+    Fog,
+}
+
+/// A way of getting a yaw rate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Method {
+    /// The name in JSON.
+    pub key: &'static str,
+    /// The name in tables.
+    pub name: &'static str,
+    /// The gyro that it starts from.
+    pub gyro: Gyro,
+}
+
+const fn mems(key: &'static str, name: &'static str) -> Method {
+    Method { key, name, gyro: Gyro::Mems }
+}
+
+const fn fog(key: &'static str, name: &'static str) -> Method {
+    Method { key, name, gyro: Gyro::Fog }
 }
 
 impl Method {
-    /// In the order of the table.
-    pub const ALL: [Self; 9] = [
-        Self::Raw,
-        Self::Static,
-        Self::Fir,
-        Self::Newest,
-        Self::Middle,
-        Self::GyronetF32,
-        Self::GyronetInt,
-        Self::Prompt,
-        Self::Default,
+    /// The inertial sensor's gyro as it is.
+    pub const RAW: Self = mems("raw", "raw gyro");
+    /// The gyro less its mean over the first 3 s.
+    pub const STATIC: Self = mems("static", "static initialisation");
+    /// The gyro through the paper's low-pass ([`crate::evaluate::fir`]).
+    pub const FIR: Self = mems("fir", "FIR 10/15 Hz");
+    /// Static initialisation and the newest output of a window every sample.
+    pub const NEWEST: Self = mems("newest", "newest output");
+    /// Static initialisation and the middle outputs of a window every five samples.
+    pub const MIDDLE: Self = mems("middle", "middle outputs");
+    /// Static initialisation and GyroNet in f32: the mean of both windows over each sample, which is known 110 ms
+    /// later.
+    pub const GYRONET_F32: Self = mems("gyronet_f32", "overlap f32");
+    /// The same in integers.
+    pub const GYRONET_INT: Self = mems("gyronet_int", "overlap integer");
+    /// The rate that the board sends at once: Bosch TX1, VDC2.
+    pub const PROMPT: Self = mems("prompt", "sent at once");
+    /// The rate that the board sends in its own yaw messages, some samples later.
+    pub const NAVIGATION: Self = mems("default", "sent for navigation");
+    /// A well-known filter in the place of the vendor's.
+    pub const VQF: Self = mems("vqf", "VQF filter");
+    /// The same filter, with limits of rest that a shaking vehicle keeps.
+    pub const VQF_VEHICLE: Self = mems("vqf_vehicle", "VQF filter, vehicle's limits of rest");
+    /// The vendor's own heading.
+    pub const VENDOR: Self = mems("vendor", "vendor's filter");
+    /// GyroNet alone, integer, settled estimates.
+    pub const GYRONET: Self = mems("gyronet", "GyroNet");
+    /// GyroNet alone, the rate that is sent at once.
+    pub const GYRONET_ONLINE: Self = mems("gyronet_online", "GyroNet, sent at once");
+    /// GyroNet with zero-rate updates behind it: the rate that is sent for navigation.
+    pub const GYRONET_LOOP: Self = mems("gyronet_loop", "GyroNet with the bias loop");
+    /// The fibre-optic gyro as it is.
+    pub const FOG: Self = fog("fog", "FoG");
+    /// The fibre-optic gyro less the Earth's rate at the place's latitude.
+    pub const FOG_EARTH: Self = fog("fog_earth", "FoG less Earth rate");
+    /// FoGNet, its first minute padded.
+    pub const FOGNET: Self = fog("fognet", "FoGNet");
+    /// FoGNet, its first minute uncorrected.
+    pub const FOGNET_NOPAD: Self = fog("fognet_nopad", "FoGNet, no padding");
+
+    /// The methods of one drive, in the order of its table.
+    pub const ON_A_DRIVE: [Self; 9] = [
+        Self::RAW,
+        Self::STATIC,
+        Self::FIR,
+        Self::NEWEST,
+        Self::MIDDLE,
+        Self::GYRONET_F32,
+        Self::GYRONET_INT,
+        Self::PROMPT,
+        Self::NAVIGATION,
     ];
-
-    /// For people.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Raw => "raw gyro",
-            Self::Static => "static initialisation",
-            Self::Fir => "FIR 10/15 Hz",
-            Self::Newest => "newest output",
-            Self::Middle => "middle outputs",
-            Self::GyronetF32 => "overlap f32",
-            Self::GyronetInt => "overlap integer",
-            Self::Prompt => "sent at once",
-            Self::Default => "sent for navigation",
-        }
-    }
-
-    /// For programs.
-    #[must_use]
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Raw => "raw",
-            Self::Static => "static",
-            Self::Fir => "fir",
-            Self::Newest => "newest",
-            Self::Middle => "middle",
-            Self::GyronetF32 => "gyronet_f32",
-            Self::GyronetInt => "gyronet_int",
-            Self::Prompt => "prompt",
-            Self::Default => "default",
-        }
-    }
 }
 
-/// One thing for each method.
+/// A value for each method of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PerMethod<T>([T; Method::ALL.len()]);
+pub struct PerMethod<T>([T; Method::ON_A_DRIVE.len()]);
 
 impl<T> PerMethod<T> {
     /// One for each.
     pub fn new(of: impl FnMut(Method) -> T) -> Self {
-        Self(Method::ALL.map(of))
+        Self(Method::ON_A_DRIVE.map(of))
     }
 
     /// In the order of the table.
     pub fn each(&self) -> impl Iterator<Item = (Method, &T)> {
-        Method::ALL.into_iter().zip(&self.0)
+        Method::ON_A_DRIVE.into_iter().zip(&self.0)
     }
 
     /// The same of every method.
@@ -115,16 +128,16 @@ impl<T> std::ops::Index<Method> for PerMethod<T> {
     type Output = T;
 
     fn index(&self, method: Method) -> &T {
-        // The order of `ALL` is that of the variants.
-        &self.0[method as usize]
+        let at = Method::ON_A_DRIVE.iter().position(|own| *own == method);
+        &self.0[at.unwrap_or_else(|| panic!("{} is no method of a drive", method.key))]
     }
 }
 
 impl<T: Serialize> Serialize for PerMethod<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(Method::ALL.len()))?;
+        let mut map = serializer.serialize_map(Some(Method::ON_A_DRIVE.len()))?;
         for (method, value) in self.each() {
-            map.serialize_entry(method.key(), value)?;
+            map.serialize_entry(method.key, value)?;
         }
         map.end()
     }
@@ -147,7 +160,7 @@ pub struct Rates {
     /// The true yaw rate, rad/s; `None` where a sample has none.
     pub reference: Option<Vec<f64>>,
     /// The drive as the board would run it.
-    pub drive: Drive,
+    pub drive: Replay,
     /// What that run took on this machine.
     pub run_time: Duration,
 }
@@ -160,40 +173,56 @@ impl Rates {
     /// [`RUNS`] times for each row.
     ///
     /// # Errors
-    /// [`DriveError`], when static initialisation does not succeed.
+    /// [`ReplayError`], when static initialisation does not succeed.
     pub fn new(
         recording: &Recording,
         float: &mut impl WindowNetwork,
         integer: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
-    ) -> Result<Self, DriveError> {
+    ) -> Result<Self, ReplayError> {
         let start = Instant::now();
-        let drive =
-            Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), integer, &mut tick)?;
+        let drive = Replay::run(
+            recording,
+            &PipelineConfig::DEFAULT,
+            WheelFrames::new(recording),
+            integer,
+            &mut tick,
+        )?;
         let run_time = start.elapsed();
         let float =
-            Drive::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), float, &mut tick)?;
-        let newest =
-            Drive::run(recording, &with_mode(Mode::Newest), WheelFrames::new(recording), integer, &mut tick)?;
-        let middle =
-            Drive::run(recording, &with_mode(Mode::Middle), WheelFrames::new(recording), integer, &mut tick)?;
+            Replay::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), float, &mut tick)?;
+        let newest = Replay::run(
+            recording,
+            &with_mode(Mode::Newest),
+            WheelFrames::new(recording),
+            integer,
+            &mut tick,
+        )?;
+        let middle = Replay::run(
+            recording,
+            &with_mode(Mode::Middle),
+            WheelFrames::new(recording),
+            integer,
+            &mut tick,
+        )?;
         let compared = || drive.steps[drive.compared()].iter();
         let [.., bias] = drive.gyro_bias;
         let gyro = |row: usize| yaw_rate(&recording.rows[row].sample);
         // A filter starts with the recording.
         let raw: Vec<f64> = drive.steps.iter().map(|step| gyro(step.row)).collect();
         let filtered = fir::filter(&fir::Design::PAPER.taps(), &raw);
-        let settled = |drive: &Drive| drive.settled().map(|rate| rate.rad_per_sec()).collect();
+        let settled = |drive: &Replay| drive.settled().map(|rate| rate.rad_per_sec()).collect();
         let rates = PerMethod::new(|method| match method {
-            Method::Raw => compared().map(|step| gyro(step.row)).collect(),
-            Method::Static => compared().map(|step| gyro(step.row) - bias.rad_per_sec()).collect(),
-            Method::Fir => filtered[drive.compared()].to_vec(),
-            Method::Newest => settled(&newest),
-            Method::Middle => settled(&middle),
-            Method::GyronetF32 => settled(&float),
-            Method::GyronetInt => settled(&drive),
-            Method::Prompt => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
-            Method::Default => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
+            Method::RAW => compared().map(|step| gyro(step.row)).collect(),
+            Method::STATIC => compared().map(|step| gyro(step.row) - bias.rad_per_sec()).collect(),
+            Method::FIR => filtered[drive.compared()].to_vec(),
+            Method::NEWEST => settled(&newest),
+            Method::MIDDLE => settled(&middle),
+            Method::GYRONET_F32 => settled(&float),
+            Method::GYRONET_INT => settled(&drive),
+            Method::PROMPT => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
+            // Method::NAVIGATION, the last one.
+            _ => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
         });
         let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
         let seconds = compared().map(|step| (step.time.0 - first) as f64 * 1e-6).collect();

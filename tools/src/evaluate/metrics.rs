@@ -1,4 +1,4 @@
-//! How far a yaw rate leads a heading astray: the two numbers of the paper's Table I.
+//! The yaw errors of the paper's Table I: over one second, and at the end of the drive.
 
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
@@ -16,7 +16,7 @@ pub struct YawError {
     pub mean_1s_rad: f64,
     /// Absolute error of the yaw at the end, wrapped to at most pi.
     pub final_rad: f64,
-    /// The same, not wrapped.
+    /// The absolute error of the yaw at the end, not wrapped.
     pub final_unwrapped_rad: f64,
 }
 
@@ -60,7 +60,7 @@ pub fn integral(rates: &[f64]) -> Vec<f64> {
     rates.iter().scan(0.0, step).collect()
 }
 
-/// The same angle within -pi to pi.
+/// Returns the same angle within -pi to pi.
 pub(crate) fn wrap(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }

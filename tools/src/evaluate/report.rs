@@ -1,4 +1,4 @@
-//! The yaw errors of each method, drive by drive: a table for people, JSON for programs.
+//! The yaw errors of each method, drive by drive, as a table and as JSON.
 
 use crate::drive::recording::Recording;
 use crate::evaluate::methods::{Method, PerMethod, Rates};
@@ -7,7 +7,7 @@ use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 use std::fmt;
 
-/// Why a drive cannot be evaluated.
+/// The error of a drive that cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
@@ -19,12 +19,12 @@ pub enum EvaluateError {
         /// The first line without it.
         line: u64,
     },
-    /// Nothing is left after static initialisation.
+    /// Less than a second is left after static initialisation.
     #[error("{path}: {seconds:.2} s are left after static initialisation, evaluation needs 1 s")]
     TooShort {
         /// The recording.
         path: String,
-        /// What is left.
+        /// The time that is left.
         seconds: f64,
     },
 }
@@ -34,7 +34,7 @@ pub enum EvaluateError {
 pub struct DriveErrors {
     /// The recording's name.
     pub name: String,
-    /// What was compared, s.
+    /// The length of the comparison, s.
     pub seconds: f64,
     /// Grid steps without a sample; they count for no method.
     pub missing: u32,
@@ -108,10 +108,10 @@ impl fmt::Display for Report {
 
 fn table(f: &mut fmt::Formatter<'_>, errors: &PerMethod<YawError>) -> fmt::Result {
     writeln!(f, "  {:<24}{:>14}{:>16}{:>14}", "yaw error", "in 1 s, rad", "to static init", "final, rad")?;
-    let baseline = errors[Method::Static].mean_1s_rad;
+    let baseline = errors[Method::STATIC].mean_1s_rad;
     for (method, error) in errors.each() {
         let ratio = error.mean_1s_rad / baseline;
-        let name = method.name();
+        let name = method.name;
         writeln!(f, "  {name:<24}{:>14.6}{ratio:>16.3}{:>14.6}", error.mean_1s_rad, error.final_rad)?;
     }
     Ok(())
@@ -126,11 +126,11 @@ mod tests {
         let methods = |scale: f64| {
             PerMethod::new(|method| {
                 error(match method {
-                    Method::Raw => scale,
-                    Method::Static => 0.5 * scale,
-                    Method::Fir => 2.0 * scale,
-                    Method::GyronetF32 => 0.25 * scale,
-                    Method::GyronetInt => 0.125 * scale,
+                    Method::RAW => scale,
+                    Method::STATIC => 0.5 * scale,
+                    Method::FIR => 2.0 * scale,
+                    Method::GYRONET_F32 => 0.25 * scale,
+                    Method::GYRONET_INT => 0.125 * scale,
                     _ => 0.0625 * scale,
                 })
             })

@@ -1,5 +1,4 @@
-//! How far a dead-reckoned path is from the true one: the absolute trajectory error (ATE), as it
-//! lies and after alignment.
+//! The absolute trajectory error (ATE) of a dead-reckoned path against the true one, as it lies and after alignment.
 //!
 //! The paper says "using evo" and neither rmse nor mean: both are here. Alignment is Umeyama's
 //! (IEEE PAMI 13(4), 1991) without scale, in the plane: with the centred points as vectors, the
@@ -40,7 +39,7 @@ impl TrajectoryError {
         Some(Self { rmse_m, mean_m })
     }
 
-    /// After the estimate has been laid onto the truth as well as a turn and a shift can.
+    /// Compares after the estimate has been turned and shifted onto the truth as well as possible.
     #[must_use]
     pub fn aligned(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         let alignment = Alignment::new(estimate, truth)?;
@@ -78,7 +77,7 @@ impl Alignment {
         Some(Self { shift: [to[0] - x, to[1] - y], ..turned })
     }
 
-    /// Where a point of the estimate comes to lie.
+    /// Returns the aligned place of a point of the estimate.
     #[must_use]
     pub fn apply(&self, [x, y]: Point) -> Point {
         let (sin, cos) = (libm::sin(self.yaw), libm::cos(self.yaw));

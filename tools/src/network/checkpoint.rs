@@ -1,72 +1,150 @@
-//! GyroNet's f32 checkpoint, as `tools/train` exports it.
+//! The f32 checkpoints that `tools/train` exports: GyroNet's and FoGNet's, each with the tensors of its own layers.
 
-pub use crate::network::tensors::CheckpointError;
+pub use super::tensors::CheckpointError;
 
-use crate::network::tensors::{Shape, Tensors, bilstm, dense, tensor};
+use super::tensors::{Shape, Tensors, bilstm, dense, tensor};
+use gyronet::fog::seconds::STEPS;
 use gyronet::model::blob::HIDDEN;
+use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
+use gyronet::model::fognet_f32::FogNetF32;
 use gyronet::model::gyronet_f32::GyroNetF32;
 use gyronet::model::window::FEATURES;
 use gyronet::nn::reference::LstmWeights;
+use std::marker::PhantomData;
 use std::path::Path;
 
-/// The network's tensors: two LSTMs one above the other, and what is around them.
-fn shapes() -> Vec<Shape> {
-    let mut shapes = vec![
-        tensor("input_mean", &[FEATURES]),
-        tensor("input_std", &[FEATURES]),
-        tensor("output_scale", &[1]),
-    ];
-    shapes.extend(bilstm("lstm1", FEATURES, HIDDEN, 1));
-    shapes.extend(bilstm("lstm2", 2 * HIDDEN, HIDDEN, 1));
-    shapes.extend(dense("fc", 2 * HIDDEN, 2));
-    shapes
+/// A network that has checkpoints.
+pub trait Network {
+    /// Returns the names and shapes of its tensors.
+    fn shapes() -> Vec<Shape>;
+}
+
+/// GyroNet: two LSTMs one above the other, and a fully connected layer.
+#[derive(Debug, Clone)]
+pub struct GyroNet;
+
+/// FoGNet: two stacks of LSTMs, and four fully connected layers.
+#[derive(Debug, Clone)]
+pub struct FogNet;
+
+impl Network for GyroNet {
+    fn shapes() -> Vec<Shape> {
+        let mut shapes = vec![
+            tensor("input_mean", &[FEATURES]),
+            tensor("input_std", &[FEATURES]),
+            tensor("output_scale", &[1]),
+        ];
+        shapes.extend(bilstm("lstm1", FEATURES, HIDDEN, 1));
+        shapes.extend(bilstm("lstm2", 2 * HIDDEN, HIDDEN, 1));
+        shapes.extend(dense("fc", 2 * HIDDEN, 2));
+        shapes
+    }
+}
+
+impl Network for FogNet {
+    fn shapes() -> Vec<Shape> {
+        let mut shapes = vec![
+            tensor("input_mean", &[INPUTS]),
+            tensor("input_std", &[INPUTS]),
+            tensor("correction_scale", &[1]),
+        ];
+        shapes.extend(bilstm("lstm1", INPUTS, HIDDEN1, 2));
+        shapes.extend(dense("fc1", 2 * HIDDEN1, 1));
+        shapes.extend(bilstm("lstm2", 2, HIDDEN2, 2));
+        shapes.extend(dense("fc2", 2 * HIDDEN2, 1));
+        shapes.extend(dense("fc3", STEPS, 1));
+        shapes.extend(dense("fc4", 2, 1));
+        shapes
+    }
 }
 
 /// A checkpoint in memory.
 #[derive(Debug, Clone)]
-pub struct Checkpoint(Tensors);
+pub struct Checkpoint<N> {
+    tensors: Tensors,
+    network: PhantomData<N>,
+}
 
-impl Checkpoint {
+impl<N: Network> Checkpoint<N> {
     /// Reads a file.
     ///
     /// # Errors
     /// [`CheckpointError`], which names the file and the tensor.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        Tensors::read(path, &shapes()).map(Self)
+        Ok(Self { tensors: Tensors::read(path, &N::shapes())?, network: PhantomData })
     }
 
-    /// Reads bytes; `name` is for messages.
+    /// Parses bytes; messages call them `name`.
     ///
     /// # Errors
     /// [`CheckpointError`] with that name.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, CheckpointError> {
-        Tensors::parse(name, bytes, &shapes()).map(Self)
+        Ok(Self { tensors: Tensors::parse(name, bytes, &N::shapes())?, network: PhantomData })
     }
 
-    /// All tensors.
+    /// Returns all tensors.
     #[must_use]
     pub fn tensors(&self) -> &Tensors {
-        &self.0
+        &self.tensors
     }
 
-    /// Weights of layer 1 or 2, forward or backward.
+    fn features<const F: usize>(&self, name: &str) -> [f32; F] {
+        std::array::from_fn(|k| self.tensors.tensor(name)[k])
+    }
+}
+
+impl Checkpoint<GyroNet> {
+    /// Returns the weights of layer 1 or 2, forward or backward.
     #[must_use]
     pub fn direction(&self, layer: usize, backward: bool) -> LstmWeights<'_> {
-        self.0.direction(&format!("lstm{layer}"), 0, backward)
+        self.tensors.direction(&format!("lstm{layer}"), 0, backward)
     }
 
-    /// The f32 network over these tensors.
+    /// Returns the f32 network over these tensors.
     #[must_use]
     pub fn network(&self) -> GyroNetF32<'_> {
-        let features = |name| std::array::from_fn(|k| self.0.tensor(name)[k]);
         GyroNetF32 {
-            input_mean: features("input_mean"),
-            input_std: features("input_std"),
-            output_scale: self.0.tensor("output_scale")[0],
+            input_mean: self.features("input_mean"),
+            input_std: self.features("input_std"),
+            output_scale: self.tensors.tensor("output_scale")[0],
             lstm1: [self.direction(1, false), self.direction(1, true)],
             lstm2: [self.direction(2, false), self.direction(2, true)],
-            fc_weight: self.0.tensor("fc.weight"),
-            fc_bias: std::array::from_fn(|row| self.0.tensor("fc.bias")[row]),
+            fc_weight: self.tensors.tensor("fc.weight"),
+            fc_bias: self.features("fc.bias"),
+        }
+    }
+}
+
+impl Checkpoint<FogNet> {
+    /// Returns whether a file is a checkpoint of FoGNet, by the tensors in it.
+    ///
+    /// # Errors
+    /// [`CheckpointError`], which names the file.
+    pub fn is_in(path: &Path) -> Result<bool, CheckpointError> {
+        Tensors::names(path).map(|names| names.iter().any(|name| name == "fc4.weight"))
+    }
+
+    /// Returns the f32 network over these tensors.
+    #[must_use]
+    pub fn network(&self) -> FogNetF32<'_> {
+        let dense = |name: &str| {
+            let [weight, bias] =
+                ["weight", "bias"].map(|what| self.tensors.tensor(&format!("{name}.{what}")));
+            (weight, bias[0])
+        };
+        let lstm = |name| {
+            [0, 1].map(|layer| [false, true].map(|backward| self.tensors.direction(name, layer, backward)))
+        };
+        FogNetF32 {
+            input_mean: self.features("input_mean"),
+            input_std: self.features("input_std"),
+            correction_scale: self.tensors.tensor("correction_scale")[0],
+            lstm1: lstm("lstm1"),
+            fc1: dense("fc1"),
+            lstm2: lstm("lstm2"),
+            fc2: dense("fc2"),
+            fc3: dense("fc3"),
+            fc4: dense("fc4"),
         }
     }
 }

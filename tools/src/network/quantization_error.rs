@@ -1,4 +1,4 @@
-//! What quantisation adds: integer network against f32 network, window by window.
+//! The error that quantisation adds: the integer network is compared with the f32 network, window by window.
 
 use gyronet::fog::seconds::SecondsWindow;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
@@ -45,12 +45,12 @@ impl QuantizationError {
 }
 
 impl<'n, I, F> Both<'n, I, F> {
-    /// Nothing compared yet.
+    /// Starts without a comparison.
     pub fn new(integer: &'n mut I, reference: &'n mut F) -> Self {
         Self { integer, reference, error: QuantizationError::default() }
     }
 
-    /// What was found so far.
+    /// Returns the error so far.
     #[must_use]
     pub fn error(&self) -> QuantizationError {
         self.error

@@ -1,4 +1,4 @@
-//! f32 checkpoint to weight file: int8 rows, packed in the order in which the kernels read.
+//! Quantisation: an f32 checkpoint becomes a weight file with int8 rows, packed in the order in which the kernels read.
 //!
 //! A gate row gets one scale, chosen so that its largest weight becomes at most 127 and its
 //! multiplier is a whole number: the scale itself is then exact. Rows that share a halfword as
@@ -8,7 +8,7 @@
 pub mod fognet;
 mod rows;
 
-use crate::network::checkpoint::Checkpoint;
+use crate::network::checkpoint::{Checkpoint, GyroNet};
 use crate::network::tensors::Tensors;
 use gyronet::model::blob::{self, Blob, HIDDEN, Topology};
 use gyronet::model::window::WINDOW;
@@ -20,7 +20,7 @@ use serde_json::json;
 /// how many that hits.
 pub const INPUT_CLAMP_STD: f64 = 24.0;
 
-/// Why a checkpoint cannot be quantised.
+/// The error of a checkpoint that cannot be quantised.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum QuantizeError {
     /// A row's weights are beyond +-3.96, the largest that int8 and a 16-bit multiplier hold.
@@ -36,7 +36,7 @@ pub enum QuantizeError {
     /// A normalisation constant does not fit its fixed-point field.
     #[error("{what} {value} does not fit its fixed-point field")]
     Constant {
-        /// Which one.
+        /// The name of the constant.
         what: String,
         /// Its value.
         value: f64,
@@ -46,7 +46,7 @@ pub enum QuantizeError {
     Blob(#[from] blob::BlobError),
 }
 
-/// What quantisation did.
+/// Figures of a quantisation.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Rows in all.
@@ -69,7 +69,7 @@ impl Report {
 ///
 /// # Errors
 /// [`QuantizeError`].
-pub fn quantize(checkpoint: &Checkpoint) -> Result<(Vec<u8>, Report), QuantizeError> {
+pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), QuantizeError> {
     let mut report = Report::new();
     let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;
     let mut body = Vec::new();
@@ -101,7 +101,7 @@ pub fn quantize(checkpoint: &Checkpoint) -> Result<(Vec<u8>, Report), QuantizeEr
     Ok((file, report))
 }
 
-/// Both rows of the output layer.
+/// Writes both rows of the output layer.
 fn output(out: &mut Vec<u8>, tensors: &Tensors) -> Result<(), QuantizeError> {
     let (error, log_scale) = tensors.tensor("fc.weight").split_at(2 * HIDDEN);
     let bias = tensors.tensor("fc.bias");

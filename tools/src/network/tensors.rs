@@ -1,5 +1,4 @@
-//! A checkpoint file (safetensors) with the tensors that a network needs: there, of the right
-//! shape, finite.
+//! A checkpoint file (safetensors) and the tensors that a network needs from it: present, of the right shape, finite.
 
 use gyronet::nn::reference::LstmWeights;
 use safetensors::{Dtype, SafeTensors};
@@ -7,7 +6,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Why a checkpoint cannot be used.
+/// The error of a checkpoint that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// The file cannot be read.
@@ -15,15 +14,15 @@ pub enum CheckpointError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Not a safetensors file.
+    /// The file is no safetensors file.
     #[error("{name}: not a safetensors file: {source}")]
     Format {
         /// The file.
         name: String,
-        /// What the reader said.
+        /// The reader's error.
         source: safetensors::SafeTensorError,
     },
     /// A tensor that GyroNet needs is not there.
@@ -59,7 +58,7 @@ pub enum CheckpointError {
 }
 
 /// Name and shape of a tensor, as PyTorch has them.
-pub(crate) type Shape = (String, Vec<usize>);
+pub type Shape = (String, Vec<usize>);
 
 /// A vector, or a matrix by rows.
 pub(crate) fn tensor(name: &str, shape: &[usize]) -> Shape {
@@ -93,7 +92,7 @@ pub(crate) fn dense(name: &str, inputs: usize, outputs: usize) -> [Shape; 2] {
 #[derive(Debug, Clone)]
 pub struct Tensors {
     tensors: BTreeMap<String, Vec<f32>>,
-    /// What `tools/train` wrote about its making: JSON, or empty.
+    /// The provenance that `tools/train` wrote: JSON, or empty.
     pub provenance: String,
     /// SHA-256 of the file.
     pub sha256: String,

@@ -1,9 +1,9 @@
-//! A weight file (`.blob`) from disk, on the boundary that the library wants.
+//! A weight file (`.blob`) from disk, aligned as the library needs it.
 
 use gyronet::model::{Blob, BlobError, FogBlob};
 use std::path::Path;
 
-/// Why a weight file cannot be used.
+/// The error of a weight file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightFileError {
@@ -12,7 +12,7 @@ pub enum WeightFileError {
     Io {
         /// The file.
         path: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The library refuses it.
@@ -20,7 +20,7 @@ pub enum WeightFileError {
     Blob {
         /// The file.
         path: String,
-        /// Why.
+        /// The reason.
         source: BlobError,
     },
 }

@@ -7,7 +7,6 @@
 //! on the straight line between neighbouring rows; angles of the gyro and ways of the wheels are
 //! interpolated as sums, so that nothing is lost or counted twice.
 
-mod error;
 mod export;
 mod kaist;
 mod nclt;
@@ -15,11 +14,11 @@ mod rows;
 mod summary;
 mod track;
 
-pub use error::SequenceError;
 pub use export::{HEADER, write_csv};
 pub use summary::{Seen, Spread, StreamSummary};
 
 use crate::drive::DT;
+use crate::drive::error::{DataError, DataFault};
 use crate::drive::recording::{Recording, Row as RecordingRow};
 use crate::simulate::layout::{Layout, MARKER, Spec};
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
@@ -35,7 +34,7 @@ pub const MAX_GAP: f64 = 0.1;
 /// Least length of a sequence: static initialisation and a second, s.
 const NEEDED: f64 = 4.0;
 
-/// One step of the grid. Axes: x forward, y left, z up; heading counter-clockwise from east.
+/// A step of the grid. Axes: x forward, y left, z up; heading counter-clockwise from east.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// m/s^2.
@@ -44,7 +43,7 @@ pub struct Step {
     pub angular_rate: [f32; 3],
     /// The inertial sensor was silent around here for longer than [`MAX_GAP`].
     pub imu_gap: bool,
-    /// What the fibre-optic gyro has turned since the step before, rad.
+    /// The turn of the fibre-optic gyro since the step before, rad.
     pub fog: f64,
     /// Way of the left and the right wheel since the step before, m.
     pub wheels: [f64; 2],
@@ -65,12 +64,11 @@ pub struct Sequence {
     pub path: PathBuf,
     /// Whose layout it has.
     pub layout: Layout,
-    /// What it was simulated of, if it was.
+    /// The specification that it was simulated from, if it is simulated.
     pub simulated: Option<Spec>,
-    /// Whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; they are zero
-    /// otherwise.
+    /// [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
     pub has_gyro: bool,
-    /// Whether [`Step::vendor_yaw`] is a vendor's.
+    /// [`Step::vendor_yaw`] comes from a vendor's filter.
     pub has_vendor: bool,
     /// Distance of the wheels, m, where the data say it.
     pub wheel_base: Option<f64>,
@@ -96,37 +94,34 @@ struct Files {
 /// Whose layout a folder has.
 ///
 /// # Errors
-/// [`SequenceError::Unknown`], or [`SequenceError::Io`] where there is no folder.
-pub fn layout(folder: &Path) -> Result<Layout, SequenceError> {
+/// [`DataFault::UnknownLayout`], or [`DataFault::Io`] where there is no folder.
+pub fn layout(folder: &Path) -> Result<Layout, DataError> {
     if folder.join("sensor_data").is_dir() {
         Ok(Layout::Kaist)
     } else if folder.join("kvh.csv").is_file() || folder.join("ms25.csv").is_file() {
         Ok(Layout::Nclt)
     } else {
-        let path = folder.display().to_string();
-        Err(match fs::metadata(folder) {
-            Ok(_) => SequenceError::Unknown { path },
-            Err(source) => SequenceError::Io { path, source },
-        })
+        let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| DataFault::UnknownLayout);
+        Err(DataError::of(folder.display(), fault))
     }
 }
 
 /// The sequences of a folder: itself, or those right below it, by name.
 ///
 /// # Errors
-/// [`SequenceError`]: neither is one.
-pub fn find(folder: &Path) -> Result<Vec<PathBuf>, SequenceError> {
+/// [`DataError`]: neither is one.
+pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     if layout(folder).is_ok() {
         return Ok(vec![folder.to_owned()]);
     }
-    let path = || folder.display().to_string();
-    let entries = fs::read_dir(folder).map_err(|source| SequenceError::Io { path: path(), source })?;
+    let error = |fault| DataError::of(folder.display(), fault);
+    let entries = fs::read_dir(folder).map_err(|source| error(source.into()))?;
     let mut found: Vec<PathBuf> = entries
         .filter_map(|entry| entry.ok().map(|e| e.path()))
         .filter(|path| layout(path).is_ok())
         .collect();
     found.sort();
-    if found.is_empty() { Err(SequenceError::Unknown { path: path() }) } else { Ok(found) }
+    if found.is_empty() { Err(error(DataFault::UnknownLayout)) } else { Ok(found) }
 }
 
 /// Bytes that reading a sequence will read; 0 of what is not there.
@@ -138,11 +133,11 @@ pub fn size(folder: &Path) -> u64 {
 }
 
 impl Sequence {
-    /// Reads a folder. `watch` is told how many bytes have been read, now and then.
+    /// Reads a folder. `watch` is called now and then with the number of bytes read.
     ///
     /// # Errors
-    /// [`SequenceError`], which names the file and, where there is one, the line.
-    pub fn read(folder: &Path, mut watch: impl FnMut(u64)) -> Result<Self, SequenceError> {
+    /// [`DataError`], which names the file and, where there is one, the line.
+    pub fn read(folder: &Path, mut watch: impl FnMut(u64)) -> Result<Self, DataError> {
         let layout = layout(folder)?;
         let simulated = marker(folder)?;
         let progress = Rc::new(Cell::new(0));
@@ -168,8 +163,8 @@ impl Sequence {
         }
         let seconds = steps.len() as f64 * DT;
         if seconds < NEEDED {
-            let path = folder.display().to_string();
-            return Err(SequenceError::TooShort { path, seconds, needed: NEEDED });
+            let fault = DataFault::TooLittleInCommon { seconds, needed: NEEDED };
+            return Err(DataError::of(folder.display(), fault));
         }
         if let Some(Step { position: [x, y], .. }) = steps.first().copied() {
             for step in &mut steps {
@@ -217,8 +212,8 @@ impl Sequence {
     /// are left out, as a board would not get them. Wheels are rear right and rear left.
     ///
     /// # Errors
-    /// [`SequenceError::NoGyro`].
-    pub fn recording(&self) -> Result<Recording, SequenceError> {
+    /// [`DataFault::NoGyro`].
+    pub fn recording(&self) -> Result<Recording, DataError> {
         self.needs_gyro()?;
         let turns = self.turns();
         let steps = self.steps.iter().zip(&turns).enumerate().filter(|(_, (step, _))| !step.imu_gap);
@@ -240,17 +235,16 @@ impl Sequence {
         Ok(Recording { path: self.path.display().to_string(), rows: rows.collect(), missing: 0 })
     }
 
-    /// Whether there is a gyro.
+    /// Checks that the sequence has an inertial sensor.
     ///
     /// # Errors
-    /// [`SequenceError::NoGyro`].
-    pub fn needs_gyro(&self) -> Result<(), SequenceError> {
-        let path = || self.path.display().to_string();
-        self.has_gyro.then_some(()).ok_or_else(|| SequenceError::NoGyro { path: path() })
+    /// [`DataFault::NoGyro`].
+    pub fn needs_gyro(&self) -> Result<(), DataError> {
+        self.has_gyro.then_some(()).ok_or_else(|| DataError::of(self.path.display(), DataFault::NoGyro))
     }
 }
 
-/// All values at one time.
+/// The values of all files at one time.
 #[derive(Debug, Clone, Copy)]
 struct Values {
     imu: [f64; 7],
@@ -278,7 +272,7 @@ impl Values {
 
 impl Files {
     /// Time of the first row of the inertial sensor that all files have reached.
-    fn origin(&mut self) -> Result<f64, SequenceError> {
+    fn origin(&mut self) -> Result<f64, DataError> {
         let others = [self.fog.first(), self.wheels.first(), self.truth.first()];
         let begin = others.into_iter().fold(self.imu.first(), f64::max);
         self.imu.at(begin)?;
@@ -286,7 +280,7 @@ impl Files {
     }
 
     /// Values at a time and which of them lie in a gap; `None` where a file has ended.
-    fn at(&mut self, time: f64) -> Result<Option<(Values, [bool; 4])>, SequenceError> {
+    fn at(&mut self, time: f64) -> Result<Option<(Values, [bool; 4])>, DataError> {
         let Some(imu) = self.imu.at(time)? else { return Ok(None) };
         let Some(fog) = self.fog.at(time)? else { return Ok(None) };
         let Some(wheels) = self.wheels.at(time)? else { return Ok(None) };
@@ -297,15 +291,13 @@ impl Files {
     }
 }
 
-fn marker(folder: &Path) -> Result<Option<Spec>, SequenceError> {
+fn marker(folder: &Path) -> Result<Option<Spec>, DataError> {
     let path = folder.join(MARKER);
-    let name = path.display().to_string();
+    let error = |fault| DataError::of(path.display(), fault);
     match fs::read(&path) {
-        Ok(bytes) => serde_json::from_slice(&bytes)
-            .map(Some)
-            .map_err(|source| SequenceError::Marker { path: name, source }),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(SequenceError::Io { path: name, source }),
+        Ok(bytes) => serde_json::from_slice(&bytes).map(Some).map_err(|source| error(source.into())),
+        Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(error(source.into())),
     }
 }
 

@@ -1,11 +1,11 @@
-//! The paper's tables for the sequences at hand, beside what the paper prints.
+//! The paper's tables for given sequences, beside the paper's own figures.
 //!
-//! [`methods`] makes headings of a sequence, [`results`] compares them with the truth and takes
+//! [`estimates`] makes headings of a sequence, [`results`] compares them with the truth and takes
 //! means, [`table`] lays them out as the paper's tables, beside its figures ([`paper`]), [`text`]
 //! and [`html`] write them, [`pictures`] draws.
 
+pub mod estimates;
 pub mod html;
-pub mod methods;
 pub mod paper;
 pub mod pictures;
 pub mod results;

@@ -18,16 +18,14 @@
 
 use super::Quantisation;
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, DriveError, Step};
+use crate::drive::replay::{Replay, ReplayError, Step};
 use crate::drive::wheel_frames::WheelFrames;
+use crate::random::Random;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::{AngularRate, SpecificForce};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardUniform};
 
 /// Seeds of the network's answer.
 pub const STAND_INS: u64 = 2;
@@ -39,7 +37,7 @@ const NETWORK_MARGIN: f64 = 2.0;
 pub struct Difference {
     /// Largest difference of the accumulated yaw, rad.
     pub yaw_largest: f64,
-    /// At the end, rad.
+    /// The difference at the end, rad.
     pub yaw_final: f64,
     /// RMS of the rates' difference, rad/s.
     pub rate_rms: f64,
@@ -50,19 +48,19 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Of the rates that were sent at once.
+    /// Compares the rates that were sent at once.
     #[must_use]
-    pub fn of_rates(direct: &Drive, via: &Drive) -> Self {
+    pub fn of_rates(direct: &Replay, via: &Replay) -> Self {
         Self::of(direct, via, |step| step.vehicle.prompt.rate)
     }
 
-    /// Of the corrections in them.
-    fn of_corrections(direct: &Drive, via: &Drive) -> Self {
+    /// Compares the corrections in them.
+    fn of_corrections(direct: &Replay, via: &Replay) -> Self {
         Self::of(direct, via, |step| step.vehicle.prompt.correction)
     }
 
-    /// From the first step after both have been initialised.
-    fn of(direct: &Drive, via: &Drive, what: impl Fn(&Step) -> AngularRate) -> Self {
+    /// Compares from the first step after both have been initialised.
+    fn of(direct: &Replay, via: &Replay, what: impl Fn(&Step) -> AngularRate) -> Self {
         let (mut difference, mut sum, mut squares) = (Self::default(), 0.0, 0.0);
         let (mut a, mut b) = (direct.steps[direct.start..].iter(), via.steps[via.start..].iter());
         let (mut left, mut right) = (a.next(), b.next());
@@ -91,32 +89,32 @@ impl Difference {
     }
 }
 
-/// What the difference may be, term by term.
+/// The bound of the difference, term by term.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bound {
-    /// Of the yaw: rounding of each sample, rad.
+    /// The yaw from the rounding of each sample, rad.
     pub rounding: f64,
-    /// Of the yaw: the static bias, rad.
+    /// The yaw from the static bias, rad.
     pub bias: f64,
-    /// Of the yaw: the network's answer, rad.
+    /// The yaw from the network's answer, rad.
     pub network: f64,
-    /// Of the rates' rms, all together, rad/s.
+    /// The rms of the rates from all of them, rad/s.
     pub rate_rms: f64,
 }
 
 impl Bound {
-    /// From a part's steps; `direct` is the drive without the part. `tick` is called
-    /// [`STAND_INS`] times for each row, unless nothing is rounded.
+    /// Computes the bound from a part's steps; `direct` is the drive without the part. `tick` is called [`STAND_INS`]
+    /// times for each row, unless nothing is rounded.
     ///
     /// # Errors
-    /// [`DriveError`], when a stand-in does not initialise.
+    /// [`ReplayError`], when a stand-in does not initialise.
     pub fn new(
         quantisation: Quantisation,
         recording: &Recording,
-        direct: &Drive,
+        direct: &Replay,
         network: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
-    ) -> Result<Self, DriveError> {
+    ) -> Result<Self, ReplayError> {
         if quantisation == Quantisation::default() {
             return Ok(Self::default());
         }
@@ -127,7 +125,7 @@ impl Bound {
         for seed in 0..STAND_INS {
             let (config, wheels) = (PipelineConfig::DEFAULT, WheelFrames::new(recording));
             let stand_in = stand_in(recording, quantisation, seed);
-            let drive = Drive::run(&stand_in, &config, wheels, network, &mut tick)?;
+            let drive = Replay::run(&stand_in, &config, wheels, network, &mut tick)?;
             let one = Difference::of_corrections(direct, &drive);
             answer.yaw_largest = answer.yaw_largest.max(one.yaw_largest);
             answer.rate_rms = answer.rate_rms.max(one.rate_rms);
@@ -140,13 +138,13 @@ impl Bound {
         })
     }
 
-    /// Of the accumulated yaw, anywhere in the drive, rad.
+    /// Returns the bound of the accumulated yaw anywhere in the drive, rad.
     #[must_use]
     pub fn yaw(&self) -> f64 {
         self.rounding + self.bias + self.network
     }
 
-    /// Whether a difference keeps to it, every row having gone out in both replays.
+    /// Returns whether a difference is within the bound, with every row in both replays.
     #[must_use]
     pub fn holds(&self, difference: &Difference) -> bool {
         difference.unpaired == 0
@@ -157,11 +155,8 @@ impl Bound {
 
 /// The recording with even noise of a step's width on every channel.
 fn stand_in(recording: &Recording, quantisation: Quantisation, seed: u64) -> Recording {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut noise = |codes: f64| {
-        let unit: f64 = StandardUniform.sample(&mut rng);
-        libm::round((unit - 0.5) * codes) as i32
-    };
+    let mut random = Random::new(seed, 0);
+    let mut noise = |codes: f64| libm::round(random.between(-0.5, 0.5) * codes) as i32;
     let rate = quantisation.rate / AngularRate(1).rad_per_sec();
     let force = quantisation.force / SpecificForce(1).metre_per_sec2();
     let mut recording = recording.clone();

@@ -16,7 +16,7 @@ use gyronet::units::Micros;
 
 /// Messages a row.
 pub const MESSAGES: u64 = 10;
-/// From one to the next.
+/// Time from one message to the next, microseconds.
 pub const MESSAGE_US: u64 = PERIOD_US / MESSAGES;
 pub const BOTH: Fitted = Fitted { imu: true, fog: true };
 

@@ -7,7 +7,7 @@ use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 
 /// All six clipping bits of the status word.
-const CLIPPED: u32 = 0x3F << 8;
+pub const CLIPPED: u32 = 0x3F << 8;
 /// Self-test passed, filter valid.
 const GOOD: u32 = 3;
 /// Microseconds of a tick of SampleTimeFine.
@@ -36,8 +36,8 @@ pub fn messages(recording: &Recording) -> impl Iterator<Item = Vec<u8>> {
     rows.map(|(number, row)| message(number, &row.sample).emit().to_vec())
 }
 
-/// The message of a sample. Its codes came from f32 and go back to the same ones.
-fn message(number: usize, sample: &ImuSample) -> MtData2 {
+/// Returns the message of a sample. Its codes came from f32 and go back to the same ones.
+pub fn message(number: usize, sample: &ImuSample) -> MtData2 {
     MtData2 {
         packet_counter: Some(number as u16),
         sample_time_fine: Some((sample.time.0 / TICK_US) as u32),

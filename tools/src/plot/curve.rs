@@ -1,6 +1,6 @@
-//! Points of a curve: fewer of them, and how far they reach.
+//! The points of a curve: thinned, and their range.
 
-/// Every n-th point so that about `most` are left, and the last one.
+/// Returns every n-th point so that about `most` are left, and the last one.
 pub fn thinned(
     points: impl ExactSizeIterator<Item = (f64, f64)> + DoubleEndedIterator + Clone,
     most: usize,
@@ -10,7 +10,7 @@ pub fn thinned(
     points.step_by(step).chain(last)
 }
 
-/// From the least to the most, with a share of that as air on either side; 0 to 1 of no values.
+/// Returns the least and the greatest value with a share of their distance as air on either side; 0 to 1 for no values.
 pub fn range(values: impl Iterator<Item = f64>, air: f64) -> (f64, f64) {
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
     if low > high {

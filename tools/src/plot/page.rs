@@ -1,5 +1,4 @@
-//! One HTML page with everything in it: nothing is loaded from elsewhere, and all of it can be
-//! read without a script; the script adds zooming.
+//! One HTML page that loads nothing from elsewhere and can be read without a script; the script adds zooming.
 
 pub mod chart;
 

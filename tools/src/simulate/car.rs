@@ -1,4 +1,4 @@
-//! How the car moves: on a plane, with road grade and bank and a body on springs.
+//! The motion of the car: on a plane, with road grade and bank and a body on springs.
 //!
 //! Axes: x forward, y left, z up; heading, pitch and roll in that order. The part sits at the
 //! centre: no lever arm. Formulas: any text on vehicle dynamics, for example Rajamani, Vehicle
@@ -6,8 +6,9 @@
 
 use super::DT;
 use super::leg::Leg;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use super::route::{Route, Way};
+use crate::random::Random;
 use std::f64::consts::TAU;
 
 /// m/s^2.
@@ -26,7 +27,7 @@ pub struct Config {
     pub acceleration: f64,
     /// Braking, m/s^2: a calm driver.
     pub braking: f64,
-    /// How long a pedal takes to act, s.
+    /// The time that a pedal takes to act, s.
     pub pedal_lag: f64,
     /// Roll to the outside, rad per m/s^2: 4 deg/g, a common passenger car.
     pub roll_gradient: f64,
@@ -65,7 +66,7 @@ impl Config {
     };
 }
 
-/// What a perfect, level part at the car's centre would say.
+/// The readings of a perfect, level part at the car's centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// m/s^2.
@@ -80,9 +81,9 @@ pub struct Motion {
     pub acceleration: f64,
     /// Slope of the road along the way, downhill positive, rad.
     pub grade: f64,
-    /// Of the body, nose down positive, rad.
+    /// The pitch of the body, nose down positive, rad.
     pub pitch: f64,
-    /// Of the body, left side up positive, rad.
+    /// The roll of the body, left side up positive, rad.
     pub roll: f64,
 }
 
@@ -150,16 +151,16 @@ pub struct Car {
 }
 
 impl Car {
-    /// At rest at the start of the short course.
+    /// Starts at rest on the short course.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         Self::on(config, Way::Course(Route::new(seed)), seed)
     }
 
-    /// At rest at the start of a way.
+    /// Starts at rest on a way.
     #[must_use]
     pub fn on(config: &Config, mut way: Way, seed: u64) -> Self {
-        let mut road = Random::new(seed, Purpose::Road);
+        let mut road = Purpose::Road.stream(seed);
         let (first, second) = (way.next_leg(), way.next_leg());
         Self {
             config: *config,
@@ -174,7 +175,7 @@ impl Car {
             pitch: Spring::default(),
             bank: Slope::new(config.road_bank, config.bank_waves, &mut road),
             grade: Slope::new(config.road_grade, GRADE_WAVES, &mut road),
-            wheel_noise: Random::new(seed, Purpose::Wheels),
+            wheel_noise: Purpose::Wheels.stream(seed),
         }
     }
 

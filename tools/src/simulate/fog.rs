@@ -1,7 +1,8 @@
 //! A fibre-optic gyro: angle random walk, a bias that wanders, scale, misalignment.
 
 use super::mems::{axes, seen};
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
+use crate::random::Random;
 
 /// Sizes of its errors. Those marked sigma are drawn for each device or run, and axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,8 +35,8 @@ impl Fog {
     #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
         // Not the numbers that the other part of the same device seed gets.
-        let mut fixed = Random::new(device, Purpose::Fog);
-        let mut random = Random::new(run, Purpose::Fog);
+        let mut fixed = Purpose::Fog.stream(device);
+        let mut random = Purpose::Fog.stream(run);
         let matrix = axes(config.scale, config.misalignment, &mut fixed);
         let device_bias = fixed.normals();
         let run_bias = random.normals();
@@ -45,7 +46,7 @@ impl Fog {
         Self { config: *config, random, matrix, bias }
     }
 
-    /// What it says to have turned, rad, while it turned at this rate for so many seconds.
+    /// Returns the measured turn, rad, of a motion at this rate for so many seconds.
     pub fn increment(&mut self, rate: [f64; 3], seconds: f64) -> [f64; 3] {
         let seen = seen(&self.matrix, rate);
         let (noise, root) = (self.random.normals(), seconds.sqrt());

@@ -14,11 +14,12 @@ mod text;
 use super::fog::Fog;
 use super::mems::Mems;
 use super::odometer::Odometer;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use super::route::Way;
 use super::town::Town;
 use super::vehicles::{self, Vehicle};
 use super::world::{Truth, World};
+use crate::random::Random;
 use gyronet::sample::RATE_HZ;
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -27,7 +28,7 @@ use std::path::Path;
 /// File of a sequence's folder that says that it is simulated.
 pub const MARKER: &str = "simulated.json";
 
-/// Which data set's.
+/// The layout of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
@@ -48,7 +49,7 @@ impl Layout {
     }
 }
 
-/// What to simulate; written into [`MARKER`].
+/// The specification of a sequence; written into [`MARKER`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spec {
     /// Whose layout.
@@ -106,13 +107,13 @@ impl Drive {
     fn new(spec: &Spec) -> Self {
         let vehicle = spec.layout.vehicle();
         let way = Way::Town(Town::new(&vehicle.town, spec.run));
-        let heading = Random::new(spec.run, Purpose::Stamps).between(0.0, std::f64::consts::TAU);
+        let heading = Purpose::Stamps.stream(spec.run).between(0.0, std::f64::consts::TAU);
         Self {
             world: World::new(&vehicle.world, way, heading, spec.run),
             mems: Mems::of_device(&vehicle.mems, spec.device, spec.run),
             fog: Fog::of_device(&vehicle.fog, spec.device, spec.run),
             odometer: Odometer::new(&vehicle.wheels, spec.run),
-            magnetometer: Random::new(spec.run, Purpose::Magnetometer),
+            magnetometer: Purpose::Magnetometer.stream(spec.run),
             ticks: (spec.seconds * RATE_HZ) as usize,
         }
     }
@@ -124,7 +125,7 @@ impl Drive {
         self.mems.measure(self.mems.tilt(force), self.mems.tilt(rate))
     }
 
-    /// What a magnetometer says in a field of the world, with noise of that size.
+    /// Returns the reading of a magnetometer in a field of the world, with noise of that size.
     fn magnetic(&mut self, truth: &Truth, field: [f64; 3], noise: f64) -> [f64; 3] {
         let seen = truth.in_vehicle(field);
         let normals = self.magnetometer.normals();

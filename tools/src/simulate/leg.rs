@@ -1,18 +1,18 @@
-//! A piece of the way, and how it bends.
+//! A piece of the way, and its bends.
 
 /// A piece of the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Leg {
     /// Waiting.
     Stand {
-        /// For so long.
+        /// The duration.
         seconds: f64,
     },
     /// Driving.
     Road {
         /// Length.
         metres: f64,
-        /// As fast as this, m/s.
+        /// The speed, m/s.
         speed: f64,
         /// Change of heading on the way, left positive, rad.
         turn: f64,

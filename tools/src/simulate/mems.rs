@@ -5,9 +5,10 @@
 
 use super::DT;
 use super::car::turned_in;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
+use crate::random::Random;
 
-/// Sizes of a part's errors. Those marked sigma are drawn anew for each seed and axis.
+/// The sizes of a part's errors. Those marked sigma are drawn for each seed and axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// White noise, rad/s/sqrt(Hz): the Xsens MTi of the KAIST drives as OpenVINS has it
@@ -29,10 +30,10 @@ pub struct Config {
     /// Misalignment of each axis, sigma, rad: 0.05 deg, the class of a part calibrated at the
     /// factory.
     pub misalignment: f64,
-    /// What a gyro axis says of a force, sigma for each pair of axes, rad/s per m/s^2.
+    /// The sensitivity of a gyro axis to a force, sigma for each pair of axes, rad/s per m/s^2.
     pub gyro_per_force: f64,
-    /// How the part is mounted, pitch and roll, rad: the recordings' part leans to one side so
-    /// that y sees about -0.8 m/s^2 at rest.
+    /// The pitch and roll of the part's mounting, rad: the recordings' part leans to one side so that y shows about
+    /// -0.8 m/s^2 at rest.
     pub mount: [f64; 2],
 }
 
@@ -55,7 +56,7 @@ impl Config {
 /// Errors of three axes of one kind.
 #[derive(Debug, Clone, Copy)]
 struct Triad {
-    /// What the axes make of a vector.
+    /// The matrix from a vector to the readings of the axes.
     matrix: [[f64; 3]; 3],
     bias: [f64; 3],
     /// Standard deviations per sample.
@@ -110,7 +111,7 @@ impl Mems {
     /// Another part for each seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Mems);
+        let mut random = Purpose::Mems.stream(seed);
         let mut triad = |noise, walk, bias| {
             let matrix = axes(config.scale, config.misalignment, &mut random);
             Triad::new(matrix, noise, walk, bias, &mut random)
@@ -124,8 +125,8 @@ impl Mems {
     /// force are the device's, its bias at power-on and its noise the run's.
     #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
-        let mut fixed = Random::new(device, Purpose::Device);
-        let mut random = Random::new(run, Purpose::Mems);
+        let mut fixed = Purpose::Device.stream(device);
+        let mut random = Purpose::Mems.stream(run);
         let mut triad = |noise, walk, bias| {
             let matrix = axes(config.scale, config.misalignment, &mut fixed);
             Triad::new(matrix, noise, walk, bias, &mut random)

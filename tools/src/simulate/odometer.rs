@@ -5,10 +5,10 @@
 //! tyres (Rajamani, Vehicle Dynamics and Control, chapter 4).
 
 use super::car::GRAVITY;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use std::f64::consts::PI;
 
-/// What the calibration says, and by how much it is wrong.
+/// The calibration, and its errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Diameters as calibrated, left and right, m.
@@ -37,14 +37,13 @@ impl Odometer {
     /// Tyres of one run: pressure and load change from day to day.
     #[must_use]
     pub fn new(config: &Config, run: u64) -> Self {
-        let mut random = Random::new(run, Purpose::Odometer);
+        let mut random = Purpose::Odometer.stream(run);
         let common = config.common_error * random.normal();
         let diameter = config.diameter.map(|d| d * (1.0 + common + config.wheel_error * random.normal()));
         Self { config: *config, diameter, turns: [0.0; 2] }
     }
 
-    /// So many seconds at a speed along the road (m/s), an acceleration (m/s^2) and a heading
-    /// rate (rad/s).
+    /// Moves for so many seconds at a speed along the road (m/s), an acceleration (m/s^2) and a heading rate (rad/s).
     pub fn step(&mut self, speed: f64, acceleration: f64, heading_rate: f64, seconds: f64) {
         let slip = acceleration / (GRAVITY * self.config.slip_stiffness);
         let half = heading_rate * self.config.base / 2.0;

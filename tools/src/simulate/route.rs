@@ -1,13 +1,14 @@
-//! Where the driver wants to go: streets with bends, wide corners and stops, one after another.
+//! The route of the driver: streets with bends, wide corners and stops, one after another.
 //!
 //! The car turns by at most some 0.3 rad/s, as in the recordings; nobody parks.
 
 use super::leg::Leg;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
 use super::town::Town;
+use crate::random::Random;
 use std::f64::consts::FRAC_PI_2;
 
-/// Where the legs come from.
+/// The source of the legs.
 #[derive(Debug, Clone)]
 pub enum Way {
     /// The short course of [`Route`].
@@ -40,7 +41,7 @@ impl Route {
     /// Another one for each seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Route);
+        let mut random = Purpose::Route.stream(seed);
         let side = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
         Self { random, legs: 0, side }
     }

@@ -5,11 +5,12 @@
 //! acceleration give the speed.
 
 use super::leg::Leg;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
+use crate::random::Random;
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
-/// What the town and its traffic are like.
+/// The parameters of the town and its traffic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Speed limits, m/s, each with the share of the streets that have it.
@@ -20,7 +21,7 @@ pub struct Config {
     pub bends: f64,
     /// Share of the junctions at which one has to wait.
     pub stops: f64,
-    /// How long, s, from and to.
+    /// The duration of a wait, s, from and to.
     pub wait: [f64; 2],
     /// Share of the junctions at which one turns, to the left and to the right.
     pub turns: [f64; 2],
@@ -28,7 +29,7 @@ pub struct Config {
     pub corner: [[f64; 2]; 2],
     /// Comfortable lateral acceleration, m/s^2.
     pub lateral: f64,
-    /// How long it stands before it sets off, s, from and to.
+    /// The time at rest before it sets off, s, from and to.
     pub before: [f64; 2],
 }
 
@@ -44,7 +45,7 @@ impl Town {
     /// Another one for each seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Route);
+        let mut random = Purpose::Route.stream(seed);
         let [from, to] = config.before;
         let first = Leg::Stand { seconds: random.between(from, to) };
         Self { config: *config, random, legs: VecDeque::from([first]) }

@@ -1,4 +1,4 @@
-//! Vehicles and parts of the two data sets, with every number and where it is from.
+//! Vehicles and parts of the two data sets, with the source of every number.
 //!
 //! None of the numbers was chosen by a result. (M) marks what was written down from memory of a
 //! data sheet that was not at hand; (A) what nobody has published and was assumed.
@@ -43,10 +43,10 @@ const DEG: f64 = std::f64::consts::PI / 180.0;
 /// sqrt(1 h) in sqrt(s).
 const ROOT_HOUR: f64 = 60.0;
 
-/// How late messages are.
+/// The delays of messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delays {
-    /// On average, s.
+    /// The mean delay, s.
     pub mean: f64,
     /// Time between two blockages, s, and their length, s, both on average; none where infinite.
     pub blockage: [f64; 2],
@@ -57,9 +57,9 @@ pub struct Delays {
 /// A vehicle with its parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {
-    /// How it moves.
+    /// Its motion.
     pub world: world::Config,
-    /// Where it drives.
+    /// The town that it drives in.
     pub town: town::Config,
     /// Its inertial sensor.
     pub mems: mems::Config,

@@ -1,4 +1,4 @@
-//! How the part is shaken: the idling engine, and the road.
+//! The vibration of the part: the idling engine, and the road.
 //!
 //! Each source is a narrow band of noise (a damped oscillator driven by white noise) that moves
 //! all axes at once, each with its own size and phase. The angle is what shakes; the rate is
@@ -6,10 +6,11 @@
 //! car, and what it does to a yaw taken after one second is an angle of about rate / (2 pi f).
 
 use super::DT;
-use super::random::{Purpose, Random};
+use super::purpose::Purpose;
+use crate::random::Random;
 use std::f64::consts::{PI, TAU};
 
-/// One source of shaking.
+/// A source of vibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
     /// Middle of its band, Hz.
@@ -22,14 +23,13 @@ pub struct Source {
     pub specific_force: [f64; 3],
 }
 
-/// All sources. The sizes are those of the recordings: standing 0.006 to 0.009 rad/s and 0.1
-/// to 0.45 m/s^2, moving about 0.02 rad/s and 0.5 m/s^2; the bands are those that stand out in
-/// their spectra.
+/// All sources of vibration. The sizes are those of the recordings: standing 0.006 to 0.009 rad/s and 0.1 to 0.45
+/// m/s^2, moving about 0.02 rad/s and 0.5 m/s^2; the bands are those that stand out in their spectra.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// The engine, at the same strength whether the car stands or not.
     pub engine: Source,
-    /// What comes from the road at [`Config::road_speed`]; in proportion at other speeds.
+    /// The vibration from the road at [`Config::road_speed`], in proportion at other speeds.
     pub road: [Source; 3],
     /// m/s.
     pub road_speed: f64,
@@ -131,7 +131,7 @@ impl Shaker {
     }
 }
 
-/// Everything that shakes.
+/// The vibration of the vehicle.
 #[derive(Debug, Clone)]
 pub struct Vibration {
     random: Random,
@@ -141,10 +141,10 @@ pub struct Vibration {
 }
 
 impl Vibration {
-    /// With the engine running.
+    /// Starts with the engine running.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut random = Random::new(seed, Purpose::Vibration);
+        let mut random = Purpose::Vibration.stream(seed);
         let engine = Shaker::new(config.engine, &mut random);
         let road = config.road.map(|source| Shaker::new(source, &mut random));
         let mut vibration = Self { random, engine, road, road_speed: config.road_speed };

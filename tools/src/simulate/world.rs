@@ -1,4 +1,4 @@
-//! The truth: where the vehicle is and which way it points, and what perfect parts would say.
+//! The truth: position and heading of the vehicle, and the readings of perfect parts.
 //!
 //! World: x east, y north, z up. Heading is counted from east to the left, pitch is nose down,
 //! roll is left side up, in that order. Rates are constant over each 10 ms, so the truth at the
@@ -16,12 +16,12 @@ use super::vibration::{self, Shake, Vibration};
 /// The Earth's rate of rotation, rad/s (WGS 84).
 pub const EARTH_RATE: f64 = 7.292_115e-5;
 
-/// Where it drives.
+/// The place of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// The vehicle.
     pub car: car::Config,
-    /// How it shakes.
+    /// The vibration.
     pub vibration: vibration::Config,
     /// Normalised cornering stiffness of the rear axle: lateral acceleration over g for 1 rad.
     pub cornering_stiffness: f64,
@@ -29,7 +29,7 @@ pub struct Config {
     pub latitude_deg: f64,
 }
 
-/// One moment.
+/// The truth at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
     /// Since the start, s.
@@ -38,7 +38,7 @@ pub struct Truth {
     pub position: [f64; 3],
     /// Heading, not wrapped, rad.
     pub yaw: f64,
-    /// How the vehicle moves.
+    /// The motion of the vehicle.
     pub motion: Motion,
     /// Angular rate against the stars, vehicle axes, rad/s, without shaking.
     pub inertial_rate: [f64; 3],
@@ -73,7 +73,7 @@ pub struct World {
 }
 
 impl World {
-    /// At rest, pointing somewhere.
+    /// Starts at rest with a heading.
     #[must_use]
     pub fn new(config: &Config, way: Way, yaw: f64, run: u64) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Runs the bench image in the emulator and turns what it prints into counts.
+//! The bench image in the emulator, and the counts in its output.
 //!
 //! With a C compiler at hand, QEMU's plugin `tools/bench/m4count.c` counts instructions exactly
 //! and models Cortex-M4 cycles. Without one, instructions come from the image's own SysTick
@@ -25,7 +25,7 @@ pub const MACHINE: &str = "netduinoplus2";
 /// The image's target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Why the bench could not be run.
+/// The error of a bench that cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// A program could not be started.
@@ -33,7 +33,7 @@ pub enum BenchError {
     Start {
         /// The program.
         program: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A program ended with an error.
@@ -55,25 +55,25 @@ pub enum BenchError {
     Line(String),
 }
 
-/// What was counted for one region of the image.
+/// The counts of one region of the image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Count {
-    /// As the image names it.
+    /// The image's name for it.
     pub name: String,
     /// Executed instructions.
     pub instructions: u64,
     /// Modelled Cortex-M4 cycles at zero wait states, with the plugin.
     pub cycles: Option<u64>,
-    /// The same on an STM32F405 at 168 MHz: flash with 5 wait states, empty caches at the start.
+    /// Modelled cycles on an STM32F405 at 168 MHz: flash with 5 wait states, empty caches at the start.
     pub cycles_5ws: Option<u64>,
     /// Bytes of stack below the caller.
     pub stack: u64,
 }
 
-/// All counts of one run, and the sizes that the image reports of itself.
+/// All counts of one run, and the sizes that the image prints.
 #[derive(Debug, Clone, Default)]
 pub struct Counts {
-    /// In the order in which they ran.
+    /// The regions in the order in which they ran.
     pub regions: Vec<Count>,
     /// Name and bytes.
     pub sizes: Vec<(String, u64)>,
@@ -92,13 +92,13 @@ impl Counts {
         self.regions.iter().find(|count| count.name == name)
     }
 
-    /// Whether instructions were counted one by one; else they are good to six.
+    /// Returns whether instructions were counted one by one; otherwise they are good to six.
     #[must_use]
     pub fn exact(&self) -> bool {
         self.regions.iter().all(|count| count.cycles.is_some())
     }
 
-    /// All windows of a network, which must cost the same whatever they hold.
+    /// Returns whether all windows of a network cost the same, as they must whatever they hold.
     #[must_use]
     pub fn constant(&self) -> bool {
         let tolerance = if self.exact() { 0 } else { 12 };
@@ -109,7 +109,7 @@ impl Counts {
         })
     }
 
-    /// All regions whose name begins so.
+    /// Returns all regions whose name begins with `prefix`.
     pub fn starting_with(&self, prefix: &str) -> impl Iterator<Item = &Count> {
         self.regions.iter().filter(move |count| count.name.starts_with(prefix))
     }
@@ -121,8 +121,8 @@ pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Where cargo builds: the folder that this program lies in if cargo has built it there, so that
-/// `cargo fw` and what follows share one build; else that of the workspace.
+/// Returns the folder that cargo builds in: the one that this program lies in if cargo has built it there, so that
+/// `cargo fw` and the commands share one build; otherwise that of the workspace.
 #[must_use]
 pub fn target_folder() -> PathBuf {
     let program = std::env::current_exe().ok();
@@ -132,7 +132,7 @@ pub fn target_folder() -> PathBuf {
     cargo.map_or_else(|| workspace().join("target"), Path::to_owned)
 }
 
-/// Whether rustc has a standard library for the target.
+/// Checks that rustc has a standard library for the target.
 ///
 /// # Errors
 /// What is missing, as a sentence.
@@ -190,8 +190,8 @@ pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
     }
 }
 
-/// What ST's manual leaves open of the flash accelerator, or what if it were wrong: a name, and the
-/// counter's options for it. The first one is the model's.
+/// The policies of the flash accelerator that ST's manual leaves open: a name, and the counter's options for it. The
+/// first one is the model's.
 pub const POLICIES: [(&str, &str); 4] = [
     ("least recently used", ""),
     ("first in, first out", ",policy=fifo"),

@@ -18,10 +18,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const PROGRAM: &str = "qemu-system-arm";
-/// How long QEMU may take to connect its lines, and the image to switch a receiver on.
+/// The time that QEMU has to connect its lines, and the image to switch a receiver on.
 const START: Duration = Duration::from_secs(20);
 const POLL: Duration = Duration::from_millis(5);
-/// How long a client is given to speak first.
+/// The time that a client has to speak first.
 const HELLO: Duration = Duration::from_secs(2);
 
 /// Control register 1 of USART 1 to 6 (RM0090, table 1 and 30.6.4), and its bits UE and RE.
@@ -32,30 +32,30 @@ const RECEIVER_ENABLED: u32 = 1 << 13 | 1 << 2;
 const SR_BEFORE_CR1: u32 = 0x0C;
 const ALL_BUT_TXE: u32 = !(1 << 7);
 
-/// The emulator does not do what it should.
+/// The error of an emulator or its image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EmulatorError {
-    /// It is not there, or cannot be started.
+    /// QEMU is missing or cannot be started.
     #[error("{PROGRAM} cannot be run: {0}")]
     Start(io::Error),
-    /// No socket for one of its lines.
+    /// A socket of one of its lines failed.
     #[error("a socket on the loopback: {0}")]
     Socket(#[from] io::Error),
-    /// It failed, or the image did.
+    /// QEMU or the image failed.
     #[error("{PROGRAM}: {what}\nits standard error:\n{errors}")]
     Failed {
-        /// What was awaited.
+        /// The event that did not come.
         what: String,
-        /// What QEMU, and the image through semihosting, said.
+        /// The output of QEMU, and of the image through semihosting.
         errors: String,
     },
 }
 
-/// What comes of the emulator.
+/// The result of a call of the emulator.
 pub type Result<T> = std::result::Result<T, EmulatorError>;
 
-/// Whether QEMU is there.
+/// Checks that QEMU can be run.
 ///
 /// # Errors
 /// [`EmulatorError::Start`].
@@ -64,7 +64,7 @@ pub fn available() -> Result<()> {
     version.map(drop).map_err(EmulatorError::Start)
 }
 
-/// Whole lines without their ends.
+/// Returns whole lines without their ends.
 fn split(bytes: &[u8], end: u8) -> Vec<Vec<u8>> {
     let mut lines: Vec<Vec<u8>> = bytes.split(|byte| *byte == end).map(<[u8]>::to_vec).collect();
     lines.pop();
@@ -145,8 +145,8 @@ impl Board {
         }
     }
 
-    /// Everything that USART `n` has sent since the start, once it holds `count` lines (ends of
-    /// line `end`). Each line without its end; an unfinished one is left out.
+    /// Returns everything that USART `n` has sent since the start once it holds `count` lines (ends of line `end`).
+    /// Each line is without its end, and an unfinished one is left out.
     ///
     /// # Errors
     /// When they do not come within `limit`; the message says how many did.
@@ -162,7 +162,7 @@ impl Board {
         Ok(split(&bytes, end))
     }
 
-    /// The same, once they are what is awaited.
+    /// Returns the lines of USART `n` once they are enough.
     ///
     /// # Errors
     /// When they are not within `limit`.
@@ -180,8 +180,7 @@ impl Board {
         Ok(split(&bytes, end))
     }
 
-    /// USART `n` takes no more bytes from the image (its transmit register stays full), or does
-    /// again.
+    /// Makes USART `n` accept no more bytes from the image (its transmit register stays full), or accept them again.
     ///
     /// # Errors
     /// When QEMU does not answer.
@@ -190,9 +189,9 @@ impl Board {
         self.ask(&format!("writel {:#x} {value:#x}", CR1[n - 1] - SR_BEFORE_CR1)).map(drop)
     }
 
-    /// An address at which one TCP client can talk to USART `n`, and reads everything that it
-    /// has sent since the start. It comes once the client has said something, or said nothing for
-    /// a while: pyserial throws away what is there when it opens a line.
+    /// Returns an address at which one TCP client can talk to USART `n` and reads everything that it has sent since
+    /// the start. The bytes come once the client has sent something, or nothing for a while: pyserial discards what is
+    /// there when it opens a line.
     ///
     /// # Errors
     /// When the system gives no port.
@@ -215,7 +214,7 @@ impl Board {
         Ok(address)
     }
 
-    /// A word of the board's memory or registers.
+    /// Returns a word of the board's memory or registers.
     ///
     /// # Errors
     /// When QEMU does not answer.
@@ -225,7 +224,7 @@ impl Board {
         word.ok_or_else(|| self.process.failed(format!("the test port answers {answer:?}")))
     }
 
-    /// What QEMU's test port answers to a command, behind its "OK".
+    /// Returns the answer of QEMU's test port to a command, behind its "OK".
     fn ask(&mut self, command: &str) -> Result<String> {
         let Line { stream, received } = &mut self.registers;
         let asked = received.wait(Duration::ZERO, |_| true).0.len();
@@ -254,7 +253,7 @@ impl Board {
         }
     }
 
-    /// Ends QEMU in order, so that its plugins have their last word; what it, and the image through
+    /// Ends QEMU in order, so that its plugins can print, and returns everything that it, and the image through
     /// semihosting, have written to standard error.
     ///
     /// # Errors
@@ -263,13 +262,13 @@ impl Board {
         self.process.quit()
     }
 
-    /// An error of somebody who drives the board.
+    /// Returns an error of the caller, with QEMU's output.
     #[must_use]
     pub fn failed(&self, what: impl std::fmt::Display) -> EmulatorError {
         self.process.failed(what)
     }
 
-    /// What QEMU, and the image through semihosting, have written to standard error.
+    /// Returns the output of QEMU, and of the image through semihosting, on standard error.
     #[must_use]
     pub fn errors(&self) -> String {
         self.process.errors()

@@ -1,4 +1,4 @@
-//! What the parsers take of the processor, from the counts of the bench image.
+//! The parsers' share of the processor, from the counts of the bench image.
 
 use crate::target::bench::Counts;
 
@@ -20,22 +20,22 @@ pub const FRAMES: [(&str, u32); 8] = [
 /// The cost of one kind of frame.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ParserLoad {
-    /// As the image names it.
+    /// The image's name for it.
     pub name: String,
-    /// Of a frame.
+    /// Bytes of a frame.
     pub bytes: u64,
     /// Frames a second.
     pub hertz: u32,
-    /// For a frame.
+    /// Instructions of a frame.
     pub instructions: u64,
     /// Modelled cycles for a frame at zero wait states, where they were counted.
     pub cycles: Option<u64>,
-    /// The same with flash at 5 wait states.
+    /// Modelled cycles with flash at 5 wait states.
     pub cycles_5ws: Option<u64>,
 }
 
 impl ParserLoad {
-    /// All kinds that the image has measured.
+    /// Returns all kinds that the image has measured.
     #[must_use]
     pub fn all(counts: &Counts) -> Vec<Self> {
         let load = |(name, hertz): (&str, u32)| {

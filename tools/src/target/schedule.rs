@@ -1,5 +1,5 @@
-//! Whether every task of the image meets its deadline, from what each costs and how often it can
-//! come: response times for fixed priorities (Joseph and Pandya 1986; Audsley and others 1993).
+//! The response time of every task of the image, from its cost and how often it can come, for fixed priorities (Joseph
+//! and Pandya 1986; Audsley and others 1993).
 //!
 //! It is judged by the cycles with wait states, each activation with empty caches at its start. What it
 //! costs the task that it preempts is added to it: as many lines to read again as it has put into the
@@ -20,20 +20,20 @@ const LINES: u64 = 64 + 8;
 const VECTOR: u64 = 3 * LINE_READ;
 /// Part of a deadline that must be to spare.
 const SPARE: f64 = 0.25;
-/// What idle shares, it shares with the output task: only tasks up to its priority wait for it.
+/// The highest priority that idle blocks while it shares data with the output task.
 const SHARED: u8 = 2;
 /// Cycles of a copy of a frame and what is around it, outside of the code of `can_frames` itself.
 const COPY: u64 = 150;
 /// Ten bits at 115200 and at 921600 bit/s, us.
 const BYTE_115200: f64 = 10e6 / 115_200.0;
 const BYTE_921600: f64 = 10e6 / 921_600.0;
-/// How late the frames of a sample can be, us: the output task waits for a tick and takes no more than
-/// 3 ms, or nothing here counts as met.
+/// The largest delay of a sample's frames, us: the output task waits for a tick and takes no more than 3 ms, or no
+/// deadline counts as met.
 const FRAMES_LATE: f64 = 4e3;
 /// The shortest frame at 500 kbit/s: 47 bits.
 const FRAME: f64 = 47.0 / 0.5;
 
-/// How the cost of a task is found.
+/// The rule for the cost of a task.
 enum Cost {
     /// The worst activation of all.
     Worst,
@@ -54,9 +54,9 @@ const TICKS: u64 = 10;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Burst {
     count: f64,
-    /// From one to the next, us.
+    /// Time from one burst to the next, us.
     span: f64,
-    /// By how much one can come too late, us.
+    /// The largest delay of one activation, us.
     jitter: f64,
 }
 
@@ -66,16 +66,16 @@ impl Burst {
     }
 }
 
-/// What is asked of a task.
+/// The demand on a task.
 struct Demand {
     name: &'static str,
     handler: &'static str,
     cost: Cost,
-    /// Shortest time between two, us.
+    /// The shortest time between two activations, us.
     period: f64,
-    /// And no more than these.
+    /// The limit of activations in bursts.
     burst: Option<Burst>,
-    /// From when it is due to when it must be done, us.
+    /// Time from when it is due to when it must be done, us.
     deadline: f64,
     why: &'static str,
 }
@@ -84,8 +84,8 @@ const MAILBOXES: &str = "three mailboxes are empty";
 /// Handlers that end a run: the supply falls, and the board restarts.
 const LAST: [&str; 1] = ["PVD"];
 
-/// All tasks of `coprocessor`, with everything configured and connected; an image without one of them does
-/// not have its row.
+/// All tasks of `coprocessor` with everything configured and connected; an image without one of them does not have its
+/// row.
 const DEMANDS: [Demand; 9] = [
     byte("imu_line", "USART1", BYTE_115200),
     // Messages of up to 47 bytes, 1000 a second.
@@ -131,12 +131,12 @@ const fn byte(name: &'static str, handler: &'static str, period: f64) -> Demand 
     demand(name, handler, Cost::Bytes(1), period, period, "the next byte")
 }
 
-/// The same, and something is sent.
+/// Returns the demand of a line at full speed on which something is sent.
 const fn both_ways(name: &'static str, handler: &'static str, period: f64) -> Demand {
     Demand { cost: Cost::Bytes(3), ..byte(name, handler, period) }
 }
 
-/// One activation as the schedule takes it: entry, exit, and what it costs the preempted task.
+/// Returns the cycles of one activation with entry, exit, and its cost to the preempted task.
 fn whole(cycles: Cycles, fills: u64) -> Cycles {
     let five = cycles.five + EXCEPTION + VECTOR + fills.min(LINES) * LINE_READ;
     Cycles { zero: cycles.zero + EXCEPTION, five }
@@ -187,32 +187,32 @@ impl Cost {
     }
 }
 
-/// One task with its answer.
+/// A task and its response times.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Task {
-    /// As the image names it.
+    /// The image's name for it.
     pub name: &'static str,
     /// The larger the more urgent.
     pub priority: u8,
     /// Shortest time between two activations, us.
     pub period_us: f64,
-    /// And no more than these.
+    /// The limit of activations in bursts.
     #[serde(skip)]
     burst: Option<Burst>,
-    /// Of each activation of a burst, where the worst one does the work of several.
+    /// The cycles of each activation of a burst, where the worst one does the work of several.
     #[serde(skip)]
     each: Cycles,
     /// Longest that an answer may take, us.
     pub deadline_us: f64,
-    /// What the deadline is.
+    /// The reason for the deadline.
     pub why: &'static str,
     /// Activations that were counted; 0: none ran, and the cost is a bound from its code.
     pub runs: u64,
-    /// Of the longest activation.
+    /// Instructions of the longest activation.
     pub instructions: u64,
-    /// In a period at worst, modelled at zero wait states, with entry and exit.
+    /// Cycles in a period at worst, modelled at zero wait states, with entry and exit.
     pub cycles: u64,
-    /// The same with wait states, and with what it costs the task that it preempts.
+    /// The same cycles with wait states, and with the cost to the preempted task.
     pub cycles_5ws: u64,
     /// Worst response at zero wait states, us; `None`: later than ten times its deadline.
     pub response_us: Option<f64>,
@@ -221,7 +221,7 @@ pub struct Task {
 }
 
 impl Task {
-    /// Whether it is always done in time, with a quarter of it to spare.
+    /// Returns whether it is always done in time, with a quarter of the deadline to spare.
     #[must_use]
     pub fn met(&self) -> bool {
         self.response_5ws_us.is_some_and(|response| response <= (1.0 - SPARE) * self.deadline_us)
@@ -247,9 +247,10 @@ impl Task {
 pub struct Schedule(pub Vec<Task>);
 
 impl Schedule {
-    /// From what was counted. `None`: the image has a task that is not in the table.
+    /// Makes the table of what was counted; `fognet` are the instructions and cycles of one of FoGNet's windows, which
+    /// idle runs piece by piece. `None`: the image has a task that is not in the table.
     #[must_use]
-    pub fn new(tasks: &Tasks) -> Option<Self> {
+    pub fn new(tasks: &Tasks, fognet: Option<(u64, Cycles)>) -> Option<Self> {
         let Tasks { handlers, all_off, some_off } = tasks;
         let known = |handler: &Handler| {
             LAST.contains(&&*handler.name) || DEMANDS.iter().any(|demand| demand.handler == handler.name)
@@ -277,7 +278,7 @@ impl Schedule {
                 response_5ws_us: None,
             })
         };
-        let mut tasks: Vec<Task> = DEMANDS.iter().filter_map(task).collect();
+        let mut tasks: Vec<Task> = DEMANDS.iter().filter_map(task).chain(fognet.map(in_idle)).collect();
         for k in 0..tasks.len() {
             let blocked = if tasks[k].priority > SHARED { *all_off } else { all_off.max(*some_off) };
             tasks[k].response_us = response(&tasks, k, blocked.zero, |task| [task.cycles, task.each.zero]);
@@ -287,7 +288,7 @@ impl Schedule {
         Some(Self(tasks))
     }
 
-    /// Whether every task is always done in time, and frames are no later than is counted on.
+    /// Returns whether every task is always done in time, and frames are not later than assumed.
     #[must_use]
     pub fn met(&self) -> bool {
         let output = self.0.iter().filter(|task| task.name == "output");
@@ -299,6 +300,26 @@ impl Schedule {
     #[must_use]
     pub fn share(&self) -> f64 {
         self.0.iter().map(Task::share).sum()
+    }
+}
+
+/// FoGNet's window, in the time that all tasks leave: one begins with each second, and its estimate is used with the
+/// next.
+fn in_idle((instructions, cycles): (u64, Cycles)) -> Task {
+    Task {
+        name: "fognet",
+        priority: 0,
+        period_us: 1e6,
+        burst: None,
+        each: cycles,
+        deadline_us: 1e6,
+        why: "used with the next second",
+        runs: 1,
+        instructions,
+        cycles: cycles.zero,
+        cycles_5ws: cycles.five,
+        response_us: None,
+        response_5ws_us: None,
     }
 }
 
@@ -433,7 +454,7 @@ mod tests {
 
     #[test]
     fn responses_by_hand() {
-        let schedule = Schedule::new(&tasks(168_000)).unwrap();
+        let schedule = Schedule::new(&tasks(168_000), None).unwrap();
         let task = |name: &str| schedule.0.iter().find(|task| task.name == name).unwrap();
         let close = |name: &str, us: [f64; 2]| {
             let Task { response_us, response_5ws_us, .. } = task(name);
@@ -462,7 +483,7 @@ mod tests {
     /// spare, after 16 ms it is not.
     #[test]
     fn a_deadline_met_without_spare_time_is_missed() {
-        let window = |us: u64| Schedule::new(&tasks(168 * us)).unwrap();
+        let window = |us: u64| Schedule::new(&tasks(168 * us), None).unwrap();
         let response = |schedule: &Schedule| schedule.0.last().unwrap().response_5ws_us.unwrap();
         let (spare, late) = (window(11_000), window(14_000));
         assert!(spare.met() && response(&spare) > 11_000.0, "{spare}");
@@ -471,13 +492,13 @@ mod tests {
 
     #[test]
     fn a_deadline_that_is_missed_is_reported() {
-        let schedule = Schedule::new(&tasks(168 * 21_000)).unwrap();
+        let schedule = Schedule::new(&tasks(168 * 21_000), None).unwrap();
         assert!(
             !schedule.met() && schedule.to_string().contains("used two samples later: MISSED"),
             "{schedule}"
         );
         let mut more = tasks(168_000);
         more.handlers[0].name = "SPI1".to_owned();
-        assert_eq!(Schedule::new(&more), None);
+        assert_eq!(Schedule::new(&more, None), None);
     }
 }

@@ -1,18 +1,17 @@
-//! How much flash and RAM a firmware image takes, read from its ELF file.
+//! Flash and RAM of a firmware image, read from its ELF file.
 
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
 
-/// Limits of an image with both networks and everything else, bytes: flash, static RAM, stack. The stack is deepest at the
-/// start, where the coprocessor is made before any interrupt is on.
-pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 24 << 10];
+/// Limits of an image with both networks and everything else, bytes: flash, static RAM, stack.
+pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 12 << 10];
 
 /// Sizes of one image, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ImageSize {
     /// Vectors, code, constants and the initial values of data.
     pub flash: u64,
-    /// Of that, the two assembly kernels.
+    /// The part of the flash that the two assembly kernels take.
     pub kernels: u64,
     /// Statics in SRAM, and the code that runs from there.
     pub static_ram: u64,
@@ -20,7 +19,7 @@ pub struct ImageSize {
     pub ccm: u64,
 }
 
-/// Why an image cannot be measured.
+/// The error of an image that cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum SizeError {
     /// The file cannot be read.
@@ -28,15 +27,15 @@ pub enum SizeError {
     Io {
         /// The file.
         path: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Not an object file.
+    /// The file is no object file.
     #[error("{path}: {source}")]
     Format {
         /// The file.
         path: String,
-        /// What the reader said.
+        /// The reader's error.
         source: object::Error,
     },
 }

@@ -18,18 +18,17 @@ mod thumb;
 use code::Code;
 use std::collections::{BTreeMap, HashMap};
 
-/// What the processor pushes at an exception: registers, floating-point registers, alignment
-/// (ARMv7-M, B1.5.6).
+/// Bytes that the processor pushes at an exception: registers, floating-point registers, alignment (ARMv7-M, B1.5.6).
 const EXCEPTION_FRAME: u32 = 32 + 72 + 4;
-/// Where the image starts, and the handlers that end it.
+/// The function that the image starts with.
 const RESET: &str = "Reset";
-/// What RTIC runs with interrupts off; it switches them on as its last step.
+/// The function that RTIC runs with interrupts off; its last step switches them on.
 const MASKED: &str = "__rtic_init_resources";
 
-/// Why there is no bound.
+/// The error of an image whose stack has no bound.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StackError {
-    /// Not an ELF file of the kind.
+    /// The file is no firmware image.
     #[error("not a firmware image: {0}")]
     Format(String),
     /// A function calls itself, by way of others or not.
@@ -38,17 +37,17 @@ pub enum StackError {
     /// The stack pointer is moved by a register.
     #[error("{function} moves the stack pointer by a register at {address:#010x}")]
     Dynamic {
-        /// Which one.
+        /// The function.
         function: String,
-        /// Where.
+        /// The address of the instruction.
         address: u32,
     },
     /// A call to where no function is.
     #[error("{function} calls {target:#010x}, where no function begins")]
     Target {
-        /// Which one.
+        /// The function.
         function: String,
-        /// Where to.
+        /// The address that it calls.
         target: u32,
     },
 }
@@ -61,37 +60,37 @@ pub type Way = Vec<(String, u32)>;
 pub struct Handler {
     /// Higher is more urgent; of what has none there is but one.
     pub priority: Option<u8>,
-    /// What it needs, the processor's frame included.
+    /// Bytes that it needs, the processor's frame included.
     pub bytes: u32,
-    /// Its deepest way.
+    /// Its deepest call chain.
     pub deepest: Way,
 }
 
 /// The deepest stack of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageStack {
-    /// Of the main program, when handlers can come.
+    /// Bytes of the main program while handlers can come.
     pub main: u32,
-    /// Of the main program, before they can.
+    /// Bytes of the main program before handlers can come.
     pub start: u32,
-    /// Of interrupt and exception handlers, one inside the other, the most urgent one first.
+    /// The interrupt and exception handlers, one inside the other, the most urgent one first.
     pub handlers: Vec<Handler>,
     /// Calls through a register.
     pub indirect_calls: usize,
-    /// Of the main program, before handlers can come.
+    /// The deepest call chain before handlers can come.
     pub deepest: Way,
-    /// Of the main program, when they can.
+    /// The deepest call chain while handlers can come.
     pub deepest_main: Way,
 }
 
 impl ImageStack {
-    /// At worst.
+    /// Returns the worst stack, bytes.
     #[must_use]
     pub fn worst(&self) -> u32 {
         self.start.max(self.main + self.handlers())
     }
 
-    /// Of all handlers together.
+    /// Returns the bytes of all handlers together.
     #[must_use]
     pub fn handlers(&self) -> u32 {
         self.handlers.iter().map(|handler| handler.bytes).sum()

@@ -14,30 +14,30 @@ use symbols::Symbols;
 /// one is as many or more.
 pub const KINDS: usize = 5;
 
-/// Everything that was counted of an image.
+/// All counts of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tasks {
     /// Its handlers.
     pub handlers: Vec<Handler>,
-    /// For which all interrupts were off, at worst.
+    /// The longest time with all interrupts off.
     pub all_off: Cycles,
-    /// For which idle kept the output task out, at worst.
+    /// The longest time for which idle kept the output task out.
     pub some_off: Cycles,
 }
 
 /// Modelled cycles: the largest at zero wait states, and the largest on an STM32F405 at 168 MHz.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Cycles {
-    /// At zero wait states.
+    /// Cycles at zero wait states.
     pub zero: u64,
-    /// With flash at 5 wait states and empty caches at the start.
+    /// Cycles with flash at 5 wait states and empty caches at the start.
     pub five: u64,
 }
 
 /// The cheapest of some activations, preemption left out; zero: there was none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Least {
-    /// Of that one.
+    /// The cycles of the cheapest activation.
     pub cycles: Cycles,
     /// Lines that it has put into the caches.
     pub fills: u64,
@@ -79,14 +79,14 @@ impl std::fmt::Display for Cycles {
     }
 }
 
-/// One interrupt handler of the image.
+/// An interrupt handler of the image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Handler {
-    /// As the vector table names it.
+    /// The name in the vector table.
     pub name: String,
     /// The larger the more urgent.
     pub priority: u8,
-    /// Of each kind, the worst.
+    /// The worst activation of each kind.
     pub activations: [Option<Activation>; KINDS],
     /// The cheapest activation.
     pub least: Least,
@@ -99,11 +99,11 @@ pub struct Handler {
 /// The worst of the activations of a handler, preemption left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Activation {
-    /// How many there were.
+    /// The number of activations.
     pub runs: u64,
     /// Instructions of the longest one.
     pub instructions: u64,
-    /// Of the most expensive one.
+    /// The cycles of the most expensive one.
     pub cycles: Cycles,
     /// Lines that the one with most has put into the caches.
     pub fills: u64,

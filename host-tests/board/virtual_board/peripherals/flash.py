@@ -291,6 +291,9 @@ class Flash(Peripheral):
             self.time_factor = float(value)
         elif key == "seed":
             self.random = random.Random(value)
+        elif key == "error_flags":
+            # What an operation before this program has left in SR.
+            self.sr |= value & FLAGS & ~EOP
         elif key == "option_bytes":
             self.options = value & 0x0FFF_FFED
             self.loaded_bor = value >> 2 & 3

@@ -1,4 +1,4 @@
-//! A calibration as names and values that a person reads.
+//! A calibration as readable names and values.
 
 use super::settings::{shortest, value};
 use gyronet::store::Calibration;

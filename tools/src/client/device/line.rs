@@ -1,4 +1,4 @@
-//! The service line.
+//! The service line over a serial port or a TCP connection.
 
 use super::DeviceError;
 use crate::client::connection::Connection;
@@ -6,7 +6,7 @@ use std::io::{Read, Result, Write};
 use std::time::Duration;
 
 const BAUD: u32 = 115_200;
-/// How long a read waits for bytes.
+/// The longest time that a read waits for bytes.
 const WAIT: Duration = Duration::from_millis(50);
 
 /// An open one.

@@ -1,4 +1,4 @@
-//! The configuration as names and values that a person reads and writes.
+//! The configuration as readable names and values.
 //!
 //! Names are the fields', dots between the parts; rates are in rad/s, which the board holds as
 //! whole codes. The table of them is in `tools/README.md`.
@@ -10,10 +10,10 @@ use serde_json::Value;
 
 /// Rates that a record holds as codes: names inside `compensate`.
 const RATES: [&str; 3] = ["max_mean", "max_single", "max_carry"];
-/// Decimals that tell every two codes apart, rad/s.
+/// Decimals that distinguish every two codes, rad/s.
 const RATE_DECIMALS: usize = 9;
 
-/// Why names and values are no configuration.
+/// The error of names and values that are no configuration.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingError {
     /// Text that gives no value a name.
@@ -27,7 +27,7 @@ pub enum SettingError {
     Rate {
         /// Whose.
         name: &'static str,
-        /// What it is.
+        /// Its value.
         value: Value,
     },
     /// A part is missing, or is something else.
@@ -81,7 +81,7 @@ pub fn assign(configuration: &mut Value, setting: &str) -> Result<(), SettingErr
     Ok(())
 }
 
-/// By way of text: numbers then are as short as they are meant.
+/// Converts a value by way of text, so that numbers are as short as they are written.
 ///
 /// # Errors
 /// [`serde_json::Error`], where it is nothing that JSON knows.
@@ -89,7 +89,7 @@ pub fn value(of: &impl Serialize) -> serde_json::Result<Value> {
     serde_json::from_str(&serde_json::to_string(of)?)
 }
 
-/// Every value with its name.
+/// Returns every value with its name.
 #[must_use]
 pub fn flat(value: &Value) -> Vec<(String, String)> {
     let mut lines = Vec::new();
@@ -114,7 +114,7 @@ fn walk(name: &str, value: &Value, lines: &mut Vec<(String, String)>) {
     }
 }
 
-/// With as few decimals as lead back to the code.
+/// Returns a rate with as few decimals as lead back to its code.
 pub(super) fn shortest(rate: AngularRate) -> f64 {
     let exact = rate.rad_per_sec();
     let mut rounded = (1..=RATE_DECIMALS).filter_map(|decimals| format!("{exact:.decimals$}").parse().ok());

@@ -1,4 +1,4 @@
-//! A weight file into the board's unused slot.
+//! The upload of a weight file into the board's unused slot.
 
 use super::{Device, DeviceError};
 use gyronet::service::message::{BLOCK, Refusal};
@@ -9,9 +9,9 @@ use std::io::{Read, Write};
 /// A file that the board has accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Uploaded {
-    /// Where it lies.
+    /// The slot that holds it.
     pub slot: Slot,
-    /// Its checksum, by the board.
+    /// The checksum that the board computed.
     pub crc: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Frames out of text: SLCAN lines (with time stamps or without) and `candump -L` logs.
+//! CAN frames in text: SLCAN lines, with time stamps or without, and `candump -L` logs.
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::{DataFrame, slcan};
@@ -55,8 +55,8 @@ pub struct Splitter {
 }
 
 impl Splitter {
-    /// Takes a byte; gives the line that it ends, unless there is nothing in it.
-    pub fn push(&mut self, byte: u8) -> Option<String> {
+    /// Takes a byte and returns the line that it ends, unless the line is empty.
+    pub fn feed(&mut self, byte: u8) -> Option<String> {
         if !matches!(byte, b'\r' | b'\n' | 7) {
             self.too_long |= self.line.len() == MAX_LINE;
             if !self.too_long {

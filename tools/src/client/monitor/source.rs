@@ -1,4 +1,4 @@
-//! Where frames come from: a serial port, a TCP socket, or a log.
+//! The source of frames: a serial port, a TCP socket, or a log.
 //!
 //! No read lasts longer than [`WAIT`], so that whoever waits can look at the clock, redraw, or
 //! end.
@@ -15,32 +15,32 @@ use std::time::Duration;
 /// Longest wait for bytes.
 pub const WAIT: Duration = Duration::from_millis(100);
 
-/// Why there is no source, or no longer one.
+/// The error of a source that cannot be opened or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// No line, nor a file.
+    /// The line cannot be opened.
     #[error(transparent)]
     Connect(#[from] ConnectError),
     /// A file that cannot be opened.
     #[error("{name}: {source}")]
     Open {
-        /// As asked for.
+        /// The name as given.
         name: String,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// It broke while it was read.
+    /// The source broke while it was read.
     #[error("{name}: {source}")]
     Read {
-        /// As asked for.
+        /// The name as given.
         name: String,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-/// What a read led to.
+/// The result of a read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Lines {
     /// These came; none, when nothing did for [`WAIT`].
@@ -88,13 +88,13 @@ impl Source {
         Ok(source)
     }
 
-    /// Whether it is a log, whose time stamps are the only clock.
+    /// Returns whether it is a log, whose time stamps are the only clock.
     #[must_use]
     pub fn is_log(&self) -> bool {
         matches!(self.kind, Kind::Log(_))
     }
 
-    /// What came, after [`WAIT`] at the latest.
+    /// Returns the lines that came, after [`WAIT`] at the latest.
     ///
     /// # Errors
     /// [`SourceError::Read`].
@@ -106,13 +106,13 @@ impl Source {
             Err(error) if is_silence(&error) => 0,
             Err(error) => return Err(self.broken(error)),
         };
-        let lines = bytes.iter().take(count).filter_map(|byte| self.splitter.push(*byte));
+        let lines = bytes.iter().take(count).filter_map(|byte| self.splitter.feed(*byte));
         Ok(Lines::Some(lines.collect()))
     }
 
     /// A log may end without an end of line.
     fn last(&mut self) -> Lines {
-        self.splitter.push(b'\n').map_or(Lines::End, |line| Lines::Some(vec![line]))
+        self.splitter.feed(b'\n').map_or(Lines::End, |line| Lines::Some(vec![line]))
     }
 
     fn say(&mut self, text: &str) -> io::Result<()> {

@@ -1,4 +1,4 @@
-//! The newest values for people and for tables.
+//! The newest values as text, as a table row and as JSON.
 
 use super::{Counts, Monitor, State};
 use gyronet::can::yaw::Faults;
@@ -16,7 +16,7 @@ const FAULTS: [(Faults, &str); 8] = [
     (Faults::BUS, "bus"),
 ];
 
-/// What is wrong, by name; `none` where nothing is.
+/// Returns the names of the faults, or `none`.
 #[must_use]
 pub fn fault_names(faults: Faults) -> String {
     let present = FAULTS.iter().filter(|(fault, _)| faults.0 & fault.0 != 0).map(|(_, name)| *name);
@@ -29,7 +29,7 @@ fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".into(), |value| format!("{value:.decimals$}"))
 }
 
-/// By way of text: a product of a code and its scale prints all its binary digits else.
+/// Rounds by way of text: the product of a code and its scale would print all its binary digits.
 fn rounded(value: Option<f64>, decimals: usize) -> Option<f64> {
     value.and_then(|value| format!("{value:.decimals$}").parse().ok())
 }
@@ -127,7 +127,7 @@ fn row(
     writeln!(f, "{name:<16}{value:>14}{more}")
 }
 
-/// What a set of messages says of the rate.
+/// Writes the rate, the yaw, the source and the faults of a set.
 fn rows(f: &mut fmt::Formatter<'_>, state: &State) -> fmt::Result {
     let (source, quality) = judgement(state);
     row(f, "yaw rate", number(state.rate, 6), " deg/s")?;

@@ -1,4 +1,4 @@
-//! A set of yaw messages, rate, angle and detail: checked, and read.
+//! A set of yaw messages (rate, angle, detail), checked and decoded.
 
 use super::MAX_DELTA;
 use embedded_can::{Id, StandardId};
@@ -11,21 +11,21 @@ use gyronet::can::yaw::{SIGMA_UNKNOWN, Source};
 pub struct State {
     /// Corrected rate, deg/s, where available.
     pub rate: Option<f64>,
-    /// Where it comes from, and what it is worth.
+    /// The source of the rate, and its quality.
     pub judgement: Option<(Source, Quality)>,
     /// Yaw turned since the first angle message, deg, not wrapped.
     pub yaw: Option<f64>,
-    /// What is wrong at present.
+    /// The present faults.
     pub faults: Faults,
-    /// What was taken off, deg/s.
+    /// The correction that was subtracted, deg/s.
     pub correction: Option<f64>,
     /// Expected error, 1 sigma, deg/s.
     pub sigma: Option<f64>,
-    /// From the sample to the message, ms.
+    /// Time from the sample to the message, ms.
     pub latency: Option<f64>,
 }
 
-/// Which message of a set it was.
+/// The message of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Rate,

@@ -1,4 +1,4 @@
-//! Calibrating the sensor of a board that stands still.
+//! The calibration of a board that stands still.
 
 use super::{Board, mismatch, print_value};
 use clap::ValueEnum;
@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum What {
-    /// The gyro's bias, at rest.
+    /// Measure the gyro's bias at rest.
     Static,
-    /// Roll and pitch of the sensor, at rest on level ground.
+    /// Measure roll and pitch of the sensor at rest on level ground.
     Mounting,
-    /// What is known.
+    /// Print the calibration.
     Show,
     /// Stop without a result.
     Cancel,

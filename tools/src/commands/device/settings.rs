@@ -1,4 +1,4 @@
-//! Reading and changing the board's configuration.
+//! The configuration of a board, read and changed.
 
 use super::{Board, done, mismatch};
 use gyronet::service::{Reply, Request};

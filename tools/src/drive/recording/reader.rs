@@ -1,6 +1,7 @@
-//! A recording row by row, holding one row at a time.
+//! The rows of a recording, one in memory at a time.
 
-use super::{RecordingError, Row, ValueError, WHEELS};
+use super::{Row, WHEELS};
+use crate::drive::error::{DataError, DataFault, ValueError};
 use csv::StringRecord;
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
@@ -19,7 +20,7 @@ const MICROS_PER_TICK: u64 = 100;
 /// A named column and where it is.
 type Column = (&'static str, usize);
 
-/// Where the columns are.
+/// The places of the columns.
 #[derive(Debug, Clone)]
 struct Columns {
     time: Column,
@@ -30,15 +31,14 @@ struct Columns {
 }
 
 impl Columns {
-    fn find(path: &str, header: &StringRecord) -> Result<Self, RecordingError> {
+    fn find(path: &str, header: &StringRecord) -> Result<Self, DataError> {
         let optional = |name: &'static str| {
             // Spreadsheets begin a file with a byte order mark.
             let at = header.iter().position(|field| field.trim_start_matches('\u{feff}') == name)?;
             Some((name, at))
         };
-        let needed = |column| {
-            optional(column).ok_or_else(|| RecordingError::MissingColumn { path: path.to_owned(), column })
-        };
+        let needed =
+            |column| optional(column).ok_or_else(|| DataError::of(path, DataFault::MissingColumn(column)));
         let three = |names: [&'static str; 3]| {
             let [x, y, z] = names.map(needed);
             Ok([x?, y?, z?])
@@ -67,19 +67,19 @@ impl<R: std::io::Read> Reader<R> {
     /// Reads the header; `path` is for messages.
     ///
     /// # Errors
-    /// [`RecordingError`]: no header, or not the columns that are needed.
-    pub fn new(path: &str, input: R) -> Result<Self, RecordingError> {
+    /// [`DataError`]: no header, or not the columns that are needed.
+    pub fn new(path: &str, input: R) -> Result<Self, DataError> {
         let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
         let header = csv.headers().map_err(|error| csv_error(path, error))?;
         if header.is_empty() {
-            return Err(RecordingError::Empty { path: path.to_owned() });
+            return Err(DataError::of(path, DataFault::Empty));
         }
         let columns = Columns::find(path, header)?;
         let fields = header.len();
         Ok(Self { path: path.to_owned(), columns, records: csv.into_records(), fields, last: None })
     }
 
-    fn row(&mut self, record: &StringRecord) -> Result<Row, RecordingError> {
+    fn row(&mut self, record: &StringRecord) -> Result<Row, DataError> {
         let line = record.position().map_or(0, csv::Position::line);
         let Columns { time, force, rate, reference, wheels } = self.columns.clone();
         let fields = Fields { path: &self.path, line, record };
@@ -88,7 +88,7 @@ impl<R: std::io::Read> Reader<R> {
             && time <= last
         {
             let [last_s, at_s] = [last, time].map(|time| time.0 as f64 * 1e-6);
-            return Err(RecordingError::Time { path: self.path.clone(), line, last_s, at_s });
+            return Err(DataError::at(&self.path, line, DataFault::Time { last_s, at_s }));
         }
         let force = force.map(|column| fields.quantity(column, SpecificForce::from_metre_per_sec2));
         let rate = rate.map(|column| fields.quantity(column, AngularRate::from_rad_per_sec));
@@ -110,18 +110,17 @@ impl<R: std::io::Read> Reader<R> {
 }
 
 impl<R: std::io::Read> Iterator for Reader<R> {
-    type Item = Result<Row, RecordingError>;
+    type Item = Result<Row, DataError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         Some(match self.records.next()? {
             Ok(record) => self.row(&record),
             Err(error) => Err(match *error.kind() {
-                csv::ErrorKind::UnequalLengths { ref pos, len, .. } => RecordingError::Fields {
-                    path: self.path.clone(),
-                    line: pos.as_ref().map_or(0, csv::Position::line),
-                    found: len as usize,
-                    expected: self.fields,
-                },
+                csv::ErrorKind::UnequalLengths { ref pos, len, .. } => {
+                    let line = pos.as_ref().map_or(0, csv::Position::line);
+                    let (found, expected) = (len as usize, self.fields);
+                    DataError::at(&self.path, line, DataFault::Fields { found, expected })
+                }
                 _ => csv_error(&self.path, error),
             }),
         })
@@ -136,20 +135,19 @@ struct Fields<'a> {
 }
 
 impl Fields<'_> {
-    fn error(&self, (column, at): Column, error: ValueError) -> RecordingError {
-        let text = self.record.get(at).unwrap_or_default().to_owned();
-        RecordingError::Value { path: self.path.to_owned(), line: self.line, column, text, error }
+    fn error(&self, (column, at): Column, error: ValueError) -> DataError {
+        DataError::value(self.path, self.line, column, self.record.get(at).unwrap_or_default(), error)
     }
 
     /// The number, which may yet be NaN or infinite; `None` for an empty field.
-    fn number<T: FromStr>(&self, column: Column) -> Result<Option<T>, RecordingError> {
+    fn number<T: FromStr>(&self, column: Column) -> Result<Option<T>, DataError> {
         match self.record.get(column.1).unwrap_or_default() {
             "" => Ok(None),
             text => text.parse().map(Some).map_err(|_| self.error(column, ValueError::NotANumber)),
         }
     }
 
-    fn optional(&self, column: Column) -> Result<Option<f64>, RecordingError> {
+    fn optional(&self, column: Column) -> Result<Option<f64>, DataError> {
         match self.number::<f64>(column)? {
             Some(value) if !value.is_finite() => Err(self.error(column, ValueError::NotFinite)),
             value => Ok(value),
@@ -160,12 +158,12 @@ impl Fields<'_> {
         &self,
         column: Column,
         code: impl Fn(f32) -> Result<T, gyronet::units::RangeError>,
-    ) -> Result<T, RecordingError> {
+    ) -> Result<T, DataError> {
         let value = self.number(column)?.ok_or_else(|| self.error(column, ValueError::Empty))?;
         code(value).map_err(|error| self.error(column, error.into()))
     }
 
-    fn time(&self, column: Column) -> Result<Micros, RecordingError> {
+    fn time(&self, column: Column) -> Result<Micros, DataError> {
         let seconds = self.optional(column)?.ok_or_else(|| self.error(column, ValueError::Empty))?;
         let ticks = (seconds * TICKS_PER_SECOND).round();
         // Up to 2^53 a tick is exact.
@@ -176,14 +174,6 @@ impl Fields<'_> {
     }
 }
 
-fn csv_error(path: &str, error: csv::Error) -> RecordingError {
-    let path = path.to_owned();
-    if !error.is_io_error() {
-        return RecordingError::Csv { path, source: error };
-    }
-    match error.into_kind() {
-        csv::ErrorKind::Io(source) => RecordingError::Io { path, source },
-        // Said to be one a moment ago.
-        other => RecordingError::Io { path, source: std::io::Error::other(format!("{other:?}")) },
-    }
+fn csv_error(path: &str, error: csv::Error) -> DataError {
+    DataError::of(path, if error.is_io_error() { std::io::Error::from(error).into() } else { error.into() })
 }

@@ -19,7 +19,7 @@ fn unedited(rows: usize) -> String {
     standing(rows, |_, row| row)
 }
 
-fn parse(text: &str) -> Result<Recording, RecordingError> {
+fn parse(text: &str) -> Result<Recording, DataError> {
     Recording::parse("drives/a.csv", text.as_bytes())
 }
 
@@ -126,8 +126,8 @@ fn too_short_says_how_long() {
 
 #[test]
 fn nothing_at_all() {
-    assert!(matches!(parse(""), Err(RecordingError::Empty { .. })));
-    assert!(matches!(parse(&unedited(0)), Err(RecordingError::Empty { .. })));
+    assert!(matches!(parse(""), Err(DataError { fault: DataFault::Empty, .. })));
+    assert!(matches!(parse(&unedited(0)), Err(DataError { fault: DataFault::Empty, .. })));
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn a_turning_wheel_is_named() {
 fn an_unreadable_file_is_named() {
     let error = Recording::read(Path::new("no/such/drive.csv")).unwrap_err();
     assert!(error.to_string().starts_with("no/such/drive.csv: "), "{error}");
-    assert!(matches!(error, RecordingError::Io { .. }));
+    assert!(matches!(error.fault, DataFault::Io(_)));
 }
 
 #[test]
@@ -165,5 +165,5 @@ fn bytes_that_are_no_text() {
     let mut bytes = unedited(400).into_bytes();
     let at = bytes.len() - 2;
     bytes[at] = 0xFF;
-    assert!(matches!(Recording::parse("a", &bytes[..]), Err(RecordingError::Csv { .. })));
+    assert!(matches!(Recording::parse("a", &bytes[..]), Err(DataError { fault: DataFault::Csv(_), .. })));
 }

@@ -2,7 +2,7 @@
 //! stays exact ([`gyronet::model::fognet`]); the LSTMs and their rows are quantised as GyroNet's.
 
 use super::{QuantizeError, Report, fixed, header, provenance, rows, seal};
-use crate::network::fog_checkpoint::FogCheckpoint;
+use crate::network::checkpoint::{Checkpoint, FogNet};
 use gyronet::model::fognet::GAIN_FRACTION_BITS;
 use gyronet::model::fognet_blob::{self, CORRECTION_SHIFT, FogBlob, INPUTS};
 use gyronet::nn::{HIDDEN_MAX, dense::Dense};
@@ -16,7 +16,7 @@ pub const INPUT_CLAMP_STD: f64 = 16.0;
 ///
 /// # Errors
 /// [`QuantizeError`].
-pub fn quantize(checkpoint: &FogCheckpoint) -> Result<(Vec<u8>, Report), QuantizeError> {
+pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), QuantizeError> {
     let mut report = Report::new();
     let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;
     let tensors = checkpoint.tensors();

@@ -1,5 +1,4 @@
-//! A sequence as one CSV: the columns of [`crate::drive::recording`], and beside them what only a
-//! sequence has.
+//! A sequence as one CSV: the columns of [`crate::drive::recording`], and further columns that only a sequence has.
 
 use super::Sequence;
 use crate::drive::DT;

@@ -5,10 +5,11 @@
 //!
 //! Sources: the readers irapkaist/file_player and tsyxyz/kaist2bag, and the data set's page.
 
+use super::Files;
 use super::rows::{Format, Progress, Row, Rows};
 use super::summary::StreamSummary;
 use super::track::{Stream, Track, Unwrap};
-use super::{Files, SequenceError};
+use crate::drive::error::{DataError, DataFault};
 use gyronet::sample::RATE_HZ;
 use std::f64::consts::PI;
 use std::fs::File;
@@ -35,11 +36,11 @@ const POSE: Format<4> =
 /// A wheel that is faster than this has had its counter reset, m/s.
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
-/// What is there to be read.
+/// The files to be read.
 pub(super) const PATHS: [&str; 4] =
     ["sensor_data/xsens_imu.csv", "sensor_data/fog.csv", "sensor_data/encoder.csv", "global_pose.csv"];
 
-pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, SequenceError> {
+pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataError> {
     let [imu, fog, encoder, pose] = PATHS.map(|path| folder.join(path));
     let parameters = EncoderParameters::read(&folder.join("calibration/EncoderParameter.txt"))?;
     let has_gyro = columns(&imu)? != ORIENTATION.columns;
@@ -91,7 +92,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, Sequence
 /// The inertial sensor and its first stamp.
 type Imu = (Box<dyn Stream<7>>, i64);
 
-fn whole(path: &Path, progress: &Progress) -> Result<Imu, SequenceError> {
+fn whole(path: &Path, progress: &Progress) -> Result<Imu, DataError> {
     let mut vendor = Unwrap::default();
     let convert = move |row: &Row<10>, _: f64, _: &mut StreamSummary| {
         let [qx, qy, qz, qw, wx, wy, wz, fx, fy, fz] = row.fields;
@@ -102,7 +103,7 @@ fn whole(path: &Path, progress: &Progress) -> Result<Imu, SequenceError> {
     Ok((Box::new(track), epoch))
 }
 
-fn orientation(path: &Path, progress: &Progress) -> Result<Imu, SequenceError> {
+fn orientation(path: &Path, progress: &Progress) -> Result<Imu, DataError> {
     let mut vendor = Unwrap::default();
     let convert = move |row: &Row<4>, _: f64, _: &mut StreamSummary| {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vendor.angle(yaw(row.fields))]
@@ -118,17 +119,17 @@ fn yaw([x, y, z, w]: [f64; 4]) -> f64 {
 }
 
 /// Columns of the first row: which of the two kinds of file it is.
-fn columns(path: &Path) -> Result<usize, SequenceError> {
+fn columns(path: &Path) -> Result<usize, DataError> {
     let name = path.display().to_string();
-    let file = File::open(path).map_err(|source| SequenceError::open(&name, source))?;
+    let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
     let mut line = String::new();
     // A row of this file is some 200 bytes long.
     let mut reader = BufReader::new(file).take(4096);
-    reader.read_line(&mut line).map_err(|source| SequenceError::Io { path: name, source })?;
+    reader.read_line(&mut line).map_err(|source| DataError::of(&name, source.into()))?;
     Ok(line.split(',').count())
 }
 
-/// What the calibration file says.
+/// The parameters of the calibration file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct EncoderParameters {
     /// Counts of a revolution.
@@ -140,9 +141,9 @@ struct EncoderParameters {
 }
 
 impl EncoderParameters {
-    fn read(path: &Path) -> Result<Self, SequenceError> {
+    fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| SequenceError::open(&name, source))?;
+        let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
         // Keyed on the second word of a line, as the data set's own readers do.
         let number = |parameter: &'static str, key: &str| {
             let line = text.lines().find(|line| line.split_whitespace().nth(1) == Some(key));
@@ -150,7 +151,7 @@ impl EncoderParameters {
                 .and_then(|line| line.split_whitespace().last())
                 .and_then(|word| word.parse().ok())
                 .filter(|value: &f64| value.is_finite() && *value > 0.0);
-            value.ok_or_else(|| SequenceError::Parameter { path: name.clone(), parameter })
+            value.ok_or_else(|| DataError::of(&name, DataFault::Parameter(parameter)))
         };
         Ok(Self {
             resolution: number("Encoder resolution", "resolution:")?,

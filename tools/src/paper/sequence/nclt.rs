@@ -5,9 +5,10 @@
 //! The gyro gives its integral, so that a message that is lost takes nothing with it. Source:
 //! the readers bierschi/nclt2ros and ethz-asl/nclt_tools.
 
+use super::Files;
 use super::rows::{Format, Progress, Row, Rows};
 use super::track::{Track, Unwrap};
-use super::{Files, SequenceError};
+use crate::drive::error::{DataError, DataFault};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
@@ -21,24 +22,23 @@ const WHEELS: Format<2> = Format { columns: 3, used: [1, 2], stamps_per_second: 
 const POSE: Format<3> = Format { columns: 7, used: [1, 2, 6], stamps_per_second: MICROS, nominal_hz: 100.0 };
 
 /// The file of the truth has the date in its name.
-pub(super) fn truth(folder: &Path) -> Result<PathBuf, SequenceError> {
-    let path = folder.display().to_string();
+pub(super) fn truth(folder: &Path) -> Result<PathBuf, DataError> {
     let entries =
-        std::fs::read_dir(folder).map_err(|source| SequenceError::Io { path: path.clone(), source })?;
+        std::fs::read_dir(folder).map_err(|source| DataError::of(folder.display(), source.into()))?;
     let mut names: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|e| e.path())).collect();
     names.sort();
     let is_truth = |path: &PathBuf| {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         name.starts_with("groundtruth") && name.ends_with(".csv")
     };
-    let missing = || SequenceError::Missing { path: folder.join("groundtruth_*.csv").display().to_string() };
+    let missing = || DataError::of(folder.join("groundtruth_*.csv").display(), DataFault::Missing);
     names.into_iter().find(is_truth).ok_or_else(missing)
 }
 
-/// What is there to be read, beside the truth.
+/// The files to be read, beside the truth.
 pub(super) const PATHS: [&str; 3] = ["ms25.csv", "kvh.csv", "wheels.csv"];
 
-pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, SequenceError> {
+pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataError> {
     let [imu, fog, wheels] = PATHS.map(|path| folder.join(path));
     let imu = Track::new(
         Rows::open(&imu, IMU, progress.clone())?,

@@ -1,8 +1,7 @@
 //! Rows of numbers without a header: a stamp and fields, one row in memory at a time.
 
-use super::SequenceError;
 use super::summary::StreamSummary;
-use crate::drive::recording::ValueError;
+use crate::drive::error::{DataError, DataFault, ValueError};
 use csv::ByteRecord;
 use std::cell::Cell;
 use std::fs::File;
@@ -17,7 +16,7 @@ const MAX_SILENCE: f64 = 600.0;
 /// Bytes read so far of all files of a sequence, for whoever watches.
 pub(super) type Progress = Rc<Cell<u64>>;
 
-/// What a file looks like.
+/// The format of a file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Format<const N: usize> {
     /// Columns, the stamp's included.
@@ -30,7 +29,7 @@ pub(super) struct Format<const N: usize> {
     pub nominal_hz: f64,
 }
 
-/// One row: when, and the fields that are used.
+/// A row: its stamp, and the fields that are used.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<const N: usize> {
     pub line: u64,
@@ -51,9 +50,9 @@ pub(super) struct Rows<const N: usize> {
 }
 
 impl<const N: usize> Rows<N> {
-    pub fn open(path: &Path, format: Format<N>, progress: Progress) -> Result<Self, SequenceError> {
+    pub fn open(path: &Path, format: Format<N>, progress: Progress) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|source| SequenceError::open(&name, source))?;
+        let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
         let csv = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -75,12 +74,9 @@ impl<const N: usize> Rows<N> {
     }
 
     /// The next good row. Rows that are passed over are counted in the summary.
-    pub fn next_row(&mut self) -> Result<Option<Row<N>>, SequenceError> {
+    pub fn next_row(&mut self) -> Result<Option<Row<N>>, DataError> {
         loop {
-            let io = |error: csv::Error| SequenceError::Io {
-                path: self.path.clone(),
-                source: std::io::Error::other(error),
-            };
+            let io = |error: csv::Error| DataError::of(&self.path, std::io::Error::other(error).into());
             if !self.csv.read_byte_record(&mut self.record).map_err(io)? {
                 return Ok(None);
             }
@@ -90,8 +86,8 @@ impl<const N: usize> Rows<N> {
             self.seen = byte;
             let found = self.record.len();
             if found != self.format.columns {
-                let (path, expected) = (self.path.clone(), self.format.columns);
-                return Err(SequenceError::Columns { path, line, found, expected });
+                let fault = DataFault::Columns { found, expected: self.format.columns };
+                return Err(DataError::at(&self.path, line, fault));
             }
             let stamp: i64 = self.field(line, 0)?;
             if stamp < 0 {
@@ -114,12 +110,12 @@ impl<const N: usize> Rows<N> {
                     continue;
                 }
                 if stamp < last {
-                    return Err(SequenceError::Backwards { path: self.path.clone(), line, last, at: stamp });
+                    return Err(DataError::at(&self.path, line, DataFault::Backwards { last, at: stamp }));
                 }
                 let seconds = self.seconds(stamp - last);
                 if seconds > MAX_SILENCE {
-                    let (path, most) = (self.path.clone(), MAX_SILENCE);
-                    return Err(SequenceError::Silent { path, line, seconds, most });
+                    let fault = DataFault::Silent { seconds, most: MAX_SILENCE };
+                    return Err(DataError::at(&self.path, line, fault));
                 }
             }
             self.last = Some(stamp);
@@ -128,7 +124,7 @@ impl<const N: usize> Rows<N> {
         }
     }
 
-    fn field<T: std::str::FromStr>(&self, line: u64, column: usize) -> Result<T, SequenceError> {
+    fn field<T: std::str::FromStr>(&self, line: u64, column: usize) -> Result<T, DataError> {
         let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
         let error = if self.bytes(column).is_empty() { ValueError::Empty } else { ValueError::NotANumber };
         text.parse().map_err(|_| self.value(line, column, error))
@@ -138,8 +134,8 @@ impl<const N: usize> Rows<N> {
         self.record.get(column).unwrap_or_default()
     }
 
-    fn value(&self, line: u64, column: usize, error: ValueError) -> SequenceError {
-        let text = String::from_utf8_lossy(self.bytes(column)).into_owned();
-        SequenceError::Value { path: self.path.clone(), line, column: column + 1, text, error }
+    fn value(&self, line: u64, column: usize, error: ValueError) -> DataError {
+        let text = String::from_utf8_lossy(self.bytes(column));
+        DataError::value(&self.path, line, column + 1, &text, error)
     }
 }

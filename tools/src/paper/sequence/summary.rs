@@ -1,4 +1,4 @@
-//! What was found in the files of a sequence: nothing is passed over without a number here.
+//! The summary of a sequence's files: every row that is skipped is counted here.
 
 use serde::Serialize;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::path::Path;
 /// A gap is so many times the nominal period.
 const GAP_PERIODS: f64 = 2.5;
 
-/// How often something was seen, and where first.
+/// A count, and the line of its first occurrence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Seen {
     /// Times.
@@ -32,7 +32,7 @@ pub struct Spread {
     pub most_ms: f64,
 }
 
-/// One file.
+/// The summary of one file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StreamSummary {
     /// Its name.
@@ -58,7 +58,7 @@ pub struct StreamSummary {
     clock: Clock,
 }
 
-/// What the stamps say.
+/// The state of the stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Clock {
     per_second: f64,

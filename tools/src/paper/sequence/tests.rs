@@ -22,7 +22,7 @@ impl Scratch {
         fs::write(path, lines.join("\n") + "\n").unwrap();
     }
 
-    fn read(&self) -> Result<Sequence, SequenceError> {
+    fn read(&self) -> Result<Sequence, DataError> {
         Sequence::read(&self.0, |_| {})
     }
 
@@ -281,7 +281,7 @@ fn neither_data_set() {
     let folder = std::env::temp_dir();
     let path = folder.join(format!("gyronet-nothing-{}", std::process::id()));
     fs::create_dir_all(&path).unwrap();
-    assert!(matches!(Sequence::read(&path, |_| {}), Err(SequenceError::Unknown { .. })));
-    assert!(matches!(find(&path), Err(SequenceError::Unknown { .. })));
+    assert!(matches!(Sequence::read(&path, |_| {}), Err(DataError { fault: DataFault::UnknownLayout, .. })));
+    assert!(matches!(find(&path), Err(DataError { fault: DataFault::UnknownLayout, .. })));
     fs::remove_dir(path).unwrap();
 }

@@ -4,9 +4,9 @@
 //! What adds up (angle of a gyro, way of a wheel) is a stream of its sums, so that no part of it
 //! is lost or counted twice whatever the stamps do.
 
-use super::SequenceError;
 use super::rows::{Row, Rows};
 use super::summary::StreamSummary;
+use crate::drive::error::{DataError, DataFault};
 
 /// Makes a row's fields, at a time in s, into the values that are interpolated; keeps what it
 /// needs of the past.
@@ -18,11 +18,11 @@ pub(super) trait Stream<const M: usize> {
     /// Time of the first row, s since the epoch.
     fn first(&self) -> f64;
     /// The value at a time, s since the epoch; `None` at the end of the file.
-    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, SequenceError>;
+    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError>;
     /// Time of the newest row that was read.
     fn reached(&self) -> f64;
     /// Reads the rest, so that the summary is of the whole file.
-    fn finish(self: Box<Self>) -> Result<StreamSummary, SequenceError>;
+    fn finish(self: Box<Self>) -> Result<StreamSummary, DataError>;
 }
 
 /// A value in between.
@@ -45,13 +45,9 @@ pub(super) struct Track<const N: usize, const M: usize> {
 
 impl<const N: usize, const M: usize> Track<N, M> {
     /// Reads the first row; without an epoch, that is it.
-    pub fn new(
-        mut rows: Rows<N>,
-        epoch: Option<i64>,
-        mut convert: Convert<N, M>,
-    ) -> Result<Self, SequenceError> {
+    pub fn new(mut rows: Rows<N>, epoch: Option<i64>, mut convert: Convert<N, M>) -> Result<Self, DataError> {
         let first = rows.next_row()?;
-        let Some(row) = first else { return Err(SequenceError::Empty { path: rows.path().to_owned() }) };
+        let Some(row) = first else { return Err(DataError::of(rows.path(), DataFault::Empty)) };
         let epoch = epoch.unwrap_or(row.stamp);
         let time = rows.seconds(row.stamp - epoch);
         let now = (time, convert(&row, time, &mut rows.summary));
@@ -63,7 +59,7 @@ impl<const N: usize, const M: usize> Track<N, M> {
         self.epoch
     }
 
-    fn advance(&mut self) -> Result<bool, SequenceError> {
+    fn advance(&mut self) -> Result<bool, DataError> {
         let Some(row) = self.rows.next_row()? else { return Ok(false) };
         self.before = self.after;
         let time = self.rows.seconds(row.stamp - self.epoch);
@@ -77,7 +73,7 @@ impl<const N: usize, const M: usize> Stream<M> for Track<N, M> {
         self.first
     }
 
-    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, SequenceError> {
+    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError> {
         while self.after.0 < time {
             if !self.advance()? {
                 return Ok(None);
@@ -94,7 +90,7 @@ impl<const N: usize, const M: usize> Stream<M> for Track<N, M> {
         self.after.0
     }
 
-    fn finish(mut self: Box<Self>) -> Result<StreamSummary, SequenceError> {
+    fn finish(mut self: Box<Self>) -> Result<StreamSummary, DataError> {
         while self.advance()? {}
         Ok(self.rows.summary)
     }

@@ -1,4 +1,4 @@
-//! One page with everything in it: tables, and pictures as SVG; nothing is loaded from elsewhere.
+//! One HTML page with all tables and pictures; nothing is loaded from elsewhere.
 
 use super::pictures::Picture;
 use super::table::{Row, Table};

@@ -1,8 +1,8 @@
 //! The paper's figures 6, 7, 9, 10 and 11 for a sequence.
 
-use super::methods::{FIR, Gyro, RAW};
 use super::results::{Path, SequenceErrors};
 use crate::drive::DT;
+use crate::evaluate::methods::{Gyro, Method};
 use crate::paper::sequence::Sequence;
 use crate::plot::curve::range;
 use crate::plot::svg::{Axis, COLORS, Figure, Marks, Panel, PlotError, Stroke};
@@ -28,15 +28,15 @@ struct Labels<'a> {
 /// A picture of a sequence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// For the name of its file.
+    /// The part of its file's name that says what it shows.
     pub kind: &'static str,
-    /// What it shows, and which of the paper's figures it is like.
+    /// The caption, and which of the paper's figures it corresponds to.
     pub caption: String,
     /// The picture.
     pub svg: String,
 }
 
-/// All pictures of a sequence.
+/// Draws all pictures of a sequence.
 ///
 /// # Errors
 /// [`PlotError`], when the library refuses.
@@ -44,7 +44,8 @@ pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Res
     let simulated = if errors.simulated { " (simulated)" } else { "" };
     let name = format!("{}{simulated}", errors.name);
     // A gyro with its bias runs off any scale that shows the others.
-    let in_scale = |path: &&Path| path.method.is_none_or(|method| method != RAW && method != FIR);
+    let in_scale =
+        |path: &&Path| path.method.is_none_or(|method| method != Method::RAW && method != Method::FIR);
     let of = |gyro: Gyro| {
         let is_wanted = move |path: &&Path| path.method.is_none_or(|method| method.gyro == gyro);
         paths.iter().filter(is_wanted).filter(in_scale).collect::<Vec<&Path>>()
@@ -92,7 +93,7 @@ pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Res
 }
 
 fn curve(path: &Path, points: impl Iterator<Item = (f64, f64)>) -> Curve<'static> {
-    (path.method.map(|method| method.label), points.collect())
+    (path.method.map(|method| method.name), points.collect())
 }
 
 fn draw_curves(labels: &Labels<'_>, curves: Vec<Curve<'_>>) -> Result<String, PlotError> {

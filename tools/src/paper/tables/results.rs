@@ -1,7 +1,7 @@
-//! Errors of every method on every sequence, and their means: what the tables and the JSON are
-//! made of.
+//! Errors of every method on every sequence, and their means, from which the tables and the JSON are made.
 
-use super::methods::{Estimates, Method};
+use super::estimates::Estimates;
+use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::YawError;
 use crate::evaluate::trajectory_error::{Point, TrajectoryError};
 use crate::paper::sequence::Sequence;
@@ -17,17 +17,17 @@ pub struct Errors {
     pub mean_1s_rad: f64,
     /// Error of the yaw at the end, wrapped, rad.
     pub final_rad: f64,
-    /// The same, not wrapped.
+    /// The error of the yaw at the end, not wrapped, rad.
     pub final_unwrapped_rad: f64,
     /// Absolute trajectory error with odometry, rmse, m.
     pub ate_m: f64,
-    /// The same, mean of the distances.
+    /// The mean distance with odometry, m.
     pub ate_mean_m: f64,
-    /// After alignment, rmse, m.
+    /// The absolute trajectory error after alignment, rmse, m.
     pub aligned_ate_m: f64,
-    /// The same, mean of the distances.
+    /// The mean distance after alignment, m.
     pub aligned_ate_mean_m: f64,
-    /// What it took on this machine, s.
+    /// The run time on this machine, s.
     pub run_time_s: f64,
 }
 
@@ -52,21 +52,21 @@ pub struct SequenceErrors {
     pub name: String,
     /// Whose layout.
     pub layout: Layout,
-    /// Nobody drove it.
+    /// The sequence is simulated.
     pub simulated: bool,
-    /// Its parts are not those of the paper's first sequences: urban18 and later, or a simulated
-    /// device other than the first.
+    /// Its sensors are not those of the paper's first sequences: urban18 and later, or a simulated device other than
+    /// the first.
     pub other_devices: bool,
-    /// What was compared, s.
+    /// The length of the comparison, s.
     pub seconds: f64,
-    /// How far it went, by its wheels, m.
+    /// The distance by its wheels, m.
     pub metres: f64,
-    /// Why some methods could not be run.
+    /// The reason why some methods could not be run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<String>,
     /// The errors.
     pub methods: ByMethod,
-    /// In the order of the tables.
+    /// The methods in the order of the tables.
     #[serde(skip)]
     pub order: Vec<Method>,
 }
@@ -128,7 +128,7 @@ fn other_devices(sequence: &Sequence) -> bool {
 impl Errors {
     fn new(
         turns: &[f64],
-        estimate: &super::methods::Estimate,
+        estimate: &super::estimates::Estimate,
         points: &[Point],
         truth: &[Point],
     ) -> Option<Self> {
@@ -178,12 +178,12 @@ pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod
     all.into_iter().filter(|(_, e)| e.len() == count).map(|(key, e)| (key, Errors::mean(&e))).collect()
 }
 
-/// Everything, as JSON has it.
+/// The results in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
     /// Some sequence is simulated.
     pub simulated: bool,
-    /// One for each sequence.
+    /// One entry for each sequence.
     pub sequences: Vec<SequenceErrors>,
     /// Over all sequences, of the methods that all of them have.
     pub mean: ByMethod,
@@ -192,7 +192,7 @@ pub struct Results {
     /// GyroNet's error in 1 s over that of static initialisation, of the means.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyronet_to_static: Option<f64>,
-    /// The same of the paper's Table I.
+    /// The same ratio in the paper's Table I.
     pub gyronet_to_static_paper: f64,
 }
 

@@ -1,25 +1,25 @@
-//! The paper's tables with our figures: rows of words and numbers, for whoever prints them.
+//! The paper's tables with our figures: rows of words and numbers, which [`super::text`] and [`super::html`] print.
 
-use super::methods::{self, Gyro, Method};
 use super::paper::{self, Line};
 use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
+use crate::evaluate::methods::{Gyro, Method};
 use crate::simulate::layout::Layout;
 
 /// A row: a name and figures; `None` where there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// What it is of.
+    /// The name of the row.
     pub name: String,
-    /// One for each column.
+    /// One figure for each column.
     pub figures: Vec<Option<f64>>,
 }
 
 /// A table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Its number in the paper and what it shows.
+    /// Its number in the paper and its subject.
     pub title: String,
-    /// Whether it holds figures of simulated drives.
+    /// It holds figures of simulated drives.
     pub simulated: bool,
     /// Names of the columns of figures.
     pub columns: Vec<String>,
@@ -29,13 +29,13 @@ pub struct Table {
     pub rows: Vec<Row>,
     /// The paper's, with columns of its own.
     pub paper_columns: Vec<String>,
-    /// Ditto.
+    /// The paper's rows.
     pub paper_rows: Vec<Row>,
-    /// What has to be said.
+    /// Remarks below the table.
     pub notes: Vec<String>,
 }
 
-/// All tables that the sequences have figures for.
+/// Returns all tables that the sequences have figures for.
 #[must_use]
 pub fn tables(results: &Results) -> Vec<Table> {
     let kaist: Vec<&SequenceErrors> =
@@ -95,7 +95,7 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
     let of: [fn(&Errors) -> f64; 3] = [|e| e.mean_1s_rad, |e| e.final_rad, |e| e.final_unwrapped_rad];
     let rows = methods_of(set, |_| true)
         .into_iter()
-        .map(|method| Row { name: method.label.to_owned(), figures: figures(means.get(method.key), &of) });
+        .map(|method| Row { name: method.name.to_owned(), figures: figures(means.get(method.key), &of) });
     let mut notes = vec![String::from("The paper's figures are for KAIST Urban.")];
     let [still, network, looped] = ["static", "gyronet", "gyronet_loop"].map(|key| means.get(key));
     if let (Some(still), Some(network), Some(looped)) = (still, network, looped) {
@@ -107,7 +107,7 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
             paper::GYRONET_TO_STATIC
         ));
     }
-    if set.iter().any(|sequence| !sequence.methods.contains_key(methods::VENDOR.key)) {
+    if set.iter().any(|sequence| !sequence.methods.contains_key(Method::VENDOR.key)) {
         notes.push("VQF stands in for the vendor's filter, whose heading these data do not have.".into());
     }
     notes.extend(set.iter().filter_map(|s| Some(format!("{}: {}", s.name, s.refused.as_ref()?))));
@@ -128,7 +128,7 @@ const ATE: [fn(&Errors) -> f64; 2] = [|e| e.ate_m, |e| e.aligned_ate_m];
 /// Table II.
 fn urban(set: &[&SequenceErrors]) -> Table {
     let is_wanted = |method: &Method| {
-        method.gyro == Gyro::Fog || [methods::STATIC.key, methods::GYRONET.key].contains(&method.key)
+        method.gyro == Gyro::Fog || [Method::STATIC.key, Method::GYRONET.key].contains(&method.key)
     };
     let methods = methods_of(set, is_wanted);
     let row = |name: String, by: &ByMethod| Row {
@@ -151,7 +151,7 @@ fn urban(set: &[&SequenceErrors]) -> Table {
     Table {
         title: String::from("Table II: ATE and aligned ATE of dead reckoning with each yaw rate, rmse, m"),
         simulated: set.iter().any(|sequence| sequence.simulated),
-        columns: pairs(methods.iter().map(|method| method.label)),
+        columns: pairs(methods.iter().map(|method| method.name)),
         decimals: 2,
         rows,
         paper_columns: pairs(["FoG", "lwoi", "FoGNet"].into_iter()),
@@ -190,7 +190,7 @@ fn padding(set: &[&SequenceErrors]) -> Table {
 fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
     let means = mean(set.iter().copied());
     let rows = methods_of(set, |_| true).into_iter().map(|method| Row {
-        name: format!("{} + odometry", method.label),
+        name: format!("{} + odometry", method.name),
         figures: figures(means.get(method.key), &ATE),
     });
     Table {
@@ -209,7 +209,7 @@ fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
 fn run_time(set: &[&SequenceErrors]) -> Table {
     let hours = set.iter().map(|sequence| sequence.seconds).sum::<f64>() / 3600.0;
     let rows = methods_of(set, |_| true).into_iter().map(|method| Row {
-        name: method.label.to_owned(),
+        name: method.name.to_owned(),
         figures: vec![
             set.iter().map(|s| s.methods.get(method.key).map(|e| e.run_time_s)).sum::<Option<f64>>(),
         ],

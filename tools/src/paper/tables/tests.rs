@@ -1,6 +1,7 @@
-use super::methods::{Estimate, Estimates, FOG, GYRONET, RAW, STATIC};
+use super::estimates::{Estimate, Estimates};
 use super::results::{Path, Results, SequenceErrors};
-use super::{html, methods, pictures, table};
+use super::{estimates, html, pictures, table};
+use crate::evaluate::methods::Method;
 use crate::paper::sequence::{Sequence, Step, StreamSummary};
 use crate::simulate::layout::{self, Layout, Spec};
 use gyronet::model::window::{Features, WINDOW};
@@ -29,7 +30,7 @@ fn sequence(name: &str, layout: Layout, seconds: u32) -> Sequence {
     sequence
 }
 
-/// One that dead reckoning of the truth reproduces.
+/// Returns a sequence that dead reckoning of the truth reproduces.
 fn exact() -> Sequence {
     let mut track = Track { position: [100.0, -50.0], yaw: 2.0 };
     let step = |k: usize| {
@@ -68,7 +69,7 @@ fn exact() -> Sequence {
 fn the_truth_has_no_error() {
     let sequence = exact();
     let turns = sequence.turns()[300..].to_vec();
-    let truth = Estimate { method: FOG, turns, run_time: 0.0 };
+    let truth = Estimate { method: Method::FOG, turns, run_time: 0.0 };
     let estimates = Estimates { start: 300, methods: vec![truth], refused: None };
     let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
     let fog = errors.methods["fog"];
@@ -81,7 +82,7 @@ fn the_truth_has_no_error() {
 #[test]
 fn each_method_does_what_it_says() {
     let sequence = exact();
-    let estimates = methods::run(&sequence, &mut Nothing, || {});
+    let estimates = estimates::run(&sequence, &mut Nothing, || {});
     let (errors, _) = SequenceErrors::new(&sequence, &estimates);
     let final_rad = |key: &str| errors.methods[key].final_unwrapped_rad;
     let seconds = 57.0;
@@ -103,10 +104,12 @@ fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
     for (k, step) in sequence.steps.iter_mut().enumerate().take(400) {
         step.angular_rate[2] = 0.002 * k as f32;
     }
-    let estimates = methods::run(&sequence, &mut Nothing, || {});
+    let estimates = estimates::run(&sequence, &mut Nothing, || {});
     let (errors, _) = SequenceErrors::new(&sequence, &estimates);
-    assert!(!errors.methods.contains_key(STATIC.key) && !errors.methods.contains_key(GYRONET.key));
-    assert!(errors.methods.contains_key(RAW.key) && errors.methods.contains_key(FOG.key));
+    assert!(
+        !errors.methods.contains_key(Method::STATIC.key) && !errors.methods.contains_key(Method::GYRONET.key)
+    );
+    assert!(errors.methods.contains_key(Method::RAW.key) && errors.methods.contains_key(Method::FOG.key));
     assert!(errors.refused.as_ref().is_some_and(|why| why.contains("starts moving")), "{errors:?}");
 }
 
@@ -114,7 +117,7 @@ fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
 fn json_and_tables_of_simulated_sequences() {
     let of = |name: &str, layout| {
         let sequence = sequence(name, layout, 60);
-        let estimates = methods::run(&sequence, &mut Nothing, || {});
+        let estimates = estimates::run(&sequence, &mut Nothing, || {});
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
         (sequence, errors, paths)
     };

@@ -1,4 +1,4 @@
-//! Curves that fill whatever width the page has: the picture stretches, its numbers do not.
+//! Charts that fill the width of the page: the picture stretches, its numbers do not.
 //!
 //! The curves are an SVG without proportions of its own; axes and names are text of the page
 //! beside it. So the same chart can be read on a desk and on a phone, and the script can zoom by
@@ -15,18 +15,18 @@ const POINTS: usize = 2_000;
 /// Width over height of a chart with the same scale in both directions, from and to.
 const ASPECTS: (f64, f64) = (1.5, 2.6);
 
-/// One line.
+/// A line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// Its colour in the style sheet.
     pub class: &'static str,
-    /// What it is.
+    /// The name.
     pub label: String,
-    /// What it comes to, beside the label.
+    /// The result of the line, beside its name.
     pub note: String,
-    /// In the units of the axes.
+    /// The points in the units of the axes.
     pub points: Vec<(f64, f64)>,
-    /// Whether the axes must hold all of it; else it may run off them.
+    /// The axes hold all of it; otherwise it may run off them.
     pub in_scale: bool,
 }
 
@@ -35,16 +35,16 @@ pub struct Curve {
 pub struct Chart<'a> {
     /// Above it.
     pub title: &'a str,
-    /// What is to the right, and up.
+    /// The units to the right and upwards.
     pub axes: &'a str,
     /// A metre is as long either way; else the axis to the right is the time.
     pub same_scale: bool,
-    /// From back to front.
+    /// The lines from back to front.
     pub curves: Vec<Curve>,
 }
 
 impl Chart<'_> {
-    /// As HTML.
+    /// Returns the chart as HTML.
     #[must_use]
     pub fn html(&self) -> String {
         let scaling = || self.curves.iter().filter(|curve| curve.in_scale);
@@ -109,12 +109,12 @@ impl Chart<'_> {
     }
 }
 
-/// Where a value lies between the ends of its axis.
+/// Returns the place of a value between the ends of its axis.
 fn part(value: f64, (from, to): (f64, f64)) -> f64 {
     (value - from) / (to - from)
 }
 
-/// Both ranges widened so that a metre is as long either way, and width over height.
+/// Widens both ranges so that a metre is as long either way, and returns them with the ratio of width to height.
 fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64) {
     let aspect = ((x.1 - x.0) / (y.1 - y.0)).clamp(ASPECTS.0, ASPECTS.1);
     let metres = 1.1 * (y.1 - y.0).max((x.1 - x.0) / aspect);

@@ -1,6 +1,7 @@
-//! When a message arrives: its stamp is the logger's, not the part's.
+//! The arrival of a message: its stamp is the logger's, not the part's.
 
-use crate::simulate::random::{Purpose, Random};
+use crate::random::Random;
+use crate::simulate::purpose::Purpose;
 use crate::simulate::vehicles::Delays;
 
 /// The messages of one part on their way.
@@ -18,13 +19,13 @@ const APART: f64 = 10e-6;
 
 impl Delay {
     pub fn new(delays: Delays, run: u64, stream: u64) -> Self {
-        let random = Random::new(run ^ (stream << 48), Purpose::Stamps);
+        let random = Purpose::Stamps.stream(run ^ (stream << 48));
         let mut delay = Self { delays, random, last: f64::NEG_INFINITY, blocked: [0.0; 2] };
         delay.block();
         delay
     }
 
-    /// When a message of this time arrives, later than the one before, s.
+    /// Returns the arrival of a message of this time, later than the one before, s.
     pub fn arrival(&mut self, time: f64) -> f64 {
         while time > self.blocked[1] {
             self.block();

@@ -1,4 +1,4 @@
-//! Rows of numbers, fast: a sequence has one and a half million of them.
+//! Fast output of rows of numbers: a sequence has one and a half million of them.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -1,4 +1,4 @@
-//! QEMU as a process: what it says is collected by threads, and it is killed when nobody wants it.
+//! QEMU as a process: threads collect its output, and it is killed when its owner is dropped.
 
 use super::{EmulatorError, POLL, Result, START};
 use std::fmt::Display;
@@ -10,7 +10,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// What a thread collects until its source ends.
+/// The bytes that a thread collects until its source ends.
 #[derive(Debug, Default)]
 pub(super) struct Collected {
     bytes: Mutex<Vec<u8>>,
@@ -19,7 +19,7 @@ pub(super) struct Collected {
 }
 
 impl Collected {
-    /// All bytes so far and whether it is enough, once it is or time is up.
+    /// Waits until the bytes are enough or time is up, and returns them and whether they are enough.
     pub(super) fn wait(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> (Vec<u8>, bool) {
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let (bytes, timeout) = self
@@ -29,14 +29,14 @@ impl Collected {
         (bytes.clone(), !timeout.timed_out())
     }
 
-    /// Whether it becomes enough before time is up; no copy is made.
+    /// Returns whether the bytes become enough before time is up, without a copy.
     pub(super) fn holds(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> bool {
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let waited = self.more.wait_timeout_while(bytes, limit, |bytes| !enough(bytes));
         !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
     }
 
-    /// Hands on what comes until there is no more, or the sink takes no more.
+    /// Copies the bytes to a sink until the source ends or the sink takes no more.
     pub(super) fn copy_to(&self, mut sink: impl Write) {
         let mut copied = 0;
         loop {
@@ -91,7 +91,7 @@ impl Process {
         collected
     }
 
-    /// QEMU's end of a line.
+    /// Accepts QEMU's end of a line.
     pub(super) fn accept(&mut self, listener: &TcpListener) -> Result<Line> {
         let until = Instant::now() + START;
         listener.set_nonblocking(true)?;
@@ -110,7 +110,7 @@ impl Process {
         Ok(Line { stream, received })
     }
 
-    /// A short sleep, unless time is up.
+    /// Sleeps for a moment, unless time is up.
     pub(super) fn sleep(&self, until: Instant, what: impl Display) -> Result<()> {
         if Instant::now() > until {
             return Err(self.failed(what));
@@ -119,7 +119,7 @@ impl Process {
         Ok(())
     }
 
-    /// Ends QEMU in order, by its monitor; all that it has written to standard error.
+    /// Ends QEMU in order, by its monitor, and returns everything that it has written to standard error.
     pub(super) fn quit(&mut self) -> Result<String> {
         let asked = self.child.stdin.take().map(|mut monitor| monitor.write_all(b"quit\n"));
         if !matches!(asked, Some(Ok(()))) {
@@ -155,7 +155,7 @@ impl Drop for Process {
     }
 }
 
-/// One connection to QEMU.
+/// A connection to QEMU.
 #[derive(Debug)]
 pub(super) struct Line {
     pub(super) stream: TcpStream,

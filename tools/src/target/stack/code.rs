@@ -1,4 +1,4 @@
-//! An image's functions: what each needs of the stack, and what it calls.
+//! The functions of an image: the stack that each needs, and its calls.
 
 use super::priority::{self, Vectors};
 use super::thumb::{self, Effect};
@@ -16,7 +16,7 @@ pub struct Function {
 
 #[derive(Debug, Default)]
 pub struct Code {
-    /// By address.
+    /// The functions by address.
     pub functions: BTreeMap<u32, Function>,
     /// Functions whose address is a value somewhere.
     taken: BTreeSet<u32>,
@@ -138,13 +138,13 @@ impl Code {
         self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
     }
 
-    /// What is left of a function that runs with interrupts off when they come on: its frame.
+    /// Returns the frame that is left of a function that runs with interrupts off when they come on.
     pub fn masked(&self) -> HashMap<u32, u32> {
         let masked = |function: &Function| function.name.ends_with(MASKED);
         self.functions.iter().filter(|(_, f)| masked(f)).map(|(address, f)| (*address, f.own)).collect()
     }
 
-    /// Where a function's calls can go.
+    /// Returns the addresses that a function can call.
     fn targets<'a>(&'a self, function: &'a Function) -> impl Iterator<Item = u32> + 'a {
         let indirect = if function.indirect > 0 { Some(&self.taken) } else { None };
         function.calls.iter().chain(indirect.into_iter().flatten()).copied()

@@ -1,4 +1,4 @@
-//! Which handlers can interrupt each other.
+//! The priorities of handlers, which determine which of them can interrupt each other.
 //!
 //! Handlers of one priority cannot (ARMv7-M Architecture Reference Manual, B1.5.4). An image says
 //! its priorities in a section that is not loaded: for each task the number of its vector and its
@@ -7,7 +7,7 @@
 use super::StackError;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Where an image says its priorities.
+/// The section with an image's priorities.
 pub const SECTION: &str = ".priorities";
 
 /// A vector table, and the priorities of its handlers.
@@ -23,7 +23,7 @@ pub struct Vectors {
 pub type Group = (Option<u8>, BTreeSet<u32>);
 
 impl Vectors {
-    /// Takes what an image says.
+    /// Reads the priorities of an image.
     ///
     /// # Errors
     /// [`StackError::Format`]: a byte is left over, or a vector is listed twice.

@@ -1,12 +1,12 @@
-//! What a Thumb-2 instruction does to the stack pointer and to the flow of control.
+//! The effect of a Thumb-2 instruction on the stack pointer and on the flow of control.
 //!
 //! Only those that do something to either are known (ARMv7-M Architecture Reference Manual,
 //! A7.7); all others are [`Effect::None`].
 
-/// What an instruction does.
+/// The effect of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
-    /// Nothing that matters here.
+    /// The instruction does not touch the stack pointer or the flow.
     None,
     /// The stack grows by so many bytes.
     Push(u32),
@@ -33,7 +33,7 @@ pub enum Effect {
 const SP: u16 = 13;
 const PC: u16 = 15;
 
-/// Whether a second halfword belongs to it.
+/// Returns whether a second halfword belongs to the instruction.
 pub const fn is_wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }

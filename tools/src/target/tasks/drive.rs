@@ -1,4 +1,4 @@
-//! What the emulated image is given to do while it is counted.
+//! The input of the emulated image while it is counted.
 
 use crate::simulate::{Config, Sample, Simulation};
 use crate::target::emulator::{Board, EmulatorError};
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// Samples: static initialisation, and forty windows.
 const SAMPLES: usize = 500;
-/// How long a sample may take, and how long an answer is waited for before it is asked again.
+/// The longest time that a sample may take.
 const TURN: Duration = Duration::from_secs(10);
 const ASK: Duration = Duration::from_millis(20);
 /// Windows of the network that must have run, or nothing is known of it.
@@ -33,7 +33,7 @@ pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
     let mut board = Board::boot(image, SERVICE, &["-icount", ICOUNT, "-plugin", plugin])?;
     let [info, configuration, log] = [Request::Info, Request::GetConfiguration, Request::Log { after: 0 }]
         .map(|request| emit(1, &request).unwrap_or_default());
-    let mut told = Told::default();
+    let mut answers = Answers::default();
     for (k, sample) in Simulation::new(&Config::DEFAULT).take(SAMPLES).enumerate() {
         // Standing, as Toyota's frame has it, and now and then what a host asks.
         board.send(SLCAN, b"t0AA81A6F1A6F1A6F1A6F\r", TURN)?;
@@ -45,15 +45,15 @@ pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
         // First what the gyro has sent in ten milliseconds, then the sample: the schedule adds up the turn
         // that takes the one and the turn that takes the other.
         board.send(GYRO, &messages, TURN)?;
-        told.wait(&mut board, "the gyro's messages", |told| {
-            told.messages as usize >= GYRO_MESSAGES * (k + 1)
+        answers.wait(&mut board, "the gyro's messages", |answers| {
+            answers.messages as usize >= GYRO_MESSAGES * (k + 1)
         })?;
         board.send(IMU, &message(k, &sample).emit(), TURN)?;
         ask(&mut board, [&info, &configuration, &log][k % 3])?;
-        told.wait(&mut board, "the sample", |told| told.samples as usize > k)?;
+        answers.wait(&mut board, "the sample", |answers| answers.samples as usize > k)?;
     }
-    if told.windows < WINDOWS {
-        return Err(board.failed(format!("only {} windows were used", told.windows)));
+    if answers.windows < WINDOWS {
+        return Err(board.failed(format!("only {} windows were used", answers.windows)));
     }
     board.quit()
 }
@@ -63,19 +63,19 @@ fn ask(board: &mut Board, question: &[u8]) -> Result<(), EmulatorError> {
     question.iter().try_for_each(|byte| board.send(SERVICE, &[*byte], TURN))
 }
 
-/// What the image has said of its pipeline.
+/// The answers of the image about its pipeline.
 #[derive(Default)]
-struct Told {
+struct Answers {
     deframer: Deframer,
     /// Bytes of the service line that have been read.
     read: usize,
     samples: u32,
     windows: u32,
-    /// Of the fibre-optic gyro.
+    /// Messages of the fibre-optic gyro.
     messages: u32,
 }
 
-impl Told {
+impl Answers {
     /// Asks until it is so far, however slow the host is.
     fn wait(
         &mut self,
@@ -101,7 +101,7 @@ impl Told {
         Ok(())
     }
 
-    /// Takes the newest of all answers.
+    /// Reads the newest of all answers.
     fn read(&mut self, bytes: &[u8]) {
         for byte in bytes.get(self.read..).unwrap_or_default() {
             if let Some(Ok((_, Reply::Counters(AllCounters { pipeline, fog, .. })))) =

@@ -1,4 +1,4 @@
-//! Where an image's handlers lie, for the plugin that counts them.
+//! The addresses of an image's handlers, for the plugin that counts them.
 
 use super::{Handler, KINDS, Least};
 use crate::target::stack;
@@ -24,7 +24,7 @@ const VECTORS: [(usize, &str, u32); 10] = [
     (16 + 71, "USART6", 0x4001_1404),
 ];
 
-/// Handlers, each with what the plugin is told of it, and where the watched functions are.
+/// The handlers, each with the plugin's option for it, and the addresses of the watched functions.
 pub struct Symbols {
     pub handlers: Vec<(Handler, String)>,
     pub watched: u32,

@@ -1,7 +1,7 @@
 //! The ways of getting a heading that the paper's tables compare: each makes of a sequence what
 //! was turned in every 10 ms.
 //!
-//! The paper's vendor filter runs inside the sensor and cannot be had. [`VQF`] stands in for it
+//! The paper's vendor filter runs inside the sensor and cannot be had. [`Method::VQF`] stands in for it
 //! where the data have no heading of the vendor's own: an orientation filter of the same kind
 //! (gyro integrated, levelled by the accelerometer, bias learnt at rest; Laidig and Seel, VQF,
 //! Information Fusion 91, 2023), without a magnetometer, once with its published defaults and once
@@ -9,10 +9,11 @@
 
 use crate::drive::DT;
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Drive, Step};
+use crate::drive::replay::{Replay, Step};
 use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::fir;
-use crate::paper::fog_drive;
+use crate::evaluate::methods::Method;
+use crate::paper::fog_replay;
 use crate::paper::sequence::Sequence;
 use crate::simulate::world::EARTH_RATE;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
@@ -24,61 +25,6 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::units::AngularRate;
 use std::time::Instant;
-
-/// Which gyro a method starts from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Gyro {
-    /// The inertial sensor's.
-    Mems,
-    /// The fibre-optic one.
-    Fog,
-}
-
-/// A way of getting a heading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Method {
-    /// For programs.
-    pub key: &'static str,
-    /// For people.
-    pub label: &'static str,
-    /// What it starts from.
-    pub gyro: Gyro,
-}
-
-const fn mems(key: &'static str, label: &'static str) -> Method {
-    Method { key, label, gyro: Gyro::Mems }
-}
-
-const fn fog(key: &'static str, label: &'static str) -> Method {
-    Method { key, label, gyro: Gyro::Fog }
-}
-
-/// The inertial sensor's gyro as it is.
-pub const RAW: Method = mems("raw", "raw gyro");
-/// Less its mean over the first 3 s.
-pub const STATIC: Method = mems("static", "static initialisation");
-/// Through the paper's low-pass.
-pub const FIR: Method = mems("fir", "FIR 10/15 Hz");
-/// A well-known filter instead of the vendor's.
-pub const VQF: Method = mems("vqf", "VQF filter");
-/// The same, taking a shaking vehicle for one at rest.
-pub const VQF_VEHICLE: Method = mems("vqf_vehicle", "VQF filter, vehicle's limits of rest");
-/// The vendor's own heading.
-pub const VENDOR: Method = mems("vendor", "vendor's filter");
-/// GyroNet, integer, settled estimates.
-pub const GYRONET: Method = mems("gyronet", "GyroNet");
-/// GyroNet, what goes out at once.
-pub const GYRONET_ONLINE: Method = mems("gyronet_online", "GyroNet, sent at once");
-/// GyroNet with zero-rate updates behind it: what goes out for navigation.
-pub const GYRONET_LOOP: Method = mems("gyronet_loop", "GyroNet with the bias loop");
-/// The fibre-optic gyro as it is.
-pub const FOG: Method = fog("fog", "FoG");
-/// Less the Earth's rate at the place's latitude.
-pub const FOG_EARTH: Method = fog("fog_earth", "FoG less Earth rate");
-/// FoGNet, its first minute padded.
-pub const FOGNET: Method = fog("fognet", "FoGNet");
-/// FoGNet, its first minute uncorrected.
-pub const FOGNET_NOPAD: Method = fog("fognet_nopad", "FoGNet, no padding");
 
 /// What a method makes of a sequence.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,12 +58,12 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl
         Err(error) => estimates.refused = Some(error.to_string()),
     }
     if sequence.has_vendor {
-        estimates.add(VENDOR, || rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
+        estimates.add(Method::VENDOR, || rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
     }
     let fog: Vec<f64> = sequence.steps.iter().map(|step| step.fog / DT).collect();
-    estimates.add(FOG, || fog.clone());
+    estimates.add(Method::FOG, || fog.clone());
     let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
-    estimates.add(FOG_EARTH, || fog.iter().map(|rate| rate - earth).collect());
+    estimates.add(Method::FOG_EARTH, || fog.iter().map(|rate| rate - earth).collect());
     estimates
 }
 
@@ -133,10 +79,12 @@ impl Estimates {
         if !sequence.has_gyro {
             return;
         }
-        for (method, padding) in [(FOGNET, FogConfig::DEFAULT.padding), (FOGNET_NOPAD, Padding::None)] {
+        for (method, padding) in
+            [(Method::FOGNET, FogConfig::DEFAULT.padding), (Method::FOGNET_NOPAD, Padding::None)]
+        {
             let started = Instant::now();
             let config = FogConfig { padding, ..FogConfig::DEFAULT };
-            let drive = fog_drive::run(sequence, network, config, &mut tick);
+            let drive = fog_replay::run(sequence, network, config, &mut tick);
             let run_time = started.elapsed().as_secs_f64();
             let turns = drive.turns[self.start..].to_vec();
             self.methods.push(Estimate { method, turns, run_time });
@@ -156,21 +104,21 @@ impl Estimates {
         let started = Instant::now();
         // The paper's network alone: no zero-rate updates behind it.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let drive = Drive::run(recording, &config, None, network, &mut tick);
+        let drive = Replay::run(recording, &config, None, network, &mut tick);
         let run_time = started.elapsed().as_secs_f64();
         let wheels = WheelFrames::new(recording);
-        let looped = Drive::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
-        self.add(RAW, || constant(0.0));
+        let looped = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
+        self.add(Method::RAW, || constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {
             Ok((drive, looped)) => {
                 let still = &gyro[..self.start];
-                self.add(STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
+                self.add(Method::STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
                 for (method, rates) in [
-                    (GYRONET, corrected(&drive, &gyro, |step| step.settled)),
-                    (GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.vehicle.prompt.rate)),
+                    (Method::GYRONET, corrected(&drive, &gyro, |step| step.settled)),
+                    (Method::GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.vehicle.prompt.rate)),
                     // The last steps of the drive have not gone out yet.
                     (
-                        GYRONET_LOOP,
+                        Method::GYRONET_LOOP,
                         corrected(&looped, &gyro, |step| {
                             step.navigation.map_or(step.settled, |sent| sent.rate)
                         }),
@@ -184,10 +132,10 @@ impl Estimates {
             }
             Err(error) => self.refused = Some(error.to_string()),
         }
-        self.add(FIR, || fir::filter(&fir::Design::PAPER.taps(), &gyro));
+        self.add(Method::FIR, || fir::filter(&fir::Design::PAPER.taps(), &gyro));
         let filter = || vqf_rs::VQF::new(DT, None, None, None);
-        self.add(VQF, || vqf(sequence, filter()));
-        self.add(VQF_VEHICLE, || {
+        self.add(Method::VQF, || vqf(sequence, filter()));
+        self.add(Method::VQF_VEHICLE, || {
             let mut filter = filter();
             // Three times the spread that static initialisation allows: VQF looks at each sample.
             let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
@@ -209,7 +157,7 @@ impl Estimates {
 
 /// One of the rates of each step; where the board got no sample, the gyro's value in between, less
 /// what was last taken off.
-fn corrected(drive: &Drive, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
+fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
     let mut steps = drive.steps.iter().peekable();
     let mut taken_off = 0.0;
     let rate = |(k, gyro): (usize, &f64)| {

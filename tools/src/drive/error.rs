@@ -1,0 +1,158 @@
+//! Errors of recorded drives and of data sets, which name the file and, where there is one, line and column.
+
+use std::fmt;
+
+/// An error of one file: where it is, and what is wrong there.
+#[derive(Debug)]
+pub struct DataError {
+    /// The file or folder.
+    pub path: String,
+    /// The line, the first one being 1.
+    pub line: Option<u64>,
+    /// The name or the number of the column.
+    pub column: Option<String>,
+    /// What is wrong.
+    pub fault: DataFault,
+}
+
+impl DataError {
+    /// Returns an error of a whole file.
+    #[must_use]
+    pub fn of(path: impl fmt::Display, fault: DataFault) -> Self {
+        Self { path: path.to_string(), line: None, column: None, fault }
+    }
+
+    /// Returns an error of one line.
+    #[must_use]
+    pub fn at(path: impl fmt::Display, line: u64, fault: DataFault) -> Self {
+        Self { line: Some(line), ..Self::of(path, fault) }
+    }
+
+    /// Returns an error of one field.
+    #[must_use]
+    pub fn value(
+        path: impl fmt::Display,
+        line: u64,
+        column: impl fmt::Display,
+        text: &str,
+        error: ValueError,
+    ) -> Self {
+        let fault = DataFault::Value { text: text.to_owned(), error };
+        Self { column: Some(column.to_string()), ..Self::at(path, line, fault) }
+    }
+
+    /// Returns the error of a file that cannot be opened.
+    #[must_use]
+    pub fn open(path: impl fmt::Display, source: std::io::Error) -> Self {
+        let missing = source.kind() == std::io::ErrorKind::NotFound;
+        Self::of(path, if missing { DataFault::Missing } else { DataFault::Io(source) })
+    }
+}
+
+impl std::error::Error for DataError {}
+
+impl fmt::Display for DataError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.path)?;
+        match (self.line, &self.column) {
+            (Some(line), Some(column)) => write!(f, "line {line}, column {column}: ")?,
+            (Some(line), None) => write!(f, "line {line}: ")?,
+            (None, _) => {}
+        }
+        self.fault.fmt(f)
+    }
+}
+
+/// What is wrong with a file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each fault names its fields")]
+pub enum DataFault {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// The file is no CSV in UTF-8.
+    #[error(transparent)]
+    Csv(#[from] csv::Error),
+    /// A file that the data set has does not exist.
+    #[error("missing")]
+    Missing,
+    /// The folder belongs to neither data set.
+    #[error(
+        "neither a KAIST Urban sequence (a folder with sensor_data in it) nor an NCLT one (with kvh.csv or ms25.csv)"
+    )]
+    UnknownLayout,
+    /// The file has no rows.
+    #[error("holds no samples")]
+    Empty,
+    /// The header lacks a column.
+    #[error("column {0} is missing")]
+    MissingColumn(&'static str),
+    /// A row has more or fewer fields than the header.
+    #[error("{found} fields, the header has {expected}")]
+    Fields { found: usize, expected: usize },
+    /// A row has more or fewer columns than the data set.
+    #[error("{found} columns, expected {expected}")]
+    Columns { found: usize, expected: usize },
+    /// A field is not what its column needs.
+    #[error("{text:?} is {error}")]
+    Value { text: String, error: ValueError },
+    /// Time does not rise.
+    #[error("time goes {} from {last_s:.4} s to {at_s:.4} s",
+        if at_s < last_s { "backwards" } else { "nowhere" })]
+    Time { last_s: f64, at_s: f64 },
+    /// A stamp is earlier than the one before.
+    #[error("time goes backwards from {last} to {at}")]
+    Backwards { last: i64, at: i64 },
+    /// The file stops for so long that what follows is another drive.
+    #[error("silent for {seconds:.0} s before it, at most {most} s are one drive")]
+    Silent { seconds: f64, most: f64 },
+    /// The recording is too short for static initialisation.
+    #[error("is {seconds:.2} s long, static initialisation alone needs {needed} s")]
+    TooShort { seconds: f64, needed: f64 },
+    /// The files of a sequence have too little time in common.
+    #[error("its files have {seconds:.2} s in common, needed are {needed} s")]
+    TooLittleInCommon { seconds: f64, needed: f64 },
+    /// The median period is not that of 100 Hz.
+    #[error("is sampled at {hz:.1} Hz, should be 100 Hz")]
+    Rate { hz: f64 },
+    /// A wheel, 1 to 4, turns during static initialisation; its mean rate over a second is in rad/s.
+    #[error("starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s")]
+    Moving { line: u64, wheel: usize, rate: f64 },
+    /// The calibration lacks a parameter, or it is no positive number.
+    #[error("no usable parameter {0:?}")]
+    Parameter(&'static str),
+    /// The sequence has no inertial sensor, which the request needs.
+    #[error("xsens_imu.csv has 8 columns: no gyro and no accelerometer")]
+    NoGyro,
+    /// The note that a sequence is simulated cannot be parsed.
+    #[error(transparent)]
+    Marker(#[from] serde_json::Error),
+}
+
+/// What is wrong with one field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ValueError {
+    /// The field is empty.
+    #[error("empty")]
+    Empty,
+    /// The field is text.
+    #[error("not a number")]
+    NotANumber,
+    /// The field is NaN or an infinity.
+    #[error("not finite")]
+    NotFinite,
+    /// No part of this kind can measure so much, or the time is before zero.
+    #[error("out of range")]
+    OutOfRange,
+}
+
+impl From<gyronet::units::RangeError> for ValueError {
+    fn from(error: gyronet::units::RangeError) -> Self {
+        match error {
+            gyronet::units::RangeError::NotFinite => Self::NotFinite,
+            _ => Self::OutOfRange,
+        }
+    }
+}

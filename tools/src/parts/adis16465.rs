@@ -1,0 +1,85 @@
+//! Bursts of an ADIS16465-2, through the driver and a simulated SPI bus.
+//!
+//! The part sends 16 bits of each reading and no time: the driver stamps a sample with the time of its read.
+
+use super::{Part, Sent, ViaError};
+use crate::drive::recording::Recording;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use gyronet::sample::ImuSample;
+use gyronet::sensor::adis16465::{Adis16465, BURST, Burst, DiagStat, Model};
+use gyronet::units::STANDARD_GRAVITY;
+use std::convert::Infallible;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The model with a range of 500 deg/s.
+pub const MODEL: Model = Model::Adis16465_2;
+/// Bytes on the bus for one read: the command and the burst.
+const READ_BYTES: u64 = 2 + BURST as u64;
+/// Counts of 0.1 degrees C; a room's.
+const TEMPERATURE: i16 = 250;
+
+pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+    let bus = Bus::default();
+    let mut part = Adis16465::new(bus.clone(), MODEL);
+    let mut samples = Vec::with_capacity(recording.rows.len());
+    for (number, row) in recording.rows.iter().enumerate() {
+        bus.answer(burst(number, &row.sample).emit());
+        let sample = part.read(row.sample.time);
+        let no_sample = |error| Part::Adis16465.no_sample(recording, row, error);
+        samples.push(ImuSample { validity: row.sample.validity, ..sample.map_err(no_sample)? });
+    }
+    let bytes = READ_BYTES * samples.len() as u64;
+    Ok((samples, bytes))
+}
+
+/// The steps of a rate in rad/s and of an acceleration in m/s^2.
+pub fn steps() -> [f64; 2] {
+    let [per_rad, per_force] = counts();
+    [1.0 / per_rad, 1.0 / per_force]
+}
+
+/// Counts in one rad/s and in one m/s^2.
+fn counts() -> [f64; 2] {
+    let per_rad = f64::from(MODEL.counts_per_dps()).to_degrees();
+    [per_rad, f64::from(MODEL.counts_per_g()) / f64::from(STANDARD_GRAVITY)]
+}
+
+/// Returns the burst of a sample, its readings rounded to the part's steps.
+pub fn burst(number: usize, sample: &ImuSample) -> Burst {
+    let [per_rad, per_force] = counts();
+    let count = |value: f64| libm::round(value) as i16;
+    Burst {
+        diagnosis: DiagStat::default(),
+        rate: sample.angular_rate.map(|rate| count(rate.rad_per_sec() * per_rad)),
+        acceleration: sample.specific_force.map(|force| count(force.metre_per_sec2() * per_force)),
+        temperature: TEMPERATURE,
+        counter: number as u16,
+    }
+}
+
+/// A bus on which every read gives the same bytes until others are set.
+#[derive(Debug, Clone, Default)]
+pub struct Bus(Arc<Mutex<[u8; BURST]>>);
+
+impl Bus {
+    /// Sets the bytes of the next reads.
+    pub fn answer(&self, burst: [u8; BURST]) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = burst;
+    }
+}
+
+impl ErrorType for Bus {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Bus {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let burst = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        for operation in operations {
+            if let Operation::Read(to) = operation {
+                to.iter_mut().zip(burst).for_each(|(to, byte)| *to = byte);
+            }
+        }
+        Ok(())
+    }
+}
