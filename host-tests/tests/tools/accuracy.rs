@@ -21,7 +21,7 @@ const SCALE: f64 = 0.02;
 /// 1 s yaw error over that of static initialisation, trials 09 and 11, by `cargo gyronet evaluate`: the README's rows of
 /// what is sent. A change for the worse by more than [`WORSE`] fails, and one for the better is worth a new number.
 const HEADLINE: [(Method, [f64; 2]); 2] =
-    [(Method::PROMPT, [1.100, 0.687]), (Method::NAVIGATION, [0.711, 0.491])];
+    [(Method::PROMPT, [1.100, 0.687]), (Method::NAVIGATION, [0.688, 0.487])];
 const WORSE: f64 = 0.05;
 
 #[test]
