@@ -29,7 +29,7 @@ pub use mode::{DELAY, Hop, Lag, Mode, OutOfRange};
 
 use crate::model::Corrections;
 use crate::model::window::WINDOW;
-use crate::sample::Validity;
+use crate::sample::{RATE_HZ, Validity};
 use crate::units::AngularRate;
 
 /// The way from estimates of the gyro's error to corrected rates.
@@ -67,6 +67,10 @@ impl CompensateConfig {
 
 /// Samples over which a carry may be spread before it is reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
+/// The number of quarters of a second of standing whose angle may still be carried: the last second and the quarter that
+/// is not over. Wheels show late that a vehicle pulls away, but not later than that.
+const HELD_QUARTERS: usize = 5;
+
 /// Samples that are kept: the newest, and as many before it as a window can still change.
 const KEPT: usize = Lag::MAX.samples() + 1;
 
@@ -144,16 +148,26 @@ pub struct Compensator {
     /// Revisions not yet in the prompt rate, and in the navigation rate.
     prompt_carry: i64,
     navigation_carry: i64,
-    /// The part of the navigation rate that standstill set to zero, beyond the estimates: in the second before the
-    /// last [`Compensator::confirm_standstill`], and since.
-    held: [i64; 2],
+    /// The part of the navigation rates that standstill set to zero, beyond the estimates: in this quarter of a second
+    /// of standing and in those before it.
+    held: [i64; HELD_QUARTERS],
+    /// The number of samples until the next quarter.
+    held_until: u32,
 }
 
 impl Compensator {
     /// Begins without an estimate.
     #[must_use]
     pub const fn new(config: CompensateConfig) -> Self {
-        Self { config, kept: [None; KEPT], prior: 0, prompt_carry: 0, navigation_carry: 0, held: [0; 2] }
+        Self {
+            config,
+            kept: [None; KEPT],
+            prior: 0,
+            prompt_carry: 0,
+            navigation_carry: 0,
+            held: [0; HELD_QUARTERS],
+            held_until: 0,
+        }
     }
 
     /// Sets the configuration, before the first sample.
@@ -189,7 +203,7 @@ impl Compensator {
             let age = KEPT - 1 - (oldest + place);
             match (age >= lag.samples(), entry.held) {
                 (true, false) => self.navigation_carry += revision,
-                (true, true) => self.held[1] -= revision,
+                (true, true) => self.held[0] -= revision,
                 (false, _) => {}
             }
         }
@@ -222,7 +236,12 @@ impl Compensator {
         entry.held = stands && entry.validity.is_good();
         let mut taken = i64::from(entry.estimate) + i64::from(bias.0);
         if entry.held {
-            self.held[1] += i64::from(entry.rate) - taken;
+            if self.held_until == 0 {
+                self.held.rotate_right(1);
+                (self.held[0], self.held_until) = (0, RATE_HZ / 4);
+            }
+            self.held_until -= 1;
+            self.held[0] += i64::from(entry.rate) - taken;
             taken = i64::from(entry.rate);
         }
         Some(emit(entry, taken, &mut self.navigation_carry, self.config.max_carry))
@@ -245,16 +264,11 @@ impl Compensator {
         self.prior = 0;
     }
 
-    /// Confirms that the vehicle stood until the last call of this function; it still stands.
-    pub fn confirm_standstill(&mut self) {
-        self.held = [self.held[1], 0];
-    }
-
-    /// Notes that the vehicle stands no more. It may have moved before that was noticed, so the confirmed
-    /// part of what was held at zero stays zero, and the rest is carried into the next rates.
+    /// Notes that the vehicle stands no more. It may have moved before that was noticed, so what was held at zero in the
+    /// last second is carried into the next rates; what was before stays zero.
     pub fn end_standstill(&mut self) {
-        let [before, since] = core::mem::take(&mut self.held);
-        self.navigation_carry -= before + since;
+        self.navigation_carry -= core::mem::take(&mut self.held).iter().sum::<i64>();
+        self.held_until = 0;
     }
 
     /// Returns whether the navigation rates have more to carry than a window revises, because the wheels stood

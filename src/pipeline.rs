@@ -309,10 +309,7 @@ impl Pipeline {
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(settled)) = (zero_rate, settled) else { return };
         match zero_rate.observe(settled.left(), source, sample.temperature) {
-            Some(ZeroRateOutcome::Used) => {
-                count(&mut counters.zero_rate_updates, 1);
-                compensator.confirm_standstill();
-            }
+            Some(ZeroRateOutcome::Used) => count(&mut counters.zero_rate_updates, 1),
             Some(ZeroRateOutcome::Refused) => count(&mut counters.contradicted, 1),
             Some(ZeroRateOutcome::Waits) | None => {}
         }

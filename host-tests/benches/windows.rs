@@ -3,47 +3,46 @@
 //! Compare with what others need for the same network on an x86 core: ONNX Runtime int8 50 us,
 //! RTNeural 54 us, ONNX Runtime f32 65 us, PyTorch 330 us.
 
-use criterion::{Criterion, criterion_group, criterion_main};
 use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet_tools::network::checkpoint::{self, Checkpoint};
+use gyronet_host_tests::noise::Noise;
 use std::hint::black_box;
-use std::path::Path;
+use std::time::Instant;
 
-/// A car's accelerations and rates, roughly: 1 m/s^2 and 0.02 rad/s of everything.
+/// Rounds, of which the median counts, and windows in each.
+const ROUNDS: usize = 101;
+const WINDOWS: u32 = 100;
+
+/// A car's accelerations and rates, roughly: up to 1 m/s^2 and 0.02 rad/s of everything.
 fn window() -> [Features; WINDOW] {
-    let mut state = 1u32;
-    std::array::from_fn(|_| {
-        std::array::from_fn::<i32, FEATURES, _>(|k| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let uniform = f64::from(state) / f64::from(u32::MAX) * 2.0 - 1.0;
-            let (size, per_unit) = if k < 3 {
-                (1.0, SpecificForce::PER_METRE_PER_SEC2)
-            } else {
-                (0.02, AngularRate::PER_RAD_PER_SEC)
-            };
-            (uniform * size * f64::from(per_unit)) as i32
-        })
-    })
+    let mut noise = Noise::new(1);
+    let force = i64::from(SpecificForce::PER_METRE_PER_SEC2 as i32);
+    let rate = i64::from(AngularRate::PER_RAD_PER_SEC as i32) / 50;
+    let mut code =
+        |axis| noise.int(if axis < 3 { -force } else { -rate }, if axis < 3 { force } else { rate });
+    std::array::from_fn(|_| std::array::from_fn::<i32, FEATURES, _>(|axis| code(axis) as i32))
 }
 
-fn windows(criterion: &mut Criterion) {
+/// Prints the median time of a window.
+fn measure<T>(name: &str, mut run: impl FnMut() -> T) {
+    let mut rounds: Vec<f64> = (0..ROUNDS)
+        .map(|_| {
+            let start = Instant::now();
+            (0..WINDOWS).for_each(|_| drop(black_box(run())));
+            start.elapsed().as_secs_f64() * 1e6 / f64::from(WINDOWS)
+        })
+        .collect();
+    rounds.sort_by(f64::total_cmp);
+    println!("{name}: {:.1} us, fastest {:.1} us", rounds[ROUNDS / 2], rounds[0]);
+}
+
+fn main() {
     let window = window();
     let mut integer = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
-    criterion.bench_function("gyronet/window", |bench| {
-        bench.iter(|| integer.estimate(black_box(&window)));
-    });
-    criterion.bench_function("gyronet/newest", |bench| {
-        bench.iter(|| integer.estimate_newest(black_box(&window)));
-    });
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tools/weights/gyronet.safetensors");
-    let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&path).expect("the checkpoint is good");
+    measure("gyronet/window", || integer.estimate(black_box(&window)));
+    measure("gyronet/newest", || integer.estimate_newest(black_box(&window)));
+    let checkpoint = gyronet_tools::bundled::checkpoint().expect("the checkpoint is good");
     let mut reference = checkpoint.network();
-    criterion.bench_function("gyronet/f32", |bench| {
-        bench.iter(|| reference.estimate(black_box(&window)));
-    });
+    measure("gyronet/f32", || reference.estimate(black_box(&window)));
 }
-
-criterion_group!(benches, windows);
-criterion_main!(benches);

@@ -1,6 +1,5 @@
-//! Everything connected: what comes over the lines of a board that has an MTi, a fibre-optic gyro that
-//! is simulated from the reference, and wheel frames over SLCAN; with a board in the emulator and
-//! one on the host taking the same, one input after the other.
+//! A board with everything connected: an MTi, a fibre-optic gyro that is simulated from the reference, and wheel frames
+//! over SLCAN. A board in the emulator and one on the host take the same inputs, one after the other.
 
 use crate::recordings::Row;
 use crate::{qemu, replay};
@@ -21,33 +20,32 @@ const LIMIT: Duration = Duration::from_secs(60);
 const IMU: usize = 1;
 const SLCAN: usize = 2;
 const FOG: usize = 3;
-const SERVICE: usize = 6;
-/// Lines that a board needs for it.
-pub const USARTS: usize = SERVICE;
-/// Messages of the gyro in 10 ms.
+/// The number of USARTs that such a board needs.
+pub const USARTS: usize = qemu::SERVICE;
+/// The gyro sends so many messages in 10 ms.
 const MESSAGES: usize = 10;
-/// Frames of one sample of the MTi.
+/// A sample of the MTi makes so many frames.
 const SET: usize = 6;
-/// How TX1 begins when the sensor is silent: no rate, failed.
+/// TX1 begins like this when the sensor is silent: no rate, failed.
 const SILENT: &[u8] = b"t1748008020FF0080";
-/// Samples from one wheel frame to the next.
+/// The number of samples from one wheel frame to the next.
 const WHEELS: usize = 2;
-/// It stands for so many samples.
+/// The vehicle stands for so many samples.
 const STANDING: usize = 600;
 
-/// What comes in 10 ms, in this order.
+/// The inputs of 10 ms, in their order.
 #[derive(Debug, Clone)]
 pub struct Step {
-    /// Of all four wheels.
+    /// The frame of all four wheels, where one comes.
     pub wheels: Option<DataFrame>,
-    /// From the MTi.
+    /// The message of the MTi.
     pub imu: MtData2,
-    /// From the fibre-optic gyro.
+    /// The bytes of the fibre-optic gyro.
     pub fog: Vec<u8>,
 }
 
 impl Step {
-    /// What comes with a row.
+    /// Returns the inputs that belong to a row.
     #[must_use]
     pub fn of(number: usize, row: &Row) -> Self {
         let speed = if number < STANDING { 0.0 } else { 20.0 };
@@ -64,7 +62,7 @@ impl Step {
     }
 }
 
-/// Each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
+/// Returns each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
 #[must_use]
 pub fn reading(number: usize, row: &Row) -> f32 {
     // No gyro says the same for long.
@@ -72,8 +70,8 @@ pub fn reading(number: usize, row: &Row) -> f32 {
     (row.reference * 0.01 / MESSAGES as f64 + noise) as f32
 }
 
-/// What the gyro sends in the 10 ms that end with a row. It begins with the message that ends with the
-/// first row, so that a set of ours always comes with the last message.
+/// Returns the bytes that the gyro sends in the 10 ms that end with a row. It begins with the message that ends with
+/// the first row, so that a set of ours always comes with the last message.
 #[must_use]
 pub fn fog(number: usize, reading: f32) -> Vec<u8> {
     let message = |part: usize| Message {
@@ -87,14 +85,14 @@ pub fn fog(number: usize, reading: f32) -> Vec<u8> {
     (first..MESSAGES).flat_map(|part| message(part).emit().to_vec()).collect()
 }
 
-/// All wheels at a speed, km/h.
+/// Returns the frame of four wheels at the same speed, km/h.
 fn wheels(speed: f64) -> DataFrame {
     let code = ((speed + 67.67) * 100.0).round() as u16;
     let id = StandardId::new(0xAA).expect("11 bits");
     DataFrame::new(id, &[code.to_be_bytes(); 4].concat()).expect("eight bytes")
 }
 
-/// What comes over one line.
+/// An input over one line.
 enum Input {
     Wheels(DataFrame),
     Imu(Vec<u8>),
@@ -102,7 +100,7 @@ enum Input {
 }
 
 impl Input {
-    /// Whether what comes of it shows that all of it has been taken.
+    /// Gives it to the host's board. Returns whether the frames show that all of it has been taken.
     fn push(&self, host: &mut replay::Board) -> bool {
         match self {
             Self::Wheels(frame) => host.wheel(frame),
@@ -128,28 +126,26 @@ impl Input {
     }
 }
 
-/// What both boards have made of the same.
+/// The results of both boards.
 pub struct Outcome {
-    /// The host's, without what an emulated one says because its host is busy.
+    /// The host's board, which never finds its sensor silent.
     pub host: replay::Board,
-    /// The host's that has followed.
+    /// The host's board that was silent where the emulated one was.
     pub followed: replay::Board,
-    /// Frames of the emulated one.
+    /// The number of frames of the emulated one.
     pub sent: usize,
-    /// What it has counted.
+    /// The counters of the emulated one.
     pub counters: AllCounters,
 }
 
-/// Gives each input to the emulated board when it has taken the one before: which comes first is
-/// part of what both must make the same of. Every frame must be the host's.
+/// Gives each input to the emulated board when it has taken the one before, since their order counts. Every frame must
+/// equal the host's.
 ///
 /// # Panics
 /// When one is not, or frames are missing.
 #[must_use]
 pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step]) -> Outcome {
-    let port = board.serve(SERVICE).to_string();
-    let mut device = Device::new(Line::open(&port).expect("the harness listens"), &port);
-    board.send(SERVICE, &[0], LIMIT);
+    let mut device = board.device(LIMIT);
     let weights = || Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
     let mut host = replay::Board::configured(configuration, weights());
     let mut answers = 0;
@@ -181,16 +177,12 @@ pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step
     for input in &inputs {
         input.push(&mut followed);
     }
-    for (number, (line, expected)) in sent.iter().zip(&followed.lines).enumerate() {
-        let text = |line: &[u8]| line.escape_ascii().to_string();
-        assert_eq!(text(line), text(expected), "frame {number}");
-    }
-    assert!(sent.len() >= followed.lines.len(), "{} of {}", sent.len(), followed.lines.len());
+    replay::assert_same(&sent, &followed.lines);
     assert!(followed.followed < steps.len() as u64 / 10, "the host was busy: {}", followed.followed);
     Outcome { host, followed, sent: sent.len(), counters }
 }
 
-/// What the board has counted by now.
+/// Returns the counters of a board.
 ///
 /// # Panics
 /// Where it does not answer.
@@ -204,7 +196,7 @@ pub fn counters(device: &mut Device<Line>) -> AllCounters {
     }
 }
 
-/// What the host alone makes of it.
+/// Returns the host's board after these steps.
 #[must_use]
 pub fn on_host(steps: &[Step]) -> replay::Board {
     let mut host = replay::Board::new();
@@ -214,12 +206,12 @@ pub fn on_host(steps: &[Step]) -> replay::Board {
     host
 }
 
-/// Frames among lines; the answers to the wheel frames left out.
+/// Returns the frames among lines, without the answers to the wheel frames.
 fn frames(lines: &[Vec<u8>]) -> Vec<Vec<u8>> {
     lines.iter().filter(|line| line.starts_with(b"t")).cloned().collect()
 }
 
-/// Frames with an identifier of 11 bits among lines, each with the number of the MTi's sample before it.
+/// Returns the frames with an identifier of 11 bits among lines, each with the number of the MTi's sample before it.
 pub fn of(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, DataFrame)> {
     let id = Id::Standard(StandardId::new(id).expect("11 bits"));
     let frames = lines.iter().map(|line| slcan::parse::<DataFrame>(line).expect("a frame"));
@@ -230,7 +222,7 @@ pub fn of(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, DataFrame)
     numbered.filter(move |(_, frame)| frame.id() == id)
 }
 
-/// Rates with an identifier.
+/// Returns the rates with an identifier, each with the number of the MTi's sample before it.
 pub fn rates(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, RateMessage)> {
     of(lines, id).map(|(samples, frame)| (samples, RateMessage::parse(frame.data()).expect("a rate")))
 }

@@ -17,24 +17,24 @@ use std::rc::Rc;
 const WORD: usize = 4;
 const BYTES: usize = 1 << 20;
 
-/// What a power cut does to the operation that it hits.
+/// The ways in which a power cut hits an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cut {
-    /// It comes just before.
+    /// The cut comes just before the operation.
     Before,
-    /// In the middle: a word has some of its bits, a sector is partly erased, from its start on.
+    /// The cut comes in the middle: a word has some of its bits, a sector is erased from its start to somewhere.
     Front,
-    /// In the middle: any part of the sector may be erased.
+    /// The cut comes in the middle, and any part of the sector may be erased.
     Anywhere,
-    /// In the middle, while the part still programs all of a sector's words to zero before it
+    /// The cut comes in the middle, while the part still programs all of a sector's words to zero before it
     /// erases them: any of them may be zero.
     Zeros,
-    /// It comes just after: the operation is done, but nobody hears of it.
+    /// The cut comes just after: the operation is done, but not reported.
     After,
 }
 
 impl Cut {
-    /// All of them.
+    /// All ways, in the order of their effect.
     pub const ALL: [Self; 5] = [Self::Before, Self::Front, Self::Anywhere, Self::Zeros, Self::After];
 
     const fn tears(self) -> bool {
@@ -42,12 +42,12 @@ impl Cut {
     }
 }
 
-/// Why an operation was not done.
+/// The reasons why an operation was not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MockError {
     /// There is no power.
     PowerCut,
-    /// Not a word or a sector.
+    /// The range is not a word or a sector.
     Alignment,
 }
 
@@ -67,7 +67,7 @@ enum Word {
     Torn,
 }
 
-/// The whole flash.
+/// The whole flash of an STM32F405.
 #[derive(Debug, Clone)]
 pub struct F405 {
     words: Vec<u32>,
@@ -79,7 +79,7 @@ pub struct F405 {
 }
 
 impl Default for F405 {
-    /// As it leaves the factory.
+    /// Returns an erased flash.
     fn default() -> Self {
         Self {
             words: vec![u32::MAX; BYTES / WORD],
@@ -93,7 +93,7 @@ impl Default for F405 {
 }
 
 impl F405 {
-    /// Operations (words programmed, sectors erased) so far.
+    /// Returns the number of operations (words programmed, sectors erased) so far.
     #[must_use]
     pub fn operations(&self) -> u64 {
         self.operations
@@ -104,13 +104,13 @@ impl F405 {
         self.cut = Some((self.operations + after, cut));
     }
 
-    /// Switches power on again; whether it had been cut.
+    /// Switches power on again. Returns whether it had been cut.
     pub fn restore(&mut self) -> bool {
         self.cut = None;
         !std::mem::replace(&mut self.powered, true)
     }
 
-    /// Its content.
+    /// Returns the content.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.words)
@@ -121,7 +121,7 @@ impl F405 {
         bytemuck::cast_slice_mut::<u32, u8>(&mut self.words)[offset] ^= bits;
     }
 
-    /// How far the next operation gets; `None`: to its end.
+    /// Returns how far the next operation gets; `None`: to its end.
     fn step(&mut self) -> Result<Option<Cut>, MockError> {
         if !self.powered {
             return Err(MockError::PowerCut);
@@ -177,7 +177,7 @@ pub struct Region<const SECTOR: usize> {
 }
 
 impl<const SECTOR: usize> Region<SECTOR> {
-    /// A range of a flash.
+    /// Returns a range of a flash.
     #[must_use]
     pub fn new(flash: &Rc<RefCell<F405>>, range: Range<u32>) -> Self {
         Self { flash: Rc::clone(flash), range: range.start as usize..range.end as usize }
@@ -236,9 +236,9 @@ impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
     }
 }
 
-/// The weight slots, which can also be read in place.
+/// The weight slots of a flash, which can also be read in place.
 ///
-/// What [`MappedSlots::slots`] hands out is a copy of the content at the last operation: the
+/// [`MappedSlots::slots`] returns a copy of the content at the last operation: the
 /// mock's bytes are behind a cell.
 #[derive(Debug)]
 pub struct MappedRegion {
@@ -247,7 +247,7 @@ pub struct MappedRegion {
 }
 
 impl MappedRegion {
-    /// The slots of a flash.
+    /// Returns the slots of a flash.
     #[must_use]
     pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
         let mut mapped = Self { region: Region::new(flash, layout::SLOTS), copy: [Vec::new(), Vec::new()] };
@@ -255,7 +255,7 @@ impl MappedRegion {
         mapped
     }
 
-    /// Both slots.
+    /// The range of both slots.
     #[must_use]
     pub fn current(&self) -> [&[u8]; 2] {
         self.copy.each_ref().map(|words| bytemuck::cast_slice(words))

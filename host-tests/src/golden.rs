@@ -1,12 +1,12 @@
-//! What PyTorch made of some windows, layer by layer, as `tools/train` exports it.
+//! The outputs of PyTorch for some windows, layer by layer, as `tools/train` exports them.
 
 use crate::recordings::workspace;
 use safetensors::{Dtype, SafeTensors};
 
-/// Windows in each file.
+/// The number of windows in each file.
 pub const WINDOWS: usize = 8;
-/// f32 sums of a few hundred products of order 1, twice over, in another order than PyTorch's. A
-/// normalised input of 20 has an LSB of 2e-6; all else stays within 1.
+/// The largest difference: f32 sums of a few hundred products of order 1, twice over, in another order than PyTorch's.
+/// A normalised input of 20 has an LSB of 2e-6; all else stays within 1.
 const TOLERANCE: f32 = 1e-5;
 
 /// A file of golden tensors.
@@ -14,7 +14,7 @@ const TOLERANCE: f32 = 1e-5;
 pub struct Golden(Vec<u8>);
 
 impl Golden {
-    /// Of a network, `gyronet` or `fognet`.
+    /// Reads the tensors of a network, `gyronet` or `fognet`.
     ///
     /// # Panics
     /// Unless it is in the repository.
@@ -24,7 +24,7 @@ impl Golden {
         Self(std::fs::read(path).expect("the committed tensors"))
     }
 
-    /// The values of a tensor, row-major.
+    /// Returns the values of a tensor, row-major.
     ///
     /// # Panics
     /// Unless it is there, in f32 and of this shape.
@@ -36,7 +36,7 @@ impl Golden {
         view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
     }
 
-    /// Holds a layer's outputs against the tensor of its name.
+    /// Compares a layer's outputs with the tensor of its name.
     ///
     /// # Panics
     /// Where they differ by more than rounding explains, or the tensor is all zeros.

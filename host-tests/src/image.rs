@@ -1,4 +1,4 @@
-//! The firmware images, built as `cargo fw` builds them.
+//! The firmware images, built as `cargo fw` builds them, so that the tests run what is flashed.
 
 use crate::qemu;
 use crate::recordings::workspace;
@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// The ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for the emulated board, for a test that is
-/// skipped (aloud) where the target's standard library is not installed.
+/// Returns the ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for the emulated board; the test is
+/// reported as skipped where the target's standard library is not installed.
 ///
 /// Each image is built once in a process, under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the
 /// build folder of `cargo test` itself may be locked.
@@ -21,7 +21,7 @@ pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
     firmware_for("netduino-plus-2", test, scratch, image)
 }
 
-/// The same for another board, named by its feature.
+/// Returns the ELF file of an image for another board, named by its feature.
 ///
 /// # Panics
 /// As [`firmware`].
@@ -42,7 +42,7 @@ pub fn firmware_for(board: &str, test: &str, scratch: &str, image: &str) -> Opti
     Some(elf)
 }
 
-/// The image that is flashed, for a test that is skipped (aloud) where it cannot be built or run.
+/// Returns the ELF file of the image that is flashed; the test is reported as skipped where it cannot be built or run.
 #[must_use]
 pub fn coprocessor(test: &str, scratch: &str) -> Option<PathBuf> {
     qemu::available(test)?;

@@ -1,9 +1,9 @@
-//! Seeded randomness for long streams: the same on every machine, every time. And the settings
-//! of the property tests, whose seeds change from run to run.
+//! Random numbers from a seed for long streams, the same on every machine and every time; and the settings of the
+//! property tests, whose seeds change from run to run.
 
 use proptest::test_runner::Config;
 
-/// So many cases, and no file of failed ones beside the sources: the message has the input.
+/// Returns the settings for so many cases. Failed ones are not written beside the sources: the message has the input.
 #[must_use]
 pub fn cases(count: u32) -> Config {
     // Miri looks at every access of a case: a few are enough there.
@@ -11,18 +11,18 @@ pub fn cases(count: u32) -> Config {
     Config { cases, failure_persistence: None, ..Config::default() }
 }
 
-/// SplitMix64 (Steele, Lea, Flood: Fast Splittable Pseudorandom Number Generators, 2014).
+/// The generator SplitMix64 (Steele, Lea, Flood: Fast Splittable Pseudorandom Number Generators, 2014).
 #[derive(Debug, Clone)]
 pub struct Noise(u64);
 
 impl Noise {
-    /// A stream of its own for each seed.
+    /// Returns the stream of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -30,19 +30,19 @@ impl Noise {
         z ^ (z >> 31)
     }
 
-    /// A random byte.
+    /// Returns a random byte.
     pub fn byte(&mut self) -> u8 {
         self.bits().to_le_bytes()[7]
     }
 
-    /// One of `from..=to`.
+    /// Returns one of `from..=to`.
     pub fn int(&mut self, from: i64, to: i64) -> i64 {
         let span = to.abs_diff(from) as u128 + 1;
         // The high half of a 64 x 64 bit product: even to one part in 2^64 / span.
         from + ((u128::from(self.bits()) * span) >> 64) as i64
     }
 
-    /// Approximately normal, mean 0, variance 1: the sum of twelve uniform numbers.
+    /// Returns an approximately normal number, mean 0, variance 1: the sum of twelve uniform numbers.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.bits() as f64 / u64::MAX as f64).sum::<f64>() - 6.0
     }
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn published_values() {
+    fn the_stream_is_that_of_the_reference_code() {
         // First outputs for seed 1234567, as in the reference C code.
         let mut noise = Noise::new(1_234_567);
         assert_eq!(noise.bits(), 6_457_827_717_110_365_317);
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges() {
+    fn an_int_has_every_value_of_its_range() {
         let mut noise = Noise::new(1);
         let (mut low, mut high) = (0, 0);
         for _ in 0..1_000 {

@@ -1,4 +1,4 @@
-//! LSTM weights row by row, and packed the way that the documentation of `gyronet::nn::lstm`
+//! LSTM weights row by row, and packed in the way that the documentation of `gyronet::nn::lstm`
 //! says: written from there, not from the quantiser.
 
 use crate::noise::Noise;
@@ -8,18 +8,18 @@ use gyronet::nn::{GATES, HIDDEN_MAX};
 /// One gate row of one unit.
 #[derive(Debug, Clone, Default)]
 pub struct Row {
-    /// In accumulator units.
+    /// The bias, in accumulator units.
     pub bias: i32,
-    /// Gate input = accumulator * multiplier / 2^16.
+    /// The multiplier: gate input = accumulator * multiplier / 2^16.
     pub multiplier: i16,
-    /// Over the inputs.
+    /// The weights of the inputs.
     pub input: Vec<i8>,
-    /// Over the hidden state.
+    /// The weights of the hidden state.
     pub recurrent: Vec<i8>,
 }
 
 impl Row {
-    /// The largest sum that inputs up to `input_max` and any hidden state can give, bias
+    /// Returns the largest sum that inputs up to `input_max` and any hidden state can give, bias
     /// included.
     #[must_use]
     pub fn bound(&self, input_max: i32) -> i64 {
@@ -29,7 +29,7 @@ impl Row {
         sum(&self.input, input_max) + sum(&self.recurrent, HIDDEN_MAX) + i64::from(self.bias.unsigned_abs())
     }
 
-    /// Random weights up to `largest`, thinned until the row's bound stays below `limit`; the
+    /// Returns random weights up to `largest`, thinned until the row's bound stays below `limit`; the
     /// bias may take all that is left.
     fn random(
         noise: &mut Noise,
@@ -60,7 +60,7 @@ impl Row {
 pub struct Rows(pub Vec<[Row; GATES]>);
 
 impl Rows {
-    /// Random rows within what the kernel can hold for inputs up to `input_max`.
+    /// Returns random rows within what the kernel can hold for inputs up to `input_max`.
     #[must_use]
     pub fn random(noise: &mut Noise, inputs: usize, units: usize, input_max: i32) -> Self {
         let mut row = |gate: usize| {
@@ -70,7 +70,7 @@ impl Rows {
         Self((0..units).map(|_| std::array::from_fn(&mut row)).collect())
     }
 
-    /// In reading order.
+    /// Returns the packed words in reading order.
     #[must_use]
     pub fn pack(&self) -> Packed {
         let mut packed =
@@ -89,14 +89,14 @@ impl Rows {
     }
 }
 
-/// Two halfwords in a word, the first one lower.
+/// Packs two halfwords into a word, the first one lower.
 #[must_use]
 pub fn word(first: i16, second: i16) -> u32 {
     let ([a, b], [c, d]) = (first.to_le_bytes(), second.to_le_bytes());
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// Packed words of rows i, f, g, o, their columns filled up with zeros to a multiple.
+/// Returns the packed words of rows i, f, g, o, their columns filled up with zeros to a multiple.
 fn columns(out: &mut Vec<u32>, mut rows: [Vec<i8>; GATES], multiple: usize) {
     for row in &mut rows {
         row.resize(row.len().next_multiple_of(multiple), 0);
@@ -120,7 +120,7 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// As the kernel takes them.
+    /// Returns the weights as the kernel takes them.
     ///
     /// # Panics
     /// When the kernel does not take records of this size.

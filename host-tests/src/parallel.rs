@@ -1,6 +1,6 @@
-//! Drives side by side: each takes a core for tens of seconds.
+//! Recordings side by side, because each of them keeps a core busy for seconds.
 
-/// A table of the lines that `judge` gives for each item, printed; what does not hold is told with it.
+/// Prints a table of the lines that `judge` returns for each item; what does not hold is reported with it.
 ///
 /// # Panics
 /// Where something does not hold.
@@ -11,7 +11,7 @@ pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String,
     assert!(failures.concat().is_empty(), "{failures:#?}\n{table}");
 }
 
-/// What `judge` says of each item, a thread for each, in their order.
+/// Returns the results of `judge` for each item in their order; each item has a thread.
 ///
 /// # Panics
 /// When one of them does.

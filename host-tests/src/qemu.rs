@@ -1,19 +1,23 @@
-//! The emulated board for tests: [`gyronet_tools::target::emulator`], whose errors end the test.
+//! The emulated board for tests: [`gyronet_tools::target::emulator`] with errors that end the test.
 
 use crate::require::{self, Need};
+use gyronet_tools::client::device::{Device, line::Line};
 use gyronet_tools::target::emulator::{self, Result};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
 
-/// Whether QEMU is there, for a test that is skipped (aloud) without it.
+/// The USART of the service line.
+pub const SERVICE: usize = 6;
+
+/// Looks for QEMU; without it reports that the test is skipped.
 #[must_use]
 pub fn available(test: &str) -> Option<()> {
     require::wants(test, Need::Qemu, emulator::available().map_err(|error| error.to_string()))
 }
 
-/// An emulated board that runs an image. Whatever goes wrong with it is a panic with QEMU's own
-/// words; what each method does stands with that of the same name in [`emulator::Board`].
+/// An emulated board that runs an image. Whatever goes wrong with it is a panic with QEMU's own words; each method is
+/// described at that of the same name in [`emulator::Board`].
 #[derive(Debug)]
 pub struct Board(emulator::Board);
 
@@ -60,6 +64,14 @@ impl Board {
     #[must_use]
     pub fn serve(&mut self, n: usize) -> SocketAddr {
         sure(self.0.serve(n))
+    }
+
+    /// Opens the service line, once the image listens to it, of a board with [`SERVICE`] USARTs.
+    #[must_use]
+    pub fn device(&mut self, limit: Duration) -> Device<Line> {
+        self.send(SERVICE, &[0], limit);
+        let port = self.serve(SERVICE).to_string();
+        Device::new(Line::open(&port).expect("the harness listens"), &port)
     }
 
     pub fn word(&mut self, address: u32) -> u32 {

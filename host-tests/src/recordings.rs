@@ -1,27 +1,27 @@
-//! The recordings of real drives. They are not part of the repository: their licence does not
-//! allow it.
+//! The recordings of real drives, which a test finds or is skipped. They are not part of the repository, because their
+//! licence does not allow it.
 
 use crate::require::{self, Need};
 use std::path::{Path, PathBuf};
 
-/// Points at the folder that holds `wid_car/`.
+/// The environment variable that names the folder with `wid_car/`.
 pub const VARIABLE: &str = "GYRONET_DATA";
 
-/// The repository's root.
+/// Returns the repository's root.
 #[must_use]
 pub fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("host-tests lies in the workspace")
 }
 
-/// Where the recordings are looked for: [`VARIABLE`], from the repository's root if relative,
-/// else `shared/data` beside the repository.
+/// Returns the folder of the recordings: [`VARIABLE`], from the repository's root if relative, else `shared/data`
+/// beside the repository.
 #[must_use]
 pub fn folder() -> PathBuf {
     let beside = || workspace().parent().unwrap_or(workspace()).join("shared/data");
     std::env::var_os(VARIABLE).map_or_else(beside, |folder| workspace().join(folder))
 }
 
-/// One drive of `wid_car`, for a test that is skipped (aloud) without it.
+/// Returns the file of one drive of `wid_car`; without it reports that the test is skipped.
 #[must_use]
 pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
     let path = folder().join(format!("wid_car/trial{number:02}_100hz.csv"));
@@ -36,17 +36,17 @@ pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
 /// One row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Seconds.
+    /// The time, s.
     pub time: f64,
-    /// m/s^2.
+    /// The acceleration, m/s^2.
     pub acceleration: [f32; 3],
-    /// rad/s.
+    /// The rate of turn, rad/s.
     pub rate_of_turn: [f32; 3],
-    /// The reference gyro's z axis, rad/s.
+    /// The rate of the reference gyro's z axis, rad/s.
     pub reference: f64,
 }
 
-/// The rows of a recording: a reader of the tests' own, to hold the tools' one against.
+/// Reads the rows of a recording. It is a reader of the tests' own, to compare the tools' one with.
 ///
 /// # Panics
 /// When the file is not of the layout of `wid_car`.

@@ -1,7 +1,7 @@
 //! The image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames in,
 //! SLCAN lines out. It is the input and output around the library's [`Coprocessor`], as the image is.
 
-use crate::recordings::Row;
+use crate::recordings::{self, Row, workspace};
 use gyronet::can::config::Config;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
@@ -15,11 +15,12 @@ use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::store::{Calibration, Configuration};
 use gyronet::units::Micros;
+use std::ops::Range;
 
-/// What the image sends.
+/// The messages that the image sends.
 pub const CONFIG: Config = Config::DEFAULT;
 
-/// The message that an MTi would send for a row.
+/// Returns the message that an MTi would send for a row.
 #[must_use]
 pub fn message(number: usize, row: &Row) -> MtData2 {
     MtData2 {
@@ -32,7 +33,29 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
     }
 }
 
-/// What it sends when the vehicle is level and turns at `yaw_rate`, rad/s, 10 ms after 10 ms.
+/// Returns samples of the simulated drive as an MTi sends them, message by message.
+///
+/// # Panics
+/// When the drive is shorter.
+#[must_use]
+pub fn simulated_drive(samples: Range<usize>) -> Vec<Vec<u8>> {
+    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
+    samples.map(|number| message(number, &rows[number]).emit().to_vec()).collect()
+}
+
+/// Compares what a board has sent with what it must send, line by line.
+///
+/// # Panics
+/// Where a line differs or is missing.
+pub fn assert_same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
+    let text = |line: &[u8]| line.escape_ascii().to_string();
+    for (number, (line, expected)) in lines.iter().zip(expected).enumerate() {
+        assert_eq!(text(line), text(expected), "line {number}");
+    }
+    assert!(lines.len() >= expected.len(), "{} lines, {} expected", lines.len(), expected.len());
+}
+
+/// Returns the bytes that it sends when the vehicle is level and turns at `yaw_rate`, rad/s, 10 ms after 10 ms.
 #[must_use]
 pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
     // The least bits of a real part always move.
@@ -47,7 +70,7 @@ pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
     message(number, &row).emit().to_vec()
 }
 
-/// What the board must send for these bytes, line by line without the CR.
+/// Returns the lines that the board must send for these bytes, without the CR.
 ///
 /// # Panics
 /// When the library's own weights are refused.
@@ -66,15 +89,15 @@ pub struct Board {
     fog_network: FogNet<'static, 'static>,
     mti: Mti,
     dsp1760: Dsp1760,
-    /// Board time: it passes while the sensor is silent, since bytes come at the host's pace.
+    /// The board's time: it passes while the sensor is silent, since bytes come at the host's pace.
     now: Micros,
-    /// What an emulated board has sent: see [`Board::following`].
+    /// The lines that an emulated board has sent: see [`Board::following`].
     heard: Vec<Vec<u8>>,
-    /// Silent for so many message sets.
+    /// The sensor has been silent for so many message sets.
     silent: u64,
-    /// Message sets without a rate that were followed.
+    /// The number of message sets without a rate that were followed.
     pub followed: u64,
-    /// What it has sent.
+    /// The lines that it has sent.
     pub lines: Vec<Vec<u8>>,
 }
 
@@ -85,7 +108,7 @@ impl Default for Board {
 }
 
 impl Board {
-    /// Nothing received yet.
+    /// Returns a board that has received nothing yet.
     ///
     /// # Panics
     /// When the library's own weights are refused.
@@ -95,7 +118,7 @@ impl Board {
         Self::configured(&Configuration::DEFAULT, blob)
     }
 
-    /// With another configuration, on other weights.
+    /// Returns a board with another configuration, on other weights.
     ///
     /// # Panics
     /// When the configuration, or FoGNet's own weights, are refused.
@@ -123,21 +146,21 @@ impl Board {
         }
     }
 
-    /// Beside an emulated board that has sent these lines. A busy host may keep its bytes back for
-    /// so long that it finds the sensor silent, by its own clock, and says so; where it has, this one
-    /// says so, too. All else must be the same.
+    /// Returns a board that follows an emulated one which has sent these lines. A busy host may keep its bytes back for
+    /// so long that it finds the sensor silent, by its own clock, and reports that; where it has, this one reports it
+    /// too. All else must be the same.
     #[must_use]
     pub fn following(lines: Vec<Vec<u8>>) -> Self {
         Self::new().beside(lines)
     }
 
-    /// The same, beside one that was configured.
+    /// Follows an emulated board that has sent these lines, as [`Board::following`].
     #[must_use]
     pub fn beside(self, lines: Vec<Vec<u8>>) -> Self {
         Self { heard: lines, ..self }
     }
 
-    /// Found something damaged at its start, perhaps the configuration itself.
+    /// Returns the board that has found something damaged at its start, perhaps the configuration itself.
     #[must_use]
     pub fn damaged(self, configuration_lost: bool) -> Self {
         let storage = StorageFaults { damaged: true, configuration_lost };
@@ -145,7 +168,7 @@ impl Board {
         Self { coprocessor: Coprocessor::new(config), config, ..self }
     }
 
-    /// Says what the emulated board has said before anything else came.
+    /// Sends the message sets without a rate that the emulated board has sent before the next sample.
     fn follow(&mut self) {
         loop {
             let mut coprocessor = self.coprocessor.clone();
@@ -166,13 +189,13 @@ impl Board {
         }
     }
 
-    /// When the next message set without a sample is due.
+    /// Returns the time at which the next message set without a sample is due.
     fn next_silence(&self) -> Micros {
         let first = if self.lines.is_empty() { START_US } else { TIMEOUT_US };
         Micros(self.now.0 + if self.silent == 0 { first } else { PERIOD_US })
     }
 
-    /// The sensor sends.
+    /// Takes bytes of the inertial sensor.
     pub fn push(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.mti.receive(*byte);
@@ -187,13 +210,13 @@ impl Board {
         }
     }
 
-    /// A wheel frame comes.
+    /// Takes a wheel frame.
     pub fn wheel(&mut self, frame: &DataFrame) {
         // What is wrong with one, the wheels' silence tells.
         let _ = self.coprocessor.can(frame, self.now);
     }
 
-    /// The fibre-optic gyro sends.
+    /// Takes bytes of the fibre-optic gyro.
     pub fn push_fog(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.dsp1760.receive(*byte);
@@ -208,13 +231,13 @@ impl Board {
         }
     }
 
-    /// What became of the fibre-optic gyro.
+    /// Returns the numbers of events of the fibre-optic gyro.
     #[must_use]
     pub fn fog(&self) -> &FogCounters {
         self.coprocessor.fog_counters()
     }
 
-    /// The sensor is silent for so many message sets; from the start, where it has sent nothing yet.
+    /// Lets the sensor be silent for so many message sets; from the start, where it has sent nothing yet.
     ///
     /// # Panics
     /// When the coprocessor does not say so.

@@ -1,4 +1,4 @@
-//! What a test may want beyond Rust: it gets it, or it is skipped aloud, or it fails.
+//! Requirements of a test beyond Rust: it gets them, or it is reported as skipped, or it fails.
 //!
 //! `GYRONET_REQUIRE=qemu,data` makes tests that want these fail where they are missing; without
 //! it they print `SKIPPED name: why` and pass. The line goes straight to the process's standard
@@ -7,13 +7,13 @@
 use std::io::Write;
 use std::process::Command;
 
-/// Names what must be there, separated by commas.
+/// The environment variable that lists the requirements that must be met, separated by commas.
 pub const VARIABLE: &str = "GYRONET_REQUIRE";
 
-/// Something that is not on every machine.
+/// A requirement that not every machine meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
-    /// qemu-system-arm and the target's standard library.
+    /// The program qemu-system-arm and the target's standard library.
     Qemu,
     /// The recordings ([`crate::recordings`]).
     Data,
@@ -26,7 +26,7 @@ impl Need {
         [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python)];
 }
 
-/// What the environment insists on.
+/// The requirements that must be met.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Required(Vec<Need>);
 
@@ -48,7 +48,7 @@ impl Required {
         Self::parse(&std::env::var(VARIABLE).unwrap_or_default()).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// What was found, or `None` with a line on `out` that says which test is skipped and why.
+    /// Returns what was found, or `None` with a line on `out` that names the skipped test and the reason.
     ///
     /// # Panics
     /// When it was not found and is required.
@@ -70,7 +70,7 @@ impl Required {
     }
 }
 
-/// Says that a test is skipped on this machine, whatever is required.
+/// Reports that a test is skipped on this machine, whatever is required.
 pub fn skipped(test: &str, why: &str) {
     say(test, why, &mut std::io::stderr());
 }
@@ -80,7 +80,7 @@ fn say(test: &str, why: &str, out: &mut impl Write) {
     let _ = out.write_all(format!("SKIPPED {test}: {why}\n").as_bytes());
 }
 
-/// [`Required::wants`] with the environment's list and standard error.
+/// Returns what was found, or reports on standard error that the test is skipped.
 ///
 /// # Panics
 /// When it was not found and is required, or the list has an unknown word.
@@ -88,7 +88,7 @@ pub fn wants<T>(test: &str, need: Need, found: Result<T, String>) -> Option<T> {
     Required::from_env().wants(test, need, found, &mut std::io::stderr())
 }
 
-/// The Python with these packages: `GYRONET_PYTHON`, or `python3`.
+/// Returns the Python with these packages: `GYRONET_PYTHON`, or `python3`.
 ///
 /// # Panics
 /// As [`wants`].
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists() {
+    fn a_list_names_requirements_and_nothing_else() {
         assert_eq!(Required::parse(""), Ok(Required(vec![])));
         assert_eq!(Required::parse("qemu, data,"), Ok(Required(vec![Need::Qemu, Need::Data])));
         assert_eq!(Required::parse("python"), Ok(Required(vec![Need::Python])));
@@ -115,14 +115,14 @@ mod tests {
     }
 
     #[test]
-    fn found_is_handed_on() {
+    fn what_was_found_is_returned() {
         let mut out = Vec::new();
         assert_eq!(Required::default().wants("t", Need::Data, Ok(7), &mut out), Some(7));
         assert_eq!(out, b"");
     }
 
     #[test]
-    fn not_found_is_said() {
+    fn a_skipped_test_is_reported() {
         let (mut out, required) = (Vec::new(), Required::parse("qemu,python").unwrap());
         assert_eq!(required.wants("t", Need::Data, Err::<(), _>("no folder".into()), &mut out), None);
         assert_eq!(out, b"SKIPPED t: no folder\n");
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "t: GYRONET_REQUIRE asks for Data, but no folder")]
-    fn not_found_but_required() {
+    fn a_missing_requirement_fails_where_it_must_be_met() {
         let required = Required::parse("data").unwrap();
         required.wants("t", Need::Data, Err::<(), _>("no folder".into()), &mut Vec::new());
     }

@@ -1,4 +1,4 @@
-//! What is stored in the emulated board's flash: written by the library's own store to the mock of
+//! The flash of an emulated board before it starts: written by the library's own store to the mock of
 //! the F405's flash, and laid into the emulator's memory, which is mapped though it has no controller.
 
 use crate::flash::{F405, Region};
@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::rc::Rc;
 
-/// The records of a flash.
+/// Opens the records of a flash.
 ///
 /// # Errors
 /// [`StoreError`].
@@ -21,7 +21,7 @@ pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, S
     Store::open(Region::new(flash, layout::STORE), 0, false)
 }
 
-/// Both weight slots of a flash.
+/// Returns both weight slots of a flash.
 #[must_use]
 pub fn slots(flash: &F405) -> [&[u8]; 2] {
     let bytes = &flash.bytes()[layout::SLOTS.start as usize..layout::SLOTS.end as usize];
@@ -45,7 +45,7 @@ pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), 
     store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))
 }
 
-/// The built-in weights with these bits of the output's bias flipped (bits 8 to 15 of it), and a
+/// Returns the built-in weights with these bits of the output's bias flipped (bits 8 to 15 of it), and a
 /// checksum that fits.
 #[must_use]
 pub fn other_weights(bits: u8) -> Vec<u8> {
@@ -63,7 +63,7 @@ pub fn other_weights(bits: u8) -> Vec<u8> {
 pub struct Stored(Rc<RefCell<F405>>);
 
 impl Stored {
-    /// With a record.
+    /// Stores a record.
     ///
     /// # Panics
     /// When it is refused.
@@ -73,7 +73,7 @@ impl Stored {
         self
     }
 
-    /// With an accepted weight file; the last one is the one to be used.
+    /// Stores an accepted weight file; the last one is the one to be used.
     ///
     /// # Panics
     /// When it is refused.
@@ -83,7 +83,7 @@ impl Stored {
         self
     }
 
-    /// With bits of a byte flipped, at an offset into the flash.
+    /// Flips bits of a byte at an offset into the flash.
     #[must_use]
     pub fn damaged(self, offset: u32, bits: u8) -> Self {
         self.0.borrow_mut().damage(offset as usize, bits);

@@ -1,4 +1,4 @@
-//! A pipeline fed with samples, and a network of the test's own behind it.
+//! A pipeline that gets samples, with a network of the test's own behind it.
 
 use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};
@@ -7,21 +7,21 @@ use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
 
-/// First tick after static initialisation, where nothing disturbs it.
+/// The first tick after static initialisation, where nothing disturbs it.
 pub const KNOWN: u64 = 300;
 
-/// A pipeline with its defaults.
+/// Returns a pipeline with its defaults.
 #[must_use]
 pub fn new() -> Pipeline {
     Pipeline::new(PipelineConfig::DEFAULT)
 }
 
-/// Standing, then turning from tick [`KNOWN`] on.
+/// Returns samples of a vehicle that stands and turns from tick [`KNOWN`] on.
 pub fn drive(ticks: impl IntoIterator<Item = u64>) -> impl Iterator<Item = ImuSample> {
     ticks.into_iter().map(|tick| turning(tick, rate(if tick < KNOWN { 0.001 } else { 0.25 })))
 }
 
-/// A network that always says the same, rad/s.
+/// Returns a network whose corrections are always the same, rad/s.
 pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
     move |_| Some(Estimate { corrections: [rate(correction); WINDOW], scale: SCALE_MIN, clamped_inputs: 0 })
 }
@@ -48,7 +48,7 @@ pub fn run(
     outputs
 }
 
-/// Runs of equal status of what goes out at once: which, and how many samples.
+/// Returns the runs of equal status of the prompt rate: each with its number of samples.
 #[must_use]
 pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
     outputs
@@ -57,7 +57,7 @@ pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
         .collect()
 }
 
-/// Runs of equal faults: which, and how many samples.
+/// Returns the runs of equal faults: each with its number of samples.
 #[must_use]
 pub fn faults(outputs: &[Output]) -> Vec<(Faults, usize)> {
     let faults = |output: &Output| output.vehicle.navigation.faults;

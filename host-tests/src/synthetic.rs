@@ -6,7 +6,7 @@ use gyronet::health::{Quality, Source};
 use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
 
-/// rad/s to a code.
+/// Returns the code of a rate, rad/s.
 ///
 /// # Panics
 /// Beyond +-16 rad/s.
@@ -15,7 +15,7 @@ pub fn rate(rad_per_sec: f64) -> AngularRate {
     AngularRate::from_rad_per_sec(rad_per_sec as f32).expect("a gyro's range")
 }
 
-/// m/s^2 to a code.
+/// Returns the code of a specific force, m/s^2.
 ///
 /// # Panics
 /// Beyond +-2048 m/s^2.
@@ -24,7 +24,7 @@ pub fn force(metre_per_sec2: f64) -> SpecificForce {
     SpecificForce::from_metre_per_sec2(metre_per_sec2 as f32).expect("an accelerometer's range")
 }
 
-/// A level vehicle at grid step `tick` that turns by `yaw_rate` and does nothing else.
+/// Returns a sample of a level vehicle at grid step `tick` that turns by `yaw_rate` and does nothing else.
 #[must_use]
 pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
     ImuSample {
@@ -36,7 +36,7 @@ pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
     }
 }
 
-/// A vehicle that stands with its engine running: a 27 Hz shake and its overtone on every axis,
+/// Returns a sample of a vehicle that stands with its engine running: a 27 Hz shake and its overtone on every axis,
 /// with some noise; `bias` (rad/s) on every gyro axis.
 #[must_use]
 pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
@@ -52,13 +52,13 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
     sample
 }
 
-/// A good rate, and the yaw turned by then.
+/// Returns a good rate with the yaw turned by then.
 #[must_use]
 pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {
     YawEstimate { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawEstimate::default() }
 }
 
-/// A vehicle that turns at `rate`, has turned by `yaw`, and is well.
+/// Returns the output for a vehicle that turns at `rate`, has turned by `yaw`, and has no fault.
 #[must_use]
 pub fn vehicle(tick: u32, rate: AngularRate, yaw: Yaw) -> VehicleSample {
     VehicleSample {

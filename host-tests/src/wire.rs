@@ -1,9 +1,9 @@
-//! Bytes of an Xsens MTi, and what the part at the end of the cable delivers for them.
+//! Bytes of an Xsens MTi, and the samples that the driver delivers for them.
 
 use gyronet::sample::ImuSample;
 use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
 
-/// Bytes written in hexadecimal, with blanks between them.
+/// Reads bytes that are written in hexadecimal, with blanks between them.
 ///
 /// # Panics
 /// When they are not.
@@ -12,7 +12,7 @@ pub fn bytes(hex: &str) -> Vec<u8> {
     hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("hex")).collect()
 }
 
-/// A frame of a real MTi with 98 bytes of payload.
+/// Returns a frame of a real MTi with 98 bytes of payload.
 #[must_use]
 pub fn real_frame() -> Vec<u8> {
     bytes(
@@ -22,7 +22,7 @@ pub fn real_frame() -> Vec<u8> {
     )
 }
 
-/// A made-up one: az 9.81 m/s^2, gz 10 deg/s, counter 1, time 100, status 3.
+/// Returns a made-up frame: az 9.81 m/s^2, gz 10 deg/s, counter 1, time 100, status 3.
 #[must_use]
 pub fn synthetic_frame() -> Vec<u8> {
     bytes(
@@ -31,7 +31,7 @@ pub fn synthetic_frame() -> Vec<u8> {
     )
 }
 
-/// A message whose readings differ with its time (10 kHz).
+/// Returns a message whose readings differ with its time (10 kHz).
 #[must_use]
 pub fn message(time: u32) -> MtData2 {
     MtData2 {
@@ -44,7 +44,7 @@ pub fn message(time: u32) -> MtData2 {
     }
 }
 
-/// What a part delivers for these bytes.
+/// Returns the samples that a driver delivers for these bytes.
 pub fn feed(mti: &mut Mti, bytes: impl IntoIterator<Item = u8>) -> Vec<Result<ImuSample, XsensError>> {
     let mut samples = Vec::new();
     for byte in bytes {
@@ -54,7 +54,7 @@ pub fn feed(mti: &mut Mti, bytes: impl IntoIterator<Item = u8>) -> Vec<Result<Im
     samples
 }
 
-/// [`feed`] from the start.
+/// Returns the samples that a new driver delivers for these bytes.
 pub fn feed_new(bytes: impl IntoIterator<Item = u8>) -> Vec<Result<ImuSample, XsensError>> {
     feed(&mut Mti::new(), bytes)
 }

@@ -1,5 +1,6 @@
 //! The command line as a whole: help, exit statuses, colours, completions.
 
+use std::io::Write as _;
 use std::process::{Command, Output, Stdio};
 
 fn gyronet(arguments: &[&str]) -> Output {
@@ -132,7 +133,8 @@ fn shells_complete_every_subcommand() {
 #[test]
 fn bash_completes() {
     if Command::new("bash").arg("--version").output().is_err() {
-        eprintln!("SKIPPED bash_completes: no bash");
+        // Not `eprintln!`: the test harness would keep it to itself.
+        writeln!(std::io::stderr(), "SKIPPED bash_completes: no bash").unwrap();
         return;
     }
     let script = "source /dev/stdin\nCOMP_WORDS=(gyronet ev); COMP_CWORD=1\n_gyronet gyronet ev gyronet\necho \"${COMPREPLY[@]}\"";

@@ -1,5 +1,5 @@
-//! The tests of health, CAN and sensors once more, in one crate without the tools: `cargo mutants`
-//! builds it for every mutant. Not run by `cargo test`, which has them already.
+//! The tests of monitor, CAN and sensors again, in one crate without the tools, because `cargo mutants` builds it for
+//! every mutant. Not run by `cargo test`, which has them already.
 #![cfg(test)]
 
 // The tests name the crate that they share.

@@ -21,7 +21,7 @@ const PROFILES: [Profile; 4] = [
     Profile::P11(P11 { data_id: 0x123, mode: P11Mode::Both }),
 ];
 
-/// Two signed wheels from byte 3 on, a counter in byte 7's upper half.
+/// The settings of two signed wheels from byte 3 on, with a counter in byte 7's upper half.
 fn two_wheels(id: Id, checksum: Checksum) -> WheelFrame {
     let field = |start, len, signed| BitField::new(start, len, ByteOrder::Intel, signed).expect("inside");
     let signal = |wheel, start| {
@@ -36,7 +36,7 @@ fn two_wheels(id: Id, checksum: Checksum) -> WheelFrame {
     }
 }
 
-/// The first byte chooses the settings; then frames: a byte of time, a byte of kind (which
+/// Receives wheel frames: the first byte selects the settings; then come frames: a byte of time, a byte of kind (which
 /// identifier, how long, whether its protection is made to fit), eight bytes. Of what is said of
 /// the wheels, nothing is older than its limit or contradicts the speeds.
 pub fn wheels(mut data: &[u8]) {
@@ -106,7 +106,7 @@ pub fn wheel_seeds() -> Vec<Seed> {
     ]
 }
 
-/// Blocks of eight bytes and a last short one as every message there is, and through the checks of
+/// Parses blocks of eight bytes and a last short one as every message there is, and through the checks of
 /// every profile; three bytes as a place of a signal in the block. What is read is written the
 /// same.
 pub fn messages(mut data: &[u8]) {

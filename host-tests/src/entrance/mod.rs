@@ -1,7 +1,7 @@
 //! Every place where bytes from outside come in, as a function of any bytes that panics where
 //! what comes out breaks a promise.
 //!
-//! The fuzz targets of `host-tests/fuzz` run these under coverage; `tests/entrances.rs` runs them
+//! The fuzz targets of `host-tests/fuzz` run these under coverage; `tests/library/entrances.rs` runs them
 //! over the corpus and over damaged copies of it.
 
 mod can;
@@ -20,17 +20,17 @@ pub type Seed = (&'static str, Vec<u8>);
 /// One entrance.
 #[derive(Debug, Clone, Copy)]
 pub struct Entrance {
-    /// Of its fuzz target and of its folder in the corpus.
+    /// The name of its fuzz target and of its folder in the corpus.
     pub name: &'static str,
-    /// Takes any bytes.
+    /// The function, which takes any bytes.
     pub run: fn(&[u8]),
-    /// What the corpus begins with: made here, none of it recorded.
+    /// The corpus to begin with: made here, none of it recorded.
     pub seeds: fn() -> Vec<Seed>,
-    /// Damaged copies that a test runs in well under a second.
+    /// The number of damaged copies that a test runs in well under a second.
     pub mutations: u64,
 }
 
-/// All of them.
+/// All entrances.
 pub const ALL: [Entrance; 15] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },

@@ -5,14 +5,14 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNo
 use gyronet::service::MappedSlots;
 use gyronet::store::layout::SLOT_SIZE;
 
-/// Two sectors.
+/// A flash of two sectors.
 #[derive(Clone)]
 pub struct RamFlash<const SECTOR: usize> {
     words: Vec<u32>,
 }
 
 impl<const SECTOR: usize> RamFlash<SECTOR> {
-    /// Begins with these bytes, erased behind them.
+    /// Returns a flash that begins with these bytes and is erased behind them.
     pub fn new(content: &[u8]) -> Self {
         let mut flash = Self { words: vec![u32::MAX; 2 * SECTOR / 4] };
         let len = content.len().min(2 * SECTOR);

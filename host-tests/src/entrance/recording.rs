@@ -1,11 +1,11 @@
-//! Recordings as CSV.
+//! Recordings as CSV files, as a user of the tools gives them.
 
 use super::Seed;
 use gyronet::sample::PERIOD_US;
 use gyronet_tools::drive::recording::{Reader, Recording};
 use std::fmt::Write as _;
 
-/// As a file. Whatever rows are read have rising times and finite values, and errors can be
+/// Takes bytes as a file. Whatever rows are read have rising times and finite values, and errors can be
 /// printed.
 pub fn csv(data: &[u8]) {
     if let Err(error) = Recording::parse("fuzz.csv", data) {

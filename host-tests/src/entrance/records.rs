@@ -1,4 +1,4 @@
-//! What is stored in flash: configuration, calibration, and which weights were accepted.
+//! Records in flash: configuration, calibration, and the accepted weights.
 
 use super::ram_flash::RamFlash;
 use super::{Seed, byte, take};
@@ -9,11 +9,11 @@ use gyronet::model::blob::CRC;
 use gyronet::store::{Accepted, Calibration, Configuration, Level, Record, Store};
 use gyronet::units::{AngularRate, CentiCelsius};
 
-/// Smaller than the part's, so that it is soon full.
+/// The size of a sector, smaller than the part's, so that it is soon full.
 pub const SECTOR: usize = 1024;
 type Flash = RamFlash<SECTOR>;
 
-/// As the bytes of both sectors; or, behind an odd byte, as records (key, version, length,
+/// Takes bytes as those of both sectors; or, behind an odd byte, as records (key, version, length,
 /// content) whose lengths, headers and checksums are made to fit. What is read is inside its
 /// ranges and fit to be run with, and what is stored is read again.
 pub fn flash(mut data: &[u8]) {
@@ -31,7 +31,7 @@ pub fn flash(mut data: &[u8]) {
     }
 }
 
-/// A few samples through a coprocessor with this configuration.
+/// Runs a few samples through a coprocessor with this configuration.
 fn run(configuration: &Configuration, calibration: &Calibration) {
     let mut coprocessor = Coprocessor::new(configuration.coprocessor(calibration));
     for tick in 0..3 {
@@ -41,7 +41,7 @@ fn run(configuration: &Configuration, calibration: &Calibration) {
     }
 }
 
-/// A sector of records as they should be.
+/// Returns a sector of records as they should be.
 fn fitting(mut data: &[u8]) -> Vec<u8> {
     let generation = 1_u32;
     let header = CRC.checksum(&(generation ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());

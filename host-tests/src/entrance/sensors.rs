@@ -1,4 +1,4 @@
-//! The bytes of the five sensors.
+//! The bytes of the five sensors, as their parsers and dialogues take them.
 
 use super::Seed;
 use crate::wire::{bytes, message, synthetic_frame};
@@ -18,7 +18,7 @@ use gyronet::sensor::xsens::precision::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti, xbus};
 use gyronet::units::Micros;
 
-/// As a stream to an MTi and to the dialogue, and as the data of a message.
+/// Takes bytes as a stream from an MTi, to its dialogue, and as the data of a message.
 pub fn xsens(data: &[u8]) {
     let mut mti = Mti::new();
     let mut dialogue = XsensDialogue::new();
@@ -47,7 +47,7 @@ pub fn xsens_seeds() -> Vec<Seed> {
     ]
 }
 
-/// As a stream to the parser and to the dialogue, as a message, and as a message whose checksum
+/// Takes bytes as a stream to the parser and to the dialogue, as a message, and as a message whose checksum
 /// is made to fit.
 pub fn dsp1760(data: &[u8]) {
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
@@ -85,7 +85,7 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
     vec![("stream", extras.concat()), ("self_test", self_test), ("commands", commands.concat())]
 }
 
-/// As lines, as words.
+/// Takes bytes as lines and as words.
 pub fn dsp3000(data: &[u8]) {
     let mut lines = Dsp3000Ascii::new();
     let mut words = Dsp3000Binary::new(Mode::Rate, 0);
@@ -110,7 +110,7 @@ pub fn dsp3000_seeds() -> Vec<Seed> {
     ]
 }
 
-/// As packets of either kind.
+/// Takes bytes as packets of either kind.
 pub fn icm42688(data: &[u8]) {
     for resolution in [Resolution::Bits16, Resolution::Bits20] {
         for bytes in data.chunks(resolution.bytes()) {
@@ -129,7 +129,7 @@ pub fn icm42688_seeds() -> Vec<Seed> {
     vec![("packet_3", packet(Resolution::Bits16)), ("packet_4", packet(Resolution::Bits20))]
 }
 
-/// As bursts, as they are and with a sum that fits.
+/// Takes bytes as bursts, as they are and with a sum that fits.
 pub fn adis16465(data: &[u8]) {
     let (bursts, _) = data.as_chunks::<BURST>();
     for bytes in bursts {

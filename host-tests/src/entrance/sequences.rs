@@ -1,4 +1,4 @@
-//! Folders of KAIST Urban and NCLT.
+//! Folders in the layouts of KAIST Urban and NCLT, as the loaders read them.
 
 use super::Seed;
 use gyronet_tools::paper::sequence::{Sequence, write_csv};
@@ -54,7 +54,7 @@ thread_local! {
         RefCell::new([Folder::new("kaist", KAIST.len()), Folder::new("nclt", NCLT.len())]);
 }
 
-/// The first byte says which layout; then the files, a zero between them. What is read is
+/// Reads a folder: the first byte selects the layout, then come the files, a zero between them. What is read is
 /// finite and can be written out; what is refused is refused with the name of a file of it.
 pub fn folder(data: &[u8]) {
     let Some((layout, data)) = data.split_first() else { return };

@@ -1,4 +1,4 @@
-//! The service line, both ways.
+//! The service line in both directions: requests to the board, replies to the host.
 
 use super::ram_flash::RamFlash;
 use super::records::SECTOR;
@@ -24,7 +24,7 @@ const DRIVES: SupportedHardware = SupportedHardware {
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
 
-/// The first byte says whether there is flash and whether the rest comes as it is, or as
+/// Runs the service line: the first byte says whether there is flash and whether the rest comes as it is, or as
 /// messages (length, content) whose frames are made to fit. Every answer is one that the asking
 /// side reads; what is stored by them, a board starts with.
 pub fn line(mut data: &[u8]) {
@@ -60,7 +60,7 @@ pub fn line(mut data: &[u8]) {
     board.calibration().check().expect("what it knows is in its ranges");
 }
 
-/// Gives a byte to the board and reads what it answers.
+/// Gives a byte to the board and reads its answer.
 fn answer(board: &mut Board, byte: u8) {
     let Some(frame) = board.receive(byte, &AllCounters::default()) else { return };
     let mut deframer = Deframer::new();
@@ -68,7 +68,7 @@ fn answer(board: &mut Board, byte: u8) {
     assert!(matches!(replies[..], [Ok(_)]), "{replies:?}");
 }
 
-/// A message, whatever it is, numbered and in a frame.
+/// Returns a message, whatever it is, numbered and in a frame.
 fn framed(message: &[u8]) -> Vec<u8> {
     let mut content = vec![7];
     content.extend(&message[..message.len().min(MAX_MESSAGE)]);

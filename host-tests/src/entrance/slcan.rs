@@ -13,10 +13,10 @@ use gyronet_tools::client::monitor::Monitor;
 use gyronet_tools::client::monitor::line::{Splitter, parse_line};
 use gyronet_tools::drive::candump::Log;
 
-/// What the board answers besides frames.
+/// The answers of a board besides frames.
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
 
-/// As a host's commands, while frames go out over a line that takes a few bytes now and then:
+/// Takes bytes as a host's commands, while frames go out over a line that takes a few bytes now and then:
 /// what leaves is whole lines, each an answer or the frame that was sent.
 pub fn board(data: &[u8]) {
     let own = DataFrame::new(StandardId::MAX, &[1, 2, 3]).expect("a frame");
@@ -59,7 +59,7 @@ pub fn board_seeds() -> Vec<Seed> {
     ]
 }
 
-/// As what a serial line or a log gives to the monitor. A frame that is read can be said again.
+/// Takes bytes as those that a serial line or a log gives to the monitor. A frame that is read can be written again.
 pub fn host(data: &[u8]) {
     let mut splitter = Splitter::default();
     let mut monitor = Monitor::new(&Config::DEFAULT);

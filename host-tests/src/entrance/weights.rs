@@ -1,4 +1,4 @@
-//! Weight files of both networks.
+//! Weight files of both networks, as the checks of an upload see them.
 
 use super::{Seed, byte, take};
 use gyronet::model::blob::{Blob, CRC, HEADER_LEN};
@@ -6,14 +6,14 @@ use gyronet::model::fognet_blob::FogBlob;
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{GyroNet, WindowNetwork, weights};
 
-/// Bytes, on a word boundary.
+/// Copies bytes to a word boundary.
 fn aligned(bytes: &[u8]) -> Vec<u32> {
     let mut words = vec![0; bytes.len().div_ceil(4)];
     bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
     words
 }
 
-/// The built-in file with places of it (three bytes of offset, one of length up to 15) written
+/// Returns the built-in file with places of it (three bytes of offset, one of length up to 15) written
 /// over and its checksum made to fit; `None` for data that are meant to be a file themselves.
 fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
     if byte(&mut data) & 1 == 0 {
@@ -35,7 +35,7 @@ fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
     Some(words)
 }
 
-/// As a file, or as changes of the built-in one. What is accepted runs at the limits of its
+/// Takes bytes as a file, or as changes of the built-in one. What is accepted runs at the limits of its
 /// inputs without an overflow (which panics where these checks run).
 pub fn gyronet(data: &[u8]) {
     let file = &weights::DEFAULT.0;
@@ -54,7 +54,7 @@ pub fn gyronet(data: &[u8]) {
     }
 }
 
-/// As [`gyronet`], of FoGNet; its kernels are the same.
+/// Takes bytes as [`gyronet`] does, for FoGNet; its kernels are the same.
 pub fn fognet(data: &[u8]) {
     let file = &weights::FOGNET.0;
     match patched(data, file) {

@@ -1,4 +1,4 @@
-//! Faults of the sensor, in the emulated image: what the bus is told, how soon, and that it ends.
+//! Faults of the sensor, in the emulated image: what the messages report, how soon, and that it ends.
 //! Every frame is held against the host's, byte for byte.
 
 use embedded_can::{Frame, Id};
@@ -15,9 +15,9 @@ use std::time::Duration;
 const LIMIT: Duration = Duration::from_secs(120);
 const IMU: usize = 1;
 const SLCAN: usize = 2;
-/// Frames of one sample.
+/// A sample makes so many frames.
 const SET: usize = 6;
-/// By then it is initialised and corrected by the network.
+/// The number of samples by which the rate is initialised and corrected by the network.
 const READY: usize = 340;
 /// MTData2 status: a gyro axis is clipped.
 const CLIPPED: u32 = 1 << 11;
@@ -31,30 +31,20 @@ fn rows() -> Vec<Row> {
     recordings::rows(&workspace().join("tools/data/simulated_drive.csv"))
 }
 
-/// Samples of the simulated drive as bytes.
 fn drive(samples: core::ops::Range<usize>) -> Vec<u8> {
-    let rows = rows();
-    samples.flat_map(|number| replay::message(number, &rows[number]).emit().to_vec()).collect()
+    replay::simulated_drive(samples).concat()
 }
 
-/// Status of the rate in each TX1.
+/// Returns the status of the rate in each TX1.
 fn statuses(lines: &[Vec<u8>]) -> Vec<SignalStatus> {
     let frames = lines.iter().map(|line| slcan::parse::<DataFrame>(line).expect("a frame"));
     let tx1 = frames.filter(|frame| frame.id() == Id::Standard(TX1_ID));
     tx1.map(|frame| Tx1::parse(frame.data()).expect("a good checksum").yaw_rate_status).collect()
 }
 
-/// Sets that say that there is no rate.
+/// Returns the number of sets without a rate.
 fn unusable(lines: &[Vec<u8>]) -> usize {
     statuses(lines).iter().filter(|status| **status == SignalStatus::FAILURE).count()
-}
-
-fn same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
-    let text = |line: &Vec<u8>| line.escape_ascii().to_string();
-    for (number, (line, expected)) in lines.iter().zip(expected).enumerate() {
-        assert_eq!(text(line), text(expected), "line {number}");
-    }
-    assert!(lines.len() >= expected.len(), "{} lines, {} expected", lines.len(), expected.len());
 }
 
 /// The cable is cut after `READY` samples, `garbage` comes over it, and it is back 0.5 s later.
@@ -78,7 +68,7 @@ fn cut(test: &str, garbage: &[u8]) {
     host.push(&drive(0..READY));
     host.silence(silent as u64);
     host.push(&drive(READY + 50..READY + 150));
-    same(&lines, &host.lines);
+    replay::assert_same(&lines, &host.lines);
     // No number is marked good that is none.
     let sets = &lines[READY * SET..(READY + silent) * SET];
     for line in sets {
@@ -99,19 +89,19 @@ fn rate_id() -> Id {
 }
 
 #[test]
-fn cable_cut_and_back() {
-    cut("cable_cut_and_back", &[]);
+fn a_cut_cable_leaves_no_rate_until_it_is_back() {
+    cut("a_cut_cable_leaves_no_rate_until_it_is_back", &[]);
 }
 
 #[test]
-fn nothing_but_garbage() {
+fn garbage_alone_is_silence() {
     let mut noise = Noise::new(31);
-    cut("nothing_but_garbage", &(0..2_000).map(|_| noise.byte()).collect::<Vec<u8>>());
+    cut("garbage_alone_is_silence", &(0..2_000).map(|_| noise.byte()).collect::<Vec<u8>>());
 }
 
 #[test]
-fn silence_is_told_within_30_ms() {
-    const NAME: &str = "silence_is_told_within_30_ms";
+fn silence_is_reported_within_30_ms() {
+    const NAME: &str = "silence_is_reported_within_30_ms";
     let Some(mut board) = boot(NAME) else { return };
     board.send(SLCAN, b"Z1\r", LIMIT);
     let _ = board.lines(SLCAN, b'\r', 1, LIMIT);
@@ -137,8 +127,8 @@ fn silence_is_told_within_30_ms() {
 }
 
 #[test]
-fn stuck_sensor() {
-    let Some(mut board) = boot("stuck_sensor") else { return };
+fn a_stuck_sensor_is_failed_from_the_seventh_equal_sample() {
+    let Some(mut board) = boot("a_stuck_sensor_is_failed_from_the_seventh_equal_sample") else { return };
     const STUCK: usize = 40;
     let rows = rows();
     let stuck = (READY..READY + STUCK).flat_map(|number| {
@@ -148,7 +138,7 @@ fn stuck_sensor() {
     let expected = replay::lines(&bytes);
     board.send(IMU, &bytes, LIMIT);
     let lines = board.lines(SLCAN, b'\r', expected.len(), LIMIT);
-    same(&lines, &expected);
+    replay::assert_same(&lines, &expected);
     let first = READY + STUCK_AFTER as usize - 1;
     for (tick, status) in statuses(&expected).iter().enumerate().skip(310) {
         let failed = (first..READY + STUCK).contains(&tick);
@@ -157,8 +147,8 @@ fn stuck_sensor() {
 }
 
 #[test]
-fn saturated_sensor() {
-    let Some(mut board) = boot("saturated_sensor") else { return };
+fn a_saturated_sensor_is_failed_until_50_ms_after() {
+    let Some(mut board) = boot("a_saturated_sensor_is_failed_until_50_ms_after") else { return };
     const SATURATED: usize = 3;
     let rows = rows();
     let bytes: Vec<u8> = (0..READY + 100)
@@ -173,7 +163,7 @@ fn saturated_sensor() {
     let expected = replay::lines(&bytes);
     board.send(IMU, &bytes, LIMIT);
     let lines = board.lines(SLCAN, b'\r', expected.len(), LIMIT);
-    same(&lines, &expected);
+    replay::assert_same(&lines, &expected);
     for (tick, status) in statuses(&expected).iter().enumerate().skip(310) {
         let failed = (READY..READY + SATURATED + HOLD as usize).contains(&tick);
         assert_eq!(*status == SignalStatus::FAILURE, failed, "sample {tick}");

@@ -13,8 +13,8 @@ use std::time::Instant;
 const SAMPLES: usize = 3_000;
 
 #[test]
-fn board_with_everything_connected() {
-    const NAME: &str = "board_with_everything_connected";
+fn both_networks_run_with_everything_connected() {
+    const NAME: &str = "both_networks_run_with_everything_connected";
     let Some(path) = recordings::trial(NAME, 11) else { return };
     let Some(elf) = image::coprocessor(NAME, env!("CARGO_TARGET_TMPDIR")) else { return };
     let rows = recordings::rows(&path);

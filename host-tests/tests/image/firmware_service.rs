@@ -7,6 +7,7 @@ use gyronet::service::{Reply, Request};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::qemu::SERVICE;
 use gyronet_host_tests::{image, qemu, replay};
 use gyronet_tools::client::device::line::Line;
 use gyronet_tools::client::device::{Device, DeviceError};
@@ -15,18 +16,14 @@ use std::time::{Duration, Instant};
 const LIMIT: Duration = Duration::from_secs(60);
 const IMU: usize = 1;
 const SLCAN: usize = 2;
-const SERVICE: usize = 6;
 /// Frames of one sample.
 const SET: usize = 6;
 
 fn boot(test: &str) -> Option<(qemu::Board, Device<Line>)> {
     let elf = image::coprocessor(test, env!("CARGO_TARGET_TMPDIR"))?;
     let mut board = qemu::Board::boot(&elf, SERVICE, &[]);
-    // Its receiver is on.
-    board.send(SERVICE, &[0], LIMIT);
-    let port = board.serve(SERVICE).to_string();
-    let line = Line::open(&port).expect("the harness listens");
-    Some((board, Device::new(line, &port)))
+    let device = board.device(LIMIT);
+    Some((board, device))
 }
 
 fn info(device: &mut Device<Line>) -> Info {
@@ -37,8 +34,8 @@ fn info(device: &mut Device<Line>) -> Info {
 }
 
 #[test]
-fn board_with_nothing_stored_says_so() {
-    let Some((_board, mut device)) = boot("board_with_nothing_stored_says_so") else { return };
+fn a_board_with_nothing_stored_reports_that() {
+    let Some((_board, mut device)) = boot("a_board_with_nothing_stored_reports_that") else { return };
     let about = info(&mut device);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
     assert_eq!(about.configuration, Origin::BuiltIn);
@@ -68,14 +65,14 @@ fn board_with_nothing_stored_says_so() {
         Ok(Reply::Log(page)) => assert!(matches!(page.events[0].kind, EventKind::Started(_)), "{page:?}"),
         other => panic!("{other:?}"),
     }
-    // It starts anew and answers again.
+    // It starts again and answers again.
     assert_eq!(device.ask(&Request::Restart).expect("an answer"), Reply::Done);
     assert_eq!(info(&mut device), about);
 }
 
 #[test]
-fn board_flooded_on_its_service_line() {
-    const NAME: &str = "board_flooded_on_its_service_line";
+fn noise_on_the_service_line_changes_no_frame() {
+    const NAME: &str = "noise_on_the_service_line_changes_no_frame";
     let Some((mut board, mut device)) = boot(NAME) else { return };
     let (mut noise, samples, rounds) = (Noise::new(6), 50, 20);
     let bytes = |round: usize| -> Vec<u8> {
@@ -90,8 +87,7 @@ fn board_flooded_on_its_service_line() {
     }
     // Every frame is as if nothing had come on the service line.
     let lines = board.lines(SLCAN, b'\r', rounds * samples * SET, LIMIT);
-    let text = |line: &Vec<u8>| line.escape_ascii().to_string();
-    assert_eq!(lines.iter().map(text).collect::<Vec<_>>(), expected.iter().map(text).collect::<Vec<_>>());
+    replay::assert_same(&lines, &expected);
     // The question stands behind what is left of the flood.
     let until = Instant::now() + 2 * LIMIT;
     let answer = std::iter::repeat_with(|| device.ask(&Request::Counters))

@@ -7,16 +7,14 @@ use gyronet::can::yaw::{AngleMessage, Faults};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::service::{Reply, Request};
 use gyronet_host_tests::{image, qemu, replay};
-use gyronet_tools::client::device::{Device, line::Line};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);
-/// How often a busy host may try.
+/// A busy host may try so often.
 const ATTEMPTS: usize = 5;
 const IMU: usize = 1;
 const SLCAN: usize = 2;
-const SERVICE: usize = 6;
 /// Frames of one sample.
 const SET: usize = 6;
 const ANGLE: Id = Id::Standard(StandardId::new(0x1A1).unwrap());
@@ -26,31 +24,31 @@ fn boot(test: &str) -> Option<qemu::Board> {
     Some(qemu::Board::boot(&elf, SLCAN, &[]))
 }
 
-/// Bytes of a vehicle that stands, or seems to turn a little.
+/// Returns the bytes of a vehicle that stands, or seems to turn a little.
 fn standing(samples: impl IntoIterator<Item = usize>) -> Vec<u8> {
     samples.into_iter().flat_map(|number| replay::turning(number, 0.001)).collect()
 }
 
-/// What is no frame among lines.
+/// Returns the lines that are no frames.
 fn answers(lines: &[Vec<u8>]) -> Vec<String> {
     let frame = |line: &&Vec<u8>| !line.starts_with(b"t");
     lines.iter().filter(frame).map(|line| line.escape_ascii().to_string()).collect()
 }
 
-/// Of the rate in TX1.
+/// Returns the status of the rate in TX1.
 fn status(frame: &DataFrame) -> Option<SignalStatus> {
     let tx1 = (frame.id() == Id::Standard(TX1_ID)).then(|| Tx1::parse(frame.data()));
     Some(tx1?.expect("a good checksum").yaw_rate_status)
 }
 
-/// Frames among lines, answers left out.
+/// Returns the frames among lines, without the answers.
 fn frames(lines: &[Vec<u8>]) -> Vec<DataFrame> {
     lines.iter().filter_map(|line| slcan::parse(line).ok()).collect()
 }
 
 #[test]
-fn board_answers_a_host() {
-    const NAME: &str = "board_answers_a_host";
+fn the_board_answers_the_commands_of_a_host() {
+    const NAME: &str = "the_board_answers_the_commands_of_a_host";
     let Some(mut board) = boot(NAME) else { return };
     // Frames come before anybody has asked for any.
     board.send(IMU, &standing(0..5), LIMIT);
@@ -76,8 +74,8 @@ fn board_answers_a_host() {
 }
 
 #[test]
-fn board_takes_wheel_frames() {
-    const NAME: &str = "board_takes_wheel_frames";
+fn wheel_frames_hold_back_initialisation_and_are_missed() {
+    const NAME: &str = "wheel_frames_hold_back_initialisation_and_are_missed";
     let Some(mut board) = boot(NAME) else { return };
     // Ten samples for each wheel frame: 3.5 s at 50 km/h, as long standing, then silence.
     const EACH: usize = 10;
@@ -117,13 +115,11 @@ fn board_takes_wheel_frames() {
 /// Samples that the board with a stalled line gets.
 const ALL: usize = 1_500;
 
-/// All lines of a board whose line stood still for a while, once the frame is among them that ends
-/// them; `None`: the host was so busy that the board found its sensor silent in between, and said so.
+/// Returns all lines of a board whose line stood still for a while, once the last frame is among them; `None`: the host
+/// was so busy that the board found its sensor silent in between, and reported it.
 fn stalled_line(elf: &Path, end: &DataFrame) -> Option<Vec<Vec<u8>>> {
-    let mut board = qemu::Board::boot(elf, SERVICE, &[]);
-    board.send(SERVICE, &[0], LIMIT);
-    let port = board.serve(SERVICE).to_string();
-    let mut device = Device::new(Line::open(&port).expect("the harness listens"), &port);
+    let mut board = qemu::Board::boot(elf, qemu::SERVICE, &[]);
+    let mut device = board.device(LIMIT);
     // Idle answers, for which there may be no time while samples come at the host's pace.
     let mut counters = || match device.ask(&Request::Counters) {
         Ok(Reply::Counters(counters)) => Some(counters),
@@ -155,20 +151,20 @@ fn stalled_line(elf: &Path, end: &DataFrame) -> Option<Vec<Vec<u8>>> {
 }
 
 #[test]
-fn board_with_a_stalled_line() {
-    const NAME: &str = "board_with_a_stalled_line";
+fn a_stalled_line_costs_the_oldest_frames() {
+    const NAME: &str = "a_stalled_line_costs_the_oldest_frames";
     let Some(elf) = image::coprocessor(NAME, env!("CARGO_TARGET_TMPDIR")) else { return };
     let expected = frames(&replay::lines(&standing(0..ALL)));
     // Detail is the last of a set and has no fault bits: as on the host, to its counter.
     let end = expected.last().expect("frames");
     let lines = (0..ATTEMPTS).find_map(|_| stalled_line(&elf, end)).expect("a host that is not so busy");
     let last = |lines: &[Vec<u8>]| frames(lines).iter().position(|frame| frame == end);
-    assert!(lines.contains(&b"F02".to_vec()), "the host is told");
+    assert!(lines.contains(&b"F02".to_vec()), "the host is informed");
     let sent = &frames(&lines)[..=last(&lines).expect("it is there")];
     let dropped = expected.len() - sent.len();
     println!("{NAME}: {} frames made, {} sent, {dropped} dropped", expected.len(), sent.len());
     assert!(dropped >= 100 * SET, "{dropped} frames were dropped while the line stood still");
-    // What was sent is what was made, in its order; only the fault is told beside it.
+    // What was sent is what was made, in its order; only the fault is reported beside it.
     let known = |frame: &DataFrame| (frame.id(), frame.data()[3..7].to_vec(), frame.data()[2]);
     let same = |a: &DataFrame, b: &DataFrame| if a.id() == ANGLE { known(a) == known(b) } else { a == b };
     // What the line had taken before it stalled.
@@ -183,6 +179,6 @@ fn board_with_a_stalled_line() {
             && AngleMessage::parse(frame.data()).is_ok_and(|m| m.faults.0 & Faults::BUS.0 != 0)
     };
     assert_eq!(sent[..before].iter().filter(bus).count(), 0);
-    assert!(sent[before..].iter().filter(bus).count() > 0, "the bus is told");
-    assert_eq!(sent[sent.len() - 9 * SET..].iter().filter(bus).count(), 0, "and told that it is over");
+    assert!(sent[before..].iter().filter(bus).count() > 0, "the fault is reported");
+    assert_eq!(sent[sent.len() - 9 * SET..].iter().filter(bus).count(), 0, "and its end");
 }

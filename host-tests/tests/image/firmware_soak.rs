@@ -6,12 +6,10 @@ use gyronet::sample::RATE_HZ;
 use gyronet::sensor::xsens::MtData2;
 use gyronet::service::message::AllCounters;
 use gyronet_host_tests::{connected, image, qemu, replay};
-use gyronet_tools::client::device::{Device, line::Line};
 use gyronet_tools::simulate::{Config, Simulation};
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(90 * 60);
-const SERVICE: usize = 6;
 /// A simulated drive as an MTi would send it, its ticks and packet counter wrapping in the middle.
 fn bytes(samples: u32) -> Vec<u8> {
     let drive = (0..samples).zip(Simulation::new(&Config::DEFAULT));
@@ -35,7 +33,7 @@ fn soak(test: &str, minutes: u32) {
     let bytes = bytes(samples);
     let expected = replay::lines(&bytes);
     let start = Instant::now();
-    let mut board = qemu::Board::boot(&elf, SERVICE, &[]);
+    let mut board = qemu::Board::boot(&elf, qemu::SERVICE, &[]);
     board.send(1, &bytes, LIMIT);
     let lines = board.lines(2, b'\r', expected.len(), LIMIT);
     println!(
@@ -43,12 +41,8 @@ fn soak(test: &str, minutes: u32) {
         expected.len(),
         start.elapsed()
     );
-    for (number, (line, expected)) in lines.iter().zip(&expected).enumerate() {
-        assert!(line == expected, "{test}: frame {number}: {}", line.escape_ascii());
-    }
-    let address = board.serve(SERVICE).to_string();
-    let mut device = Device::new(Line::open(&address).expect("a port of QEMU"), &address);
-    let AllCounters { pipeline, lines, .. } = connected::counters(&mut device);
+    replay::assert_same(&lines, &expected);
+    let AllCounters { pipeline, lines, .. } = connected::counters(&mut board.device(LIMIT));
     println!("{test}: {pipeline:?} {lines:?}");
     assert_eq!(pipeline.samples, samples);
     let windows = (samples - 300) / 5;
@@ -58,13 +52,13 @@ fn soak(test: &str, minutes: u32) {
 }
 
 #[test]
-fn a_minute() {
-    soak("a_minute", 1);
+fn a_minute_equals_the_host() {
+    soak("a_minute_equals_the_host", 1);
 }
 
 /// `cargo test -p gyronet-host-tests --test image firmware_soak -- --ignored --nocapture`
 #[test]
 #[ignore = "takes about as long as it says"]
-fn half_an_hour() {
-    soak("half_an_hour", 30);
+fn half_an_hour_equals_the_host() {
+    soak("half_an_hour_equals_the_host", 30);
 }

@@ -1,5 +1,5 @@
-//! What is stored, in the emulated image: a configuration and weights take effect, damaged ones do
-//! not, and the bus and the service line say so from the first frame on. Every frame is held
+//! Records and weights in the flash of the emulated image: a configuration and weights take effect, damaged ones do
+//! not, and the bus and the service line report that from the first frame on. Every frame is held
 //! against the host's, byte for byte.
 
 use embedded_can::{Frame, Id, StandardId};
@@ -15,6 +15,7 @@ use gyronet::store::layout::{SLOT_SIZE, SLOTS, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Mounting, Record, Slot, StoreError};
 use gyronet_host_tests::connected::{self, Step};
+use gyronet_host_tests::qemu::SERVICE;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::{Stored, other_weights};
 use gyronet_host_tests::{image, qemu, replay};
@@ -25,15 +26,12 @@ use std::time::Duration;
 const LIMIT: Duration = Duration::from_secs(120);
 const IMU: usize = 1;
 const SLCAN: usize = 2;
-const SERVICE: usize = 6;
-/// By then the network corrects.
+/// The number of samples by which the network corrects.
 const SAMPLES: usize = 360;
 const RATE: u16 = 0x1A0;
 
-/// Samples of the simulated drive as bytes.
 fn drive() -> Vec<u8> {
-    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
-    rows.iter().take(SAMPLES).enumerate().flat_map(|(k, row)| replay::message(k, row).emit()).collect()
+    replay::simulated_drive(0..SAMPLES).concat()
 }
 
 fn blob(file: Vec<u8>) -> Blob<'static> {
@@ -45,17 +43,17 @@ fn built_in() -> Blob<'static> {
     Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library")
 }
 
-/// What a board says that has run for [`SAMPLES`].
-struct Told {
+/// The frames of a board that has run for [`SAMPLES`], and its service line.
+struct Started {
     frames: Vec<DataFrame>,
     device: Device<Line>,
-    /// For as long as it is asked.
+    /// The board itself, which must run as long as it is asked.
     _board: qemu::Board,
 }
 
-impl Told {
-    /// Of a board that starts with this flash and sends what the one on the host sends; `None` where
-    /// it cannot be run.
+impl Started {
+    /// Starts a board with this flash and checks that it sends what the one on the host sends; `None` where it cannot be
+    /// run.
     fn by(test: &str, stored: &Stored, host: impl Fn() -> replay::Board) -> Option<Self> {
         let scratch = env!("CARGO_TARGET_TMPDIR");
         let elf = image::coprocessor(test, scratch)?;
@@ -68,16 +66,11 @@ impl Told {
         let mut host = host().beside(lines);
         host.push(&bytes);
         let lines = board.lines(SLCAN, b'\r', host.lines.len(), LIMIT);
-        for (number, (line, expected)) in lines.iter().zip(&host.lines).enumerate() {
-            let text = |line: &[u8]| line.escape_ascii().to_string();
-            assert_eq!(text(line), text(expected), "{test}: frame {number}");
-        }
+        replay::assert_same(&lines, &host.lines);
         println!("{test}: {} frames as the host's", host.lines.len());
         let lines = &lines[..host.lines.len()];
         let frames = lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect();
-        board.send(SERVICE, &[0], LIMIT);
-        let port = board.serve(SERVICE).to_string();
-        let device = Device::new(Line::open(&port).expect("the harness listens"), &port);
+        let device = board.device(LIMIT);
         Some(Self { frames, device, _board: board })
     }
 
@@ -90,8 +83,8 @@ impl Told {
         self.of(id).map(|data| RateMessage::parse(data).expect("eight bytes")).collect()
     }
 
-    /// Whether the bus says from the first sample's frames on, 10 ms, that something stored is
-    /// damaged; it never says so for a part of the time.
+    /// Returns whether the messages report from the first sample's frames on, 10 ms, that something stored is damaged;
+    /// they never do so for a part of the time.
     fn flagged(&self) -> bool {
         let faults = self.of(RATE + 1).map(|data| AngleMessage::parse(data).expect("eight bytes").faults);
         let flags: Vec<bool> = faults.map(|faults| faults.0 & Faults::STORED.0 != 0).collect();
@@ -99,7 +92,7 @@ impl Told {
         flags[0]
     }
 
-    /// Samples whose rate is marked good, or whatever is asked for.
+    /// Returns the number of samples whose rate has this quality.
     fn marked(&self, quality: Quality) -> usize {
         self.rates(RATE).iter().filter(|rate| rate.quality == quality).count()
     }
@@ -138,7 +131,7 @@ fn stored_configuration_takes_effect() {
     };
     let stored = Stored::default().record(&configuration);
     let host = || replay::Board::configured(&configuration, built_in());
-    let Some(mut board) = Told::by("stored_configuration_takes_effect", &stored, host) else { return };
+    let Some(mut board) = Started::by("stored_configuration_takes_effect", &stored, host) else { return };
     assert_eq!((board.of(RATE).count(), board.rates(OTHER).len() >= SAMPLES), (0, true));
     assert!(board.rates(OTHER).iter().any(|rate| rate.source == Source::GyroNet));
     let info = board.info();
@@ -151,8 +144,8 @@ fn stored_configuration_takes_effect() {
 }
 
 #[test]
-fn fibre_optic_gyro_under_other_identifiers() {
-    const NAME: &str = "fibre_optic_gyro_under_other_identifiers";
+fn a_fibre_optic_gyro_is_sent_under_configured_identifiers() {
+    const NAME: &str = "a_fibre_optic_gyro_is_sent_under_configured_identifiers";
     const OTHER: u16 = 0x3C0;
     let scratch = env!("CARGO_TARGET_TMPDIR");
     let Some(elf) = image::coprocessor(NAME, scratch) else { return };
@@ -166,12 +159,12 @@ fn fibre_optic_gyro_under_other_identifiers() {
 }
 
 #[test]
-fn fibre_optic_gyro_that_is_configured_is_missed() {
-    const NAME: &str = "fibre_optic_gyro_that_is_configured_is_missed";
+fn a_configured_fibre_optic_gyro_is_missed() {
+    const NAME: &str = "a_configured_fibre_optic_gyro_is_missed";
     let configuration = Configuration { fog: Some(FogPart::Dsp1760), ..Configuration::DEFAULT };
     let stored = Stored::default().record(&configuration);
     let host = || replay::Board::configured(&configuration, built_in());
-    let Some(board) = Told::by(NAME, &stored, host) else { return };
+    let Some(board) = Started::by(NAME, &stored, host) else { return };
     // No byte of it has come; every 10 ms the bus says so.
     let rates = board.rates(FOG_IDS[0]);
     assert!(rates.len() >= SAMPLES - 2, "{}", rates.len());
@@ -181,7 +174,7 @@ fn fibre_optic_gyro_that_is_configured_is_missed() {
 /// The configuration cannot be used: built-in values, the bus and the log say so, nothing is good.
 fn lost(test: &str, stored: &Stored, flash: FlashState, event: EventKind) {
     let host = || replay::Board::new().damaged(true);
-    let Some(mut board) = Told::by(test, stored, host) else { return };
+    let Some(mut board) = Started::by(test, stored, host) else { return };
     assert!(board.flagged());
     assert_eq!(board.marked(Quality::Good), 0);
     assert!(board.marked(Quality::Degraded) >= SAMPLES - 310, "it runs on");
@@ -192,29 +185,44 @@ fn lost(test: &str, stored: &Stored, flash: FlashState, event: EventKind) {
 }
 
 #[test]
-fn corrupt_configuration() {
+fn a_corrupt_configuration_is_reported_and_not_used() {
     let stored = Stored::default().record(&Configuration::DEFAULT).damaged(STORE.start + 20, 4);
-    lost("corrupt_configuration", &stored, FlashState::Damaged, EventKind::RecordsDamaged);
+    lost(
+        "a_corrupt_configuration_is_reported_and_not_used",
+        &stored,
+        FlashState::Damaged,
+        EventKind::RecordsDamaged,
+    );
 }
 
 #[test]
-fn corrupt_header_of_the_records() {
+fn a_corrupt_header_of_the_records_is_reported() {
     let stored = Stored::default().record(&Configuration::DEFAULT).damaged(STORE.start + 1, 0x80);
-    lost("corrupt_header_of_the_records", &stored, FlashState::Damaged, EventKind::RecordsDamaged);
+    lost(
+        "a_corrupt_header_of_the_records_is_reported",
+        &stored,
+        FlashState::Damaged,
+        EventKind::RecordsDamaged,
+    );
 }
 
 #[test]
-fn configuration_for_another_image() {
+fn a_configuration_for_another_image_is_refused() {
     let other = Configuration { imu: ImuPart::Adis16465, ..Configuration::DEFAULT };
     let event = EventKind::ConfigurationRefused(StoreError::Field(FieldError::PartNotInImage));
-    lost("configuration_for_another_image", &Stored::default().record(&other), FlashState::Ready, event);
+    lost(
+        "a_configuration_for_another_image_is_refused",
+        &Stored::default().record(&other),
+        FlashState::Ready,
+        event,
+    );
 }
 
 /// A part on SPI that does not answer (the emulator has none): it is named, there is no rate, and all
 /// else goes on.
 #[test]
-fn part_on_spi_does_not_answer() {
-    const NAME: &str = "part_on_spi_does_not_answer";
+fn a_part_on_spi_that_does_not_answer_is_named() {
+    const NAME: &str = "a_part_on_spi_that_does_not_answer_is_named";
     const SETS: usize = 20;
     let scratch = env!("CARGO_TARGET_TMPDIR");
     let Some(elf) = image::coprocessor(NAME, scratch) else { return };
@@ -229,17 +237,15 @@ fn part_on_spi_does_not_answer() {
     host.silence(SETS as u64);
     let frames: Vec<Vec<u8>> = lines.into_iter().filter(|line| line.starts_with(b"t")).collect();
     assert_eq!(frames[..SETS * 6], host.lines[..]);
-    board.send(SERVICE, &[0], LIMIT);
-    let port = board.serve(SERVICE).to_string();
-    let device = Device::new(Line::open(&port).expect("the harness listens"), &port);
+    let device = board.device(LIMIT);
     let frames = frames.iter().map(|line| slcan::parse(line).expect("a frame")).collect();
-    let mut told = Told { frames, device, _board: board };
-    assert!(told.rates(RATE).iter().all(|rate| rate.quality == Quality::Unusable));
-    let info = told.info();
+    let mut started = Started { frames, device, _board: board };
+    assert!(started.rates(RATE).iter().all(|rate| rate.quality == Quality::Unusable));
+    let info = started.info();
     assert_eq!((info.configuration, info.status), (Origin::Stored, Status::Silent));
     assert_eq!(info.sensor, Some(SensorFault::Identity(0)));
     // Once, though it is tried every second.
-    let events = told.events();
+    let events = started.events();
     let named = |event: &&EventKind| **event == EventKind::Sensor(Some(SensorFault::Identity(0)));
     assert_eq!(events.iter().filter(named).count(), 1, "{events:?}");
 }
@@ -254,7 +260,7 @@ fn in_slot(slot: Slot) -> u32 {
     SLOTS.start + slot.offset() + SLOT_SIZE as u32 / 2
 }
 
-/// What a board on these weights sends.
+/// Returns the lines that a board on these weights sends.
 fn lines_on(blob: Blob<'static>) -> Vec<Vec<u8>> {
     let mut host = replay::Board::configured(&Configuration::DEFAULT, blob);
     host.push(&drive());
@@ -268,18 +274,18 @@ fn stored_weights_are_used() {
     assert!(of_a != of_b && of_b != of_none && of_a != of_none, "whose weights they are can be seen");
     let stored = Stored::default().weights(Slot::A, &a).weights(Slot::B, &b);
     let host = || replay::Board::configured(&Configuration::DEFAULT, blob(b.clone()));
-    let Some(mut board) = Told::by("stored_weights_are_used", &stored, host) else { return };
+    let Some(mut board) = Started::by("stored_weights_are_used", &stored, host) else { return };
     assert!(!board.flagged());
     assert_eq!(board.info().weights, WeightSource::Slot(Slot::B));
 }
 
 #[test]
-fn corrupt_slot() {
+fn a_corrupt_slot_gives_way_to_the_other() {
     let [a, b] = files();
     let stored = Stored::default().weights(Slot::A, &a).weights(Slot::B, &b);
     let host = || replay::Board::configured(&Configuration::DEFAULT, blob(a.clone())).damaged(false);
     let stored = stored.damaged(in_slot(Slot::B), 0x10);
-    let Some(mut board) = Told::by("corrupt_slot", &stored, host) else { return };
+    let Some(mut board) = Started::by("a_corrupt_slot_gives_way_to_the_other", &stored, host) else { return };
     assert!(board.flagged());
     // These weights were accepted once and are whole: their rates are good.
     assert!(board.marked(Quality::Good) > 0);
@@ -290,12 +296,15 @@ fn corrupt_slot() {
 }
 
 #[test]
-fn both_slots_corrupt() {
+fn two_corrupt_slots_give_way_to_the_built_in_weights() {
     let [a, b] = files();
     let stored = Stored::default().weights(Slot::A, &a).weights(Slot::B, &b);
     let stored = stored.damaged(in_slot(Slot::A), 1).damaged(in_slot(Slot::B), 0x80);
     let host = || replay::Board::new().damaged(false);
-    let Some(mut board) = Told::by("both_slots_corrupt", &stored, host) else { return };
+    let Some(mut board) = Started::by("two_corrupt_slots_give_way_to_the_built_in_weights", &stored, host)
+    else {
+        return;
+    };
     assert!(board.flagged());
     let info = board.info();
     assert_eq!((info.weights, info.weights_crc), (WeightSource::BuiltIn, Some(built_in().crc)));

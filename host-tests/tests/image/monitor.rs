@@ -24,7 +24,7 @@ fn drive(config: Config, samples: u32) -> (Vec<DataFrame>, f64) {
 }
 
 #[test]
-fn a_good_line() {
+fn a_good_line_has_nothing_to_count() {
     let config = Config::new(Settings::DEFAULT).expect("checked");
     let (frames, turned) = drive(config, 1000);
     let mut monitor = Monitor::new(&config);
@@ -49,7 +49,7 @@ fn a_good_line() {
 }
 
 #[test]
-fn a_bad_line() {
+fn lost_repeated_and_damaged_messages_are_counted() {
     let config = Config::new(Settings::DEFAULT).expect("checked");
     let (frames, turned) = drive(config, 1000);
     let mut monitor = Monitor::new(&config);
@@ -93,7 +93,7 @@ fn a_bad_line() {
 }
 
 #[test]
-fn logs() {
+fn lines_of_a_log_are_frames_or_refused() {
     let id = StandardId::new(0x174).expect("11 bits");
     let frame = DataFrame::new(id, &[0xD0, 0x87]).expect("two bytes");
     assert_eq!(parse_line("(1436509052.249713) can0 174#D087\n"), Ok((Some(1_436_509_052.249_713), frame)));
@@ -125,8 +125,8 @@ fn bytes_become_lines() {
 }
 
 #[test]
-fn the_board_over_tcp() {
-    const NAME: &str = "the_board_over_tcp";
+fn the_board_is_read_over_tcp_until_it_goes() {
+    const NAME: &str = "the_board_is_read_over_tcp_until_it_goes";
     const LIMIT: Duration = Duration::from_secs(60);
     const SAMPLES: usize = 500;
     let Some(elf) = image::coprocessor(NAME, env!("CARGO_TARGET_TMPDIR")) else { return };

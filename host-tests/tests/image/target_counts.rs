@@ -50,8 +50,8 @@ const BARS: [Bar; 4] = [
 const NO_PLUGIN: &str = "cycles cannot be counted: no C compiler, or an emulator without plugins";
 
 #[test]
-fn counts_and_sizes() {
-    let test = "counts_and_sizes";
+fn kernels_and_parsers_cost_no_more_than_their_bars() {
+    let test = "kernels_and_parsers_cost_no_more_than_their_bars";
     let Some(()) = qemu::available(test) else { return };
     let mut counts = Counts::default();
     for name in bench::IMAGES {
@@ -100,8 +100,9 @@ fn parsers(counts: &Counts) {
 }
 
 #[test]
-fn coprocessor_size() {
-    let Some(elf) = image::firmware("coprocessor_size", env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
+fn kernels_fit_in_8_kib() {
+    let Some(elf) = image::firmware("kernels_fit_in_8_kib", env!("CARGO_TARGET_TMPDIR"), "coprocessor")
+    else {
         return;
     };
     let size = ImageSize::read(&elf).expect("an ELF file");
@@ -112,16 +113,22 @@ fn coprocessor_size() {
 /// The kernels on the target equal their portable definition, and GyroNet's outputs there
 /// equal this host's.
 #[test]
-fn selftest() {
-    let Some(()) = qemu::available("selftest") else { return };
-    let Some(elf) = image::firmware("selftest", env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
+fn kernels_on_the_target_equal_the_hosts() {
+    let Some(()) = qemu::available("kernels_on_the_target_equal_the_hosts") else { return };
+    let Some(elf) = image::firmware(
+        "kernels_on_the_target_equal_the_hosts",
+        env!("CARGO_TARGET_TMPDIR"),
+        "kernels_on_the_target_equal_the_hosts",
+    ) else {
+        return;
+    };
     let (printed, _) = bench::emulate(&elf, &[]).unwrap_or_else(|error| panic!("{error}"));
     println!("{printed}");
     assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
     assert!(printed.contains(&format!("fognet hash={:08x}\n", fognet_hash())), "{printed}");
 }
 
-/// What the self-test computes: CRC-32 over the corrections and scales of sixteen random windows.
+/// Returns the CRC-32 that the self-test prints: over the corrections and scales of sixteen random windows.
 fn hash() -> u32 {
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
     let mut digest = gyronet::model::blob::CRC.digest();
@@ -138,7 +145,7 @@ fn hash() -> u32 {
     digest.finalize()
 }
 
-/// The same for FoGNet: CRC-32 over the estimates of three random windows.
+/// Returns the CRC-32 that the self-test prints for FoGNet: over the estimates of three random windows.
 fn fognet_hash() -> u32 {
     let mut state = FogNetState::ZERO;
     let blob = FogBlob::new_checked(&weights::FOGNET.0).expect("the weights are good");

@@ -27,7 +27,7 @@ fn sigmoid(x: f64) -> f64 {
 }
 
 #[test]
-fn activation_error() {
+fn errors_stay_below_their_documented_bounds() {
     for (name, function, exact, limit) in [
         ("sigmoid", activation::sigmoid as fn(i32) -> i32, sigmoid as fn(f64) -> f64, 1.75),
         ("tanh", activation::tanh, f64::tanh, 2.5),
@@ -48,7 +48,7 @@ fn activation_error() {
 }
 
 #[test]
-fn zero_and_the_ends() {
+fn zero_and_the_ends_are_right_to_two_lsb() {
     let q15 = |word: i32| word >> 16;
     assert!((q15(activation::sigmoid(0)) - 16_384).abs() <= 1, "{}", q15(activation::sigmoid(0)));
     assert!(q15(activation::tanh(0)).abs() <= 1, "{}", q15(activation::tanh(0)));
@@ -57,7 +57,7 @@ fn zero_and_the_ends() {
 }
 
 #[test]
-fn saturation() {
+fn inputs_beyond_the_table_saturate() {
     for (x, y) in
         [(MAX, MAX), (MAX + 1, MAX), (i32::MAX, MAX), (MIN, MIN), (MIN - 1, MIN), (i32::MIN, MIN), (5, 5)]
     {

@@ -21,7 +21,7 @@ fn burst() -> Burst {
 }
 
 #[test]
-fn vector() {
+fn a_burst_is_read_as_the_data_sheet_says() {
     assert_eq!(Burst::parse(&VECTOR), Ok(burst()));
     assert_eq!(burst().emit(), VECTOR);
     let sample = burst().sample(Model::Adis16465_2, Micros(5)).expect("good");
@@ -32,7 +32,7 @@ fn vector() {
 }
 
 #[test]
-fn models() {
+fn each_model_has_its_own_scale() {
     for (model, rate, acceleration) in [
         (Model::Adis16465_1, 1600, 4000),
         (Model::Adis16465_2, 400, 4000),
@@ -47,7 +47,7 @@ fn models() {
 }
 
 #[test]
-fn what_the_part_says_of_itself() {
+fn flags_of_the_part_are_read() {
     for bit in 0..16 {
         let diagnosis = DiagStat(1 << bit);
         let sample = Burst { diagnosis, ..burst() }.sample(Model::Adis16465_2, Micros(0));
@@ -79,7 +79,7 @@ fn read(answer: [u8; BURST]) -> [Transaction<u8>; 4] {
 }
 
 #[test]
-fn driver() {
+fn the_driver_reads_a_burst() {
     let next = |counter| Burst { counter, ..burst() }.emit();
     let mut damaged = VECTOR;
     damaged[7] ^= 1;

@@ -25,7 +25,7 @@ fn begun(time: u64) -> Aligner {
 }
 
 #[test]
-fn regular_samples() {
+fn regular_samples_take_successive_steps() {
     let mut aligner = begun(123);
     for tick in 1..1_000 {
         assert_eq!(place(&mut aligner, 123 + u64::from(tick) * PERIOD_US), Ok((tick, 0)));
@@ -43,7 +43,7 @@ fn a_clock_slow_or_fast_by_three_percent_stays_in_step() {
 }
 
 #[test]
-fn jitter_within_the_tolerance() {
+fn jitter_within_the_tolerance_changes_no_step() {
     // Half the tolerance each: two neighbours may err in opposite ways.
     let half = TOLERANCE_US as i64 / 2;
     let mut noise = Noise::new(4);
@@ -55,7 +55,7 @@ fn jitter_within_the_tolerance() {
 }
 
 #[test]
-fn edge_of_the_tolerance() {
+fn a_sample_beyond_the_tolerance_is_off_the_grid() {
     let off = |time| AlignError::OffGrid { last: Micros(50_000), at: Micros(time) };
     for steps in [1, 2, 7, 101] {
         let exact = 50_000 + steps * PERIOD_US;
@@ -103,7 +103,7 @@ fn duplicates_and_steps_back_leave_the_grid() {
 }
 
 #[test]
-fn jumps_lay_the_grid_anew() {
+fn a_jump_starts_a_new_grid() {
     for to in [0, 1, 3_999_999, 6_020_000, 100_000_000, u64::MAX / 2, u64::MAX - 20_000, u64::MAX] {
         let mut aligner = begun(4_000_000 + 1_000_000);
         let error = AlignError::Jump { last: Micros(5_000_000), at: Micros(to) };
@@ -116,7 +116,7 @@ fn jumps_lay_the_grid_anew() {
 }
 
 #[test]
-fn the_longest_jumps() {
+fn jumps_of_any_length_are_survived() {
     let jump = |last, at| Err(AlignError::Jump { last: Micros(last), at: Micros(at) });
     assert_eq!(place(&mut begun(0), u64::MAX), jump(0, u64::MAX));
     assert_eq!(place(&mut begun(u64::MAX), 0), jump(u64::MAX, 0));

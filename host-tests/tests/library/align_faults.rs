@@ -13,7 +13,7 @@ use gyronet_host_tests::noise::Noise;
 const END_US: u64 = 4_000_000;
 /// The faults lie from here on.
 const FAULT_US: u64 = 2_000_000;
-/// What the vehicle turns, rad/s; both parts see it.
+/// The rate of the vehicle, rad/s; both parts measure it.
 const RATE: f64 = 0.25;
 /// The parts' clocks started elsewhere.
 const IMU_EPOCH: u64 = 77_000_000_300;
@@ -57,7 +57,7 @@ impl Cable {
         Self { imu: (0..imu_count).map(imu).collect(), fog: (0..END_US / 1_000).map(fog).collect() }
     }
 
-    /// All steps, asked for every 100 us, and all events.
+    /// Returns all steps, asked for every 100 us, and the streams.
     fn run(mut self) -> (Vec<Step>, Streams) {
         self.imu.sort_by_key(|arrival| arrival.now);
         self.fog.sort_by_key(|arrival| arrival.now);
@@ -106,7 +106,7 @@ fn flagged(steps: &[Step], what: impl Fn(&Step) -> bool) -> u64 {
 }
 
 #[test]
-fn rates_of_the_inertial_sensor() {
+fn sensors_of_any_rate_share_the_grid() {
     for (hertz, held_allowed) in [(100.0, 0), (120.0, 0), (47.0, 300)] {
         let (steps, streams) = Cable::new(1e6 / hertz).run();
         assert!(steps.len() >= 397, "{hertz} Hz: {} steps", steps.len());
@@ -119,9 +119,9 @@ fn rates_of_the_inertial_sensor() {
         assert_eq!(imu, ClockCounters { samples: imu.samples, ..ClockCounters::default() });
         assert_eq!(fog, ClockCounters { samples: fog.samples, ..ClockCounters::default() });
         assert_eq!(events.increments, IncrementCounters::default());
-        // What the steps have told adds up to all that has been counted by then.
-        let told: u32 = steps.iter().map(|step| step.events.fog.samples).sum();
-        assert!(fog.samples - told <= 21, "{told} of {}", fog.samples);
+        // The reports of the steps add up to all that has been counted by then.
+        let reported: u32 = steps.iter().map(|step| step.events.fog.samples).sum();
+        assert!(fog.samples - reported <= 21, "{reported} of {}", fog.samples);
     }
 }
 
@@ -162,7 +162,7 @@ fn jitter_is_taken_out_by_the_parts_clocks() {
 }
 
 #[test]
-fn a_gap_in_each_stream() {
+fn a_gap_in_either_stream_is_marked() {
     let mut cable = Cable::new(10_000.0);
     let gap = FAULT_US..FAULT_US + 50_000;
     cable.imu.retain(|arrival| !gap.contains(&arrival.now));
@@ -186,7 +186,7 @@ fn a_gap_in_each_stream() {
 }
 
 #[test]
-fn duplicates_and_disorder_in_each_stream() {
+fn duplicates_and_disorder_in_either_stream_are_refused() {
     let mut cable = Cable::new(10_000.0);
     let again = cable.imu[200];
     cable.imu.insert(201, Arrival { now: again.now + 50, ..again });
@@ -215,7 +215,7 @@ fn duplicates_and_disorder_in_each_stream() {
 }
 
 #[test]
-fn a_clock_that_jumps_in_each_stream() {
+fn a_clock_that_jumps_is_followed_in_either_stream() {
     for by in [-3_000_000i64, 500_000, 40_000_000] {
         let mut cable = Cable::new(10_000.0);
         for arrival in Cable::after_fault(&mut cable.imu) {

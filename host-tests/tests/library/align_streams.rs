@@ -59,7 +59,7 @@ fn resampled(period: f64) -> (Vec<Step>, f64) {
 }
 
 #[test]
-fn rates() {
+fn samples_of_any_rate_are_interpolated() {
     // A straight line between samples T apart misses a sine by at most (2 pi f T)^2 / 8.
     let bound = |period: f64| (TAU * period * 1e-6).powi(2) / 8.0 + 1e-6;
     let (steps, worst) = resampled(1e6 / 120.0);
@@ -91,6 +91,18 @@ fn increments_are_neither_lost_nor_made_up() {
             assert_eq!(sum, all.sum::<i64>());
         }
         assert_eq!(streams.increments().late + streams.increments().dropped, 0);
+    }
+}
+
+#[test]
+fn interpolated_values_are_rounded_to_the_nearest_code() {
+    for (last, at, due) in [(10, 20, 7), (-10, 20, -7), (10, 10, 3), (-10, 10, -3), (1, 15, 1), (-1, 15, -1)]
+    {
+        let mut resampler = Resampler::default();
+        resampler.add(imu(0, 0));
+        resampler.add(imu(30, last));
+        let (sample, quality) = resampler.at(Micros(at)).expect("between two samples");
+        assert_eq!((sample.angular_rate[2].0, quality), (due, Quality::Interpolated), "{last} at {at} us");
     }
 }
 
@@ -169,7 +181,7 @@ fn no_step_is_later_than_ten_milliseconds() {
 }
 
 #[test]
-fn gaps_of_the_inertial_sensor() {
+fn gaps_of_the_inertial_sensor_are_bridged_or_reported() {
     // A resampler alone: nobody waits for the samples.
     let mut resampler = Resampler::default();
     let mut samples = [5_000, 15_000, 75_000, 190_000, 200_000].into_iter().peekable();
@@ -188,7 +200,7 @@ fn gaps_of_the_inertial_sensor() {
 }
 
 #[test]
-fn clock_events() {
+fn events_of_a_clock_are_reported() {
     let mut clock = PartClock::default();
     let mut at = |stamp, arrival| clock.translate(Micros(stamp), Micros(arrival));
     let board = |time, jumped| Ok(BoardTime { time: Micros(time), jumped });

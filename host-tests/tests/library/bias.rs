@@ -95,7 +95,7 @@ fn numbers_in_a_refusal_are_right() {
 }
 
 #[test]
-fn begins_anew_after_a_verdict_and_on_restart() {
+fn initialisation_starts_again_after_a_verdict_and_on_restart() {
     let mut init = StaticInit::new(StaticConfig::DEFAULT);
     let still = |tick| turning(tick, rate(0.01));
     assert!(judge(&mut init, |tick| turning(tick, rate(0.2))).is_err());

@@ -20,7 +20,7 @@ impl File {
         file
     }
 
-    /// With these bytes at an offset, and a checksum that fits.
+    /// Returns the file with these bytes at an offset, and a checksum that fits.
     fn with(at: usize, bytes: &[u8]) -> Self {
         let mut file = Self::new();
         file.bytes_mut()[at..at + bytes.len()].copy_from_slice(bytes);
@@ -68,7 +68,7 @@ fn the_default_is_good_and_says_where_it_comes_from() {
 }
 
 #[test]
-fn header_fields() {
+fn each_header_field_is_checked() {
     let len = weights::DEFAULT.0.len();
     let topology = |found| BlobError::Topology { found, expected: TOPOLOGY };
     let length = |expected, found| BlobError::Length { expected, found };
@@ -107,7 +107,7 @@ fn header_fields() {
 }
 
 #[test]
-fn every_other_length() {
+fn every_other_length_is_refused() {
     let file = File::new();
     for len in 0..file.len {
         let error = Blob::new_checked(&file.bytes()[..len]).expect_err("it is cut off");
@@ -123,7 +123,7 @@ fn every_other_length() {
 }
 
 #[test]
-fn off_the_word_boundary() {
+fn a_file_off_the_word_boundary_is_refused() {
     for offset in 1..4 {
         let mut file = File::new();
         let len = file.len;
@@ -136,7 +136,7 @@ fn off_the_word_boundary() {
 }
 
 #[test]
-fn rows_that_could_overflow() {
+fn rows_that_could_overflow_are_refused() {
     for (layer, direction) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let inputs = [FEATURES, 2 * HIDDEN][layer as usize];
         for unit in [0, 17, HIDDEN - 1] {
@@ -154,7 +154,7 @@ fn rows_that_could_overflow() {
 }
 
 #[test]
-fn output_that_could_overflow() {
+fn an_output_that_could_overflow_is_refused() {
     let unit = file_len(provenance_len()) - 8;
     for row in [unit - 4 * HIDDEN - 8, unit - 2 * (4 * HIDDEN + 8)] {
         assert_eq!(File::with(row + 4 * HIDDEN, &i32::MAX.to_le_bytes()).error(), BlobError::Scale);

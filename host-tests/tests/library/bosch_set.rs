@@ -28,7 +28,7 @@ fn motion(yaw: f64, lateral: f32, counter: u8) -> Motion {
 }
 
 #[test]
-fn published_vectors() {
+fn frames_equal_published_vectors() {
     let vectors = [
         (motion(0.0, 0.0, 0), [0x00, 0x80, 0x00, 0x4B, 0x00, 0x80, 0x00, 0xD1]),
         (motion(10.0, 0.1, 1), [0xD0, 0x87, 0x00, 0x4B, 0x11, 0x83, 0x01, 0x86]),
@@ -45,7 +45,7 @@ fn published_vectors() {
 }
 
 #[test]
-fn three_messages_of_one_sample() {
+fn a_sample_makes_three_messages() {
     let motion = Motion {
         angular_rate: [rate(3.0), rate(-2.0), rate(10.0)],
         specific_force: [force(0.2), force(0.1), force(1.0)],
@@ -80,7 +80,7 @@ fn three_messages_of_one_sample() {
 }
 
 #[test]
-fn what_does_not_fit_is_marked() {
+fn a_value_beyond_its_signal_is_marked() {
     let mut encoder = SetEncoder::default();
     let beyond = Motion { specific_force: [force(5.0), force(-5.0), force(1.0)], ..motion(170.0, 0.0, 0) };
     let [tx1, tx2, tx3] = encoder.encode(&beyond);

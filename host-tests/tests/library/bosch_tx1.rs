@@ -16,7 +16,7 @@ const DEG_PER_CODE: f64 = 180.0 / std::f64::consts::PI / (1u64 << 27) as f64;
 /// Half an LSB of 0.005 deg/s for one period of 10 ms.
 const HALF_LSB_DEG: f64 = 0.005 / 2.0 * 0.01;
 
-/// What a receiver sees for deg/s, g and a counter at 25 deg C.
+/// Returns the message that a receiver reads for deg/s, g and a counter at 25 deg C.
 fn tx1(deg_per_sec: f64, g: f64, counter: u8) -> Tx1 {
     let yaw_rate = YawRateSignal::default().encode(rate(deg_per_sec.to_radians())).expect("in range");
     let (lateral_acceleration, lateral_acceleration_status) = encode_acceleration(force(g * G));
@@ -31,7 +31,7 @@ fn tx1(deg_per_sec: f64, g: f64, counter: u8) -> Tx1 {
 }
 
 #[test]
-fn vectors() {
+fn frames_equal_vectors() {
     for (deg_per_sec, g, counter, bytes) in [
         (0.0, 0.0, 0, [0x00, 0x80, 0x00, 0x4B, 0x00, 0x80, 0x00, 0xD1]),
         (10.0, 0.1, 1, [0xD0, 0x87, 0x00, 0x4B, 0x11, 0x83, 0x01, 0x86]),
@@ -46,7 +46,7 @@ fn vectors() {
 }
 
 #[test]
-fn crc_check_values() {
+fn the_crc_has_its_published_check_value() {
     assert_eq!(CRC.checksum(b"123456789"), 0x4B);
     assert_eq!(CRC.checksum(&[0, 0, 0, 0]), 0x59);
     assert_eq!(CRC.checksum(&[0xF2, 0x01, 0x83]), 0x37);
@@ -63,7 +63,7 @@ fn frame_has_the_id_and_eight_bytes() {
 }
 
 #[test]
-fn temperatures() {
+fn temperatures_are_encoded_and_limited() {
     for (centi, code) in
         [(2_500, 0x4B), (-5_000, 0), (-5_049, 0), (-9_000, 0), (i16::MIN, 0), (-50, 50), (-51, 49), (49, 50)]
     {
@@ -76,7 +76,7 @@ fn temperatures() {
 }
 
 #[test]
-fn accelerations() {
+fn accelerations_are_encoded_and_limited() {
     for tenth_milli_g in -41_700..=41_700 {
         let g = f64::from(tenth_milli_g) * 1e-4;
         let force = force(g * G);
@@ -122,7 +122,7 @@ fn integral_is_never_off_by_more_than_half_a_step() {
 }
 
 #[test]
-fn beyond_the_range_is_said_and_forgotten() {
+fn a_rate_beyond_the_range_is_marked_and_leaves_no_residual() {
     let mut signal = YawRateSignal::default();
     signal.encode(rate(0.0049f64.to_radians())).expect("in range");
     assert_eq!(signal.encode(rate(163.9f64.to_radians())), Err(OutOfRange(0xFFFF)));

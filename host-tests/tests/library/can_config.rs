@@ -24,7 +24,7 @@ fn with_e2e(e2e: E2e) -> Settings {
 }
 
 #[test]
-fn loads() {
+fn bus_loads_are_as_documented() {
     let percent = |per_mille: u32| f64::from(per_mille) / 10.0;
     for (name, settings) in [("default", Settings::DEFAULT), ("all encoder", ALL)] {
         let load = Config::new(settings).expect("checked").bus_load_per_mille();
@@ -48,7 +48,7 @@ fn loads() {
 }
 
 #[test]
-fn loads_by_hand() {
+fn bus_loads_equal_those_by_hand() {
     // Six frames of 135 bits a hundred times a second; 29-bit identifiers have 160.
     let config = Config::new(Settings::DEFAULT).expect("checked");
     assert_eq!(config.bus_load_per_mille(), 6 * 135 * 100 / 500);
@@ -59,7 +59,7 @@ fn loads_by_hand() {
 }
 
 #[test]
-fn settings_that_cannot_be() {
+fn settings_that_cannot_be_are_refused() {
     let refused = |settings| Config::new(settings).expect_err("refused");
     let nothing = Settings { bosch: None, yaw: None, ..Settings::DEFAULT };
     assert_eq!(refused(nothing), ConfigError::Empty);
@@ -119,7 +119,7 @@ fn the_drop_in_set_takes_57_percent_of_a_slow_line() {
 }
 
 #[test]
-fn what_comes_with_the_library_is_checked() {
+fn the_settings_of_the_library_pass_their_own_check() {
     assert_eq!(Config::new(Settings::DEFAULT), Ok(Config::DEFAULT));
     assert_eq!(Config::new(Settings::SLCAN_115200), Ok(Config::SLCAN_115200));
 }
@@ -151,7 +151,7 @@ fn frames_go_out_as_configured() {
 }
 
 #[test]
-fn every_feed_says_that_the_rate_is_not_to_be_used() {
+fn every_message_reports_that_the_rate_is_not_to_be_used() {
     let mut encoder = CanEncoder::new(Config::new(ALL).expect("checked"));
     for (quality, nibble, rate, vdc2) in
         [(Quality::Initialising, 4, 426_887, 0xFFFF), (Quality::Unusable, 2, i32::MIN, 0xFE00)]

@@ -50,7 +50,7 @@ fn raw(signal: &Signal, data: &[u8]) -> i64 {
     if signal.value_type == ValueType::Signed && value & sign != 0 { value - 2 * sign } else { value }
 }
 
-/// Every signal of a frame by its name, raw and physical.
+/// Returns every signal of a frame by its name, raw and physical.
 fn decode(dbc: &Dbc, frame: &DataFrame) -> BTreeMap<String, (i64, f64)> {
     let signals = &message(dbc, frame.id()).signals;
     let decoded = signals.iter().map(|signal| {

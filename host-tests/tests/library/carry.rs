@@ -1,7 +1,7 @@
 //! No angle is lost between the network's revised estimates and the rates on the bus: a ledger
 //! beside the pipeline, exact to the last code.
 
-use gyronet::compensate::{CompensateConfig, Hop, Lag, Mode};
+use gyronet::compensate::{CompensateConfig, Compensator, Hop, Lag, Mode};
 use gyronet::health::Status;
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
@@ -12,7 +12,7 @@ use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::{idling, rate};
 use std::collections::BTreeMap;
 
-/// What the sum of the emitted rates must be, from the estimates alone.
+/// The sum that the emitted rates must have, from the estimates alone.
 #[derive(Default)]
 struct Ledger {
     samples: BTreeMap<u32, Sample>,
@@ -28,13 +28,14 @@ struct Ledger {
 struct Sample {
     /// Gyro less bias.
     gyro: i64,
+    clipped: bool,
     /// The value before a window has covered it.
     prior: i64,
     estimates: Vec<i64>,
 }
 
 impl Sample {
-    /// Its best estimate as known now.
+    /// Returns its best estimate as known now.
     fn estimate(&self) -> i64 {
         match self.estimates.len() as i64 {
             0 => self.prior,
@@ -71,7 +72,7 @@ impl Ledger {
     }
 }
 
-/// How a stream goes wrong.
+/// The faults of a stream.
 #[derive(Clone, Copy)]
 struct Faults {
     gaps: bool,
@@ -108,7 +109,9 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
         }
         ledger.take_estimate(prompt.tick, mode, max_mean.0.into());
         let gyro = i64::from(sample.angular_rate[2].0 - bias.0);
-        ledger.samples.insert(prompt.tick, Sample { gyro, prior: ledger.prior, estimates: Vec::new() });
+        ledger
+            .samples
+            .insert(prompt.tick, Sample { gyro, clipped, prior: ledger.prior, estimates: Vec::new() });
         ledger.prompt += i64::from(prompt.rate.0);
         if navigation.status != Status::Init {
             ledger.navigation += i64::from(navigation.rate.0);
@@ -128,6 +131,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
             let sample = &ledger.samples[&rate.tick];
             let carried = sample.gyro - sample.estimate() - i64::from(rate.rate.0);
             assert!(carried.abs() <= bound, "one rate carries {carried}");
+            assert!(!sample.clipped || carried == 0, "a receiver drops the rate of a clipped sample");
             bounded += u32::from(carried.abs() == bound);
         }
         let late = ledger.samples.range(navigation.tick..).count() - 1;
@@ -144,7 +148,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
     (bounded, settled)
 }
 
-/// Every mode, with every kind of lag.
+/// Returns every mode with every kind of lag.
 fn configs() -> impl Iterator<Item = CompensateConfig> {
     let overlap = [1, 3, 5, 10].into_iter().filter_map(Hop::new).map(|hop| Mode::Overlap { hop });
     let modes = overlap.chain([Mode::Middle, Mode::Newest]);
@@ -156,7 +160,7 @@ fn configs() -> impl Iterator<Item = CompensateConfig> {
 const CALM: Faults = Faults { gaps: false, clipping: false, spread: 0.0002 };
 
 #[test]
-fn clean_stream() {
+fn the_sum_of_a_clean_stream_is_that_of_the_estimates() {
     for config in configs() {
         let (bounded, settled) = check(config, CALM, 1);
         assert_eq!(bounded, 0, "nothing here needs the bound");
@@ -167,17 +171,50 @@ fn clean_stream() {
 }
 
 #[test]
-fn gaps_clipping_and_implausible_windows() {
+fn gaps_clipping_and_implausible_windows_lose_no_revision() {
     for (seed, config) in (2..).zip(configs()) {
         check(config, Faults { gaps: true, clipping: true, spread: 0.03 }, seed);
     }
 }
 
 #[test]
-fn with_the_bound_active() {
+fn a_bounded_carry_is_spread_and_not_lost() {
     for config in configs() {
         let tight = CompensateConfig { max_carry: AngularRate(20_000), ..config };
         assert!(check(tight, CALM, 7).0 > 1_000);
         assert!(check(tight, Faults { gaps: true, clipping: true, spread: 0.02 }, 8).0 > 1_000);
     }
+}
+
+/// A window may change the estimate of a sample whose rate has gone out as zero: then what standing took off it changes.
+#[test]
+fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
+    const ALL: u32 = 400;
+    let (mut compensator, mut noise) = (Compensator::new(CompensateConfig::DEFAULT), Noise::new(9));
+    let (mut sent, mut best, mut settled) = (0, 0, 0);
+    for tick in 0..ALL {
+        match tick {
+            // The last estimates are known by then: those of the samples that follow are zero.
+            350.. => compensator.forget(),
+            20.. if tick % 5 == 0 => {
+                let corrections = [(); WINDOW].map(|()| rate(0.001 * noise.normal()));
+                compensator.revise(&corrections).expect("a small one");
+            }
+            _ => {}
+        }
+        let gyro = rate(0.002 + 0.001 * noise.normal());
+        compensator.add(tick, gyro, Validity::Good);
+        if tick == 200 {
+            compensator.end_standstill();
+        }
+        let navigation = compensator.navigation(AngularRate::ZERO, (100..200).contains(&tick));
+        sent += navigation.map_or(0, |navigation| i64::from(navigation.rate.0));
+        best += i64::from(gyro.0);
+        if let Some(known) = compensator.settled() {
+            best -= i64::from(known.correction.0);
+            settled += 1;
+        }
+    }
+    assert!(settled > ALL - 20);
+    assert_eq!(sent + compensator.navigation_owed(AngularRate::ZERO), best);
 }

@@ -244,7 +244,7 @@ fn turned(off: f64, config: Config) -> (f64, Vec<AngularRate>, Coprocessor) {
 }
 
 #[test]
-fn the_guard_sums_true_periods_where_there_is_another_clock() {
+fn the_monitor_sums_true_periods_where_there_is_another_clock() {
     let with = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
     for off in [-0.01, 0.01] {
         let (by_its_own, own_rates, _) = turned(off, Config::DEFAULT);
@@ -267,11 +267,11 @@ fn a_clock_at_fault_is_on_the_bus() {
         let (time, arrival) = sensor.sample();
         let sample = ImuSample { time, ..idling(tick, 0.001, &mut noise) };
         let faults = coprocessor.imu(sample, arrival).expect("in time").vehicle.navigation.faults;
-        let told = faults == faults.with(Faults::IMPLAUSIBLE);
-        first = first.or(told.then_some(tick));
-        assert!(first.is_none() || told, "for as long as it lasts");
+        let reported = faults == faults.with(Faults::IMPLAUSIBLE);
+        first = first.or(reported.then_some(tick));
+        assert!(first.is_none() || reported, "for as long as it lasts");
     }
-    assert!((900..1_100).contains(&first.expect("told")), "after ten seconds: {first:?}");
+    assert!((900..1_100).contains(&first.expect("reported")), "after ten seconds: {first:?}");
     assert_eq!(coprocessor.monitor_counters().clock_off, 1);
 }
 
@@ -299,7 +299,7 @@ proptest! {
     }
 }
 
-/// The slope of two crystals is told from one only by what jitter cannot do.
+/// A slope of two crystals counts only where jitter cannot explain it.
 #[test]
 fn a_difference_counts_from_three_milliseconds_on() {
     for (off_us, counts) in [(JITTER_US - 200, false), (JITTER_US + 200, true)] {

@@ -22,7 +22,7 @@ use gyronet_host_tests::synthetic::idling;
 
 const NOTHING: Estimate =
     Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 };
-/// All four wheels at 0 km/h.
+/// Returns a frame of four wheels at 0 km/h.
 const STANDS: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
 /// Frames of a sample.
 const SET: usize = 6;
@@ -220,7 +220,7 @@ fn wheel_frames_that_are_damaged_are_errors_and_others_are_passed_over() {
     assert_eq!(coprocessor.input_counters().wheel_errors, 1);
 }
 
-/// With a clock of its own standstill takes half a second of that clock, with the sensor's of the samples.
+/// Standstill takes, with a clock of the board's own, half a second of that clock, with the sensor's of the samples.
 #[test]
 fn wheels_are_judged_by_the_clock_that_is_configured() {
     for (clock, pace) in [(Clock::Outside, 1), (Clock::Outside, 10), (Clock::Sensor, 1), (Clock::Sensor, 10)]
@@ -314,4 +314,17 @@ fn a_fibre_optic_gyro_does_not_use_old_wheels() {
     }
     // The last frame came at 10 ms and is good for 100 ms, though no sample of the other sensor has come since.
     assert!(silent.is_some_and(|at| (110..=135).contains(&at)), "{silent:?}");
+}
+
+/// The wheels are looked at before the sample is worked on, so the report is not a sample late.
+#[test]
+fn lost_wheels_are_reported_with_the_first_sample_after_their_time() {
+    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
+    for _ in 0..40 {
+        car.sample();
+        car.coprocessor.can(&wheel_frame(&STANDS), at(car.tick)).expect("a good frame");
+    }
+    // The frames are old after 100 ms.
+    let missed = (41..60).find(|_| car.sample().vehicle.navigation.faults.contains(Faults::WHEELS));
+    assert_eq!(missed, Some(51));
 }

@@ -41,7 +41,7 @@ fn all() -> [Profile; 9] {
 }
 
 #[test]
-fn vectors_of_the_two_byte_headers() {
+fn frames_equal_vectors_of_the_two_byte_headers() {
     use DataIdMode::{Alternating, Both, Low, Nibble};
     let vectors = [
         (p01(Both), 0, ZEROS, [0xCC, 0x00]),
@@ -75,7 +75,7 @@ fn vectors_of_the_two_byte_headers() {
 }
 
 #[test]
-fn vectors_of_profile_5() {
+fn frames_equal_vectors_of_profile_5() {
     for (counter, header) in [(0, [0x1C, 0xCA, 0x00]), (1, [0xCF, 0x8D, 0x01])] {
         let mut data = [0; 8];
         p05().protect(&mut data, counter).expect("eight bytes");
@@ -114,7 +114,7 @@ fn crcs_have_the_published_check_values() {
 }
 
 #[test]
-fn what_a_verdict_lets_through() {
+fn a_verdict_decides_what_is_used() {
     for verdict in [Verdict::First, Verdict::Ok, Verdict::Lost(1)] {
         assert!(verdict.usable(), "{verdict:?}");
     }
@@ -124,7 +124,7 @@ fn what_a_verdict_lets_through() {
 }
 
 #[test]
-fn lengths_and_counters_that_cannot_be() {
+fn lengths_and_counters_that_cannot_be_are_refused() {
     let lengths = [p01(DataIdMode::Both), p02(0, 0), p05(), p11(P11Mode::Both)].map(|p| p.header_len());
     assert_eq!(lengths, [2, 2, 3, 2]);
     for profile in all() {

@@ -7,6 +7,9 @@ use gyronet_host_tests::recordings::workspace;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
 
 fn corpus(entrance: &Entrance) -> PathBuf {
     workspace().join("host-tests/fuzz/corpus").join(entrance.name)
@@ -66,21 +69,44 @@ fn each_entrance_has_a_fuzz_target() {
     assert_eq!(targets, ALL.iter().map(|entrance| entrance.name.to_owned()).collect());
 }
 
+/// An input that takes longer has no end: the slowest takes milliseconds.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// Each entrance works in a thread of its own, so that an input without an end fails the test and does not stop it.
 #[test]
-fn damaged_copies_keep_every_promise() {
+fn damaged_copies_keep_every_promise_and_none_waits_without_a_bound() {
     for entrance in &ALL {
-        let corpus = files(&corpus(entrance));
-        corpus.iter().for_each(|(_, input)| (entrance.run)(input));
-        let mut noise = Noise::new(26);
-        for _ in 0..entrance.mutations {
-            let pick = |noise: &mut Noise| &corpus[noise.int(0, corpus.len() as i64 - 1) as usize].1;
-            let mut input = pick(&mut noise).clone();
-            for _ in 0..noise.int(1, 4) {
-                let other = pick(&mut noise);
-                damage(&mut input, other, &mut noise);
-            }
-            (entrance.run)(&input);
+        let (ended, inputs) = mpsc::channel();
+        let worker = thread::spawn(move || {
+            run(entrance, || ended.send(()).expect("the test waits for it"));
+        });
+        let all = std::iter::from_fn(|| match inputs.recv_timeout(LIMIT) {
+            Ok(()) => Some(()),
+            Err(RecvTimeoutError::Disconnected) => None,
+            Err(RecvTimeoutError::Timeout) => panic!("{}: an input has no end", entrance.name),
+        });
+        println!("{}: {} inputs", entrance.name, all.count());
+        worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    }
+}
+
+/// Runs the corpus of an entrance and damaged copies of it; `ended` is called after each input.
+fn run(entrance: &Entrance, ended: impl Fn()) {
+    let corpus = files(&corpus(entrance));
+    let one = |input: &[u8]| {
+        (entrance.run)(input);
+        ended();
+    };
+    corpus.iter().for_each(|(_, input)| one(input));
+    let mut noise = Noise::new(26);
+    for _ in 0..entrance.mutations {
+        let pick = |noise: &mut Noise| &corpus[noise.int(0, corpus.len() as i64 - 1) as usize].1;
+        let mut input = pick(&mut noise).clone();
+        for _ in 0..noise.int(1, 4) {
+            let other = pick(&mut noise);
+            damage(&mut input, other, &mut noise);
         }
+        one(&input);
     }
 }
 

@@ -74,7 +74,7 @@ fn a_second_sums_increments_and_averages_the_rest() {
 }
 
 #[test]
-fn what_a_second_must_have() {
+fn a_second_needs_the_gyro_and_half_of_the_rest() {
     let silent = |inertial, wheels| {
         let mut sums = SecondSums::ZERO;
         let judged = (0..100).map(|n| {
@@ -101,7 +101,7 @@ fn what_a_second_must_have() {
 }
 
 #[test]
-fn padding() {
+fn a_window_is_padded_as_configured() {
     let mut minute = Minute::EMPTY;
     let rows = |minute: &Minute, padding| {
         minute.window(padding).map(|window| window.iter().map(|second| second.turn.0).collect::<Vec<i64>>())
@@ -125,7 +125,7 @@ fn padding() {
 }
 
 #[test]
-fn the_sum_is_exact() {
+fn the_sum_of_the_turns_is_exact() {
     let mut noise = Noise::new(8);
     for (spread, gain) in [(3 * MILLIRADIAN + 1, 0.0), (-MILLIRADIAN, 0.001), (7, -0.0123), (0, 0.5)] {
         let turns: Vec<i64> = (0..30_000).map(|_| noise.int(-1 << 39, 1 << 39)).collect();
@@ -162,7 +162,7 @@ fn a_scale_error_goes_with_the_turn_and_the_rest_evenly() {
 }
 
 #[test]
-fn how_fast_the_network_is_does_not_matter() {
+fn the_speed_of_the_network_changes_no_turn() {
     let turns: Vec<i64> = (0..1_000).map(|n| n << 30).collect();
     let run = |after| {
         run(&mut FogCorrector::new(FogConfig::DEFAULT), &turns, estimate(MILLIRADIAN, 0, 0.01), after)

@@ -93,7 +93,7 @@ fn a_gyro_that_says_the_same_is_stuck() {
     assert_eq!(sent.iter().rposition(stuck), Some(349));
     let during = &sent[303..350];
     assert!(during.iter().all(|yaw| stuck(yaw) && yaw.quality == Quality::Unusable && yaw.rate.0 == 0));
-    // The window has to begin anew.
+    // The window has to begin again.
     assert_eq!((sent[350].source, sent[350].quality), (Source::Raw, Quality::Degraded));
     assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
     assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
@@ -144,7 +144,7 @@ fn a_gyro_that_is_expected_is_missed_from_the_start() {
 }
 
 #[test]
-fn what_is_missing_is_said() {
+fn a_missing_input_is_reported() {
     let mut fog = FogPipeline::new(FogConfig::DEFAULT, false);
     let sent = run(&mut fog, 1..301, |_| true);
     assert!(sent.iter().all(|yaw| yaw.source == Source::Raw && yaw.faults == Faults::STORED));
@@ -168,4 +168,22 @@ fn what_is_missing_is_said() {
 fn nothing_is_sent_of_a_gyro_that_was_never_heard() {
     let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
     assert!(run(&mut fog, 1..101, |_| false).is_empty());
+}
+
+/// An increment that straddles two steps is in both: the one that holds the end of the last equal increment is stuck, too.
+#[test]
+fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
+    let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);
+    let mut sent = Vec::new();
+    for step in 1..400 {
+        let now = Micros(step * PERIOD_US + PERIOD_US / 2);
+        let increment = sample(if (300..350).contains(&step) { 300 } else { step }).increment;
+        fog.add(now, FogSample { time: now, increment, ..sample(step) }).expect("in order");
+        sent.extend(std::iter::from_fn(|| fog.next_step(now, Some([0; 6]), Some(&wheels()))));
+    }
+    let unusable: Vec<_> =
+        sent.iter().skip(10).filter(|yaw| yaw.quality == Quality::Unusable).map(|yaw| yaw.faults).collect();
+    assert!((45..=50).contains(&unusable.len()), "{} steps", unusable.len());
+    assert!(unusable.iter().all(|faults| faults.contains(Faults::STUCK)), "{unusable:?}");
+    assert!(unusable.iter().all(|faults| !faults.contains(Faults::GAP)), "{unusable:?}");
 }

@@ -15,7 +15,7 @@ fn file() -> File {
     Box::new(weights::FOGNET)
 }
 
-/// With these bytes at an offset, and a checksum that fits.
+/// Returns the file with these bytes at an offset, and a checksum that fits.
 fn with(at: usize, bytes: &[u8]) -> BlobError {
     let mut file = file();
     file.0[at..at + bytes.len()].copy_from_slice(bytes);
@@ -54,7 +54,7 @@ fn each_network_refuses_the_others_file() {
 }
 
 #[test]
-fn every_other_length_and_place() {
+fn every_other_length_and_place_is_refused() {
     let file = file();
     let mut noise = Noise::new(2);
     let lengths = (0..2_000).chain((0..200).map(|_| noise.int(2_000, LEN as i64 - 1) as usize));
@@ -69,7 +69,7 @@ fn every_other_length_and_place() {
 }
 
 #[test]
-fn rows_that_could_overflow() {
+fn rows_that_could_overflow_are_refused() {
     let provenance = LEN - file_len(0);
     let first = HEADER_LEN + provenance;
     let fc1 = first + 2 * (direction_len(HIDDEN1, COLUMNS) + direction_len(HIDDEN1, 2 * HIDDEN1));

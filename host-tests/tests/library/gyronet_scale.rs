@@ -12,7 +12,7 @@ use gyronet_host_tests::noise::Noise;
 const LEN: usize = weights::DEFAULT.0.len();
 
 #[test]
-fn power_error() {
+fn the_power_of_two_is_within_its_bound() {
     let mut largest: f64 = 0.0;
     let mut before = 0;
     for exponent in -(3 << FRACTION_BITS)..4 << FRACTION_BITS {
@@ -30,7 +30,7 @@ fn power_error() {
 }
 
 #[test]
-fn powers_beyond_the_range() {
+fn powers_beyond_the_range_saturate() {
     for unit in [0, 1, 1 << 20, u32::MAX] {
         assert_eq!(times_exp2(unit, i32::MIN), 0);
         assert_eq!(times_exp2(unit, i32::MAX), if unit == 0 { 0 } else { i32::MAX });
@@ -55,7 +55,7 @@ fn scale_of(unit: u32, log: f64) -> i32 {
 }
 
 #[test]
-fn unit_times_the_power() {
+fn the_scale_is_the_unit_times_the_power() {
     for unit in [1_000u32, 1 << 20, 7_654_321] {
         for log in [-9.0f64, -1.5, -0.001, 0.0, 0.25, 3.0] {
             let expected = f64::from(unit) * log.exp2();
@@ -67,7 +67,7 @@ fn unit_times_the_power() {
 }
 
 #[test]
-fn ends_of_the_range() {
+fn a_scale_stays_in_its_range() {
     assert_eq!(scale_of(1 << 20, -40.0), SCALE_MIN.0);
     assert_eq!(scale_of(0, 0.0), SCALE_MIN.0);
     assert_eq!(scale_of(1 << 20, 40.0), SCALE_MAX.0);
@@ -77,7 +77,7 @@ fn ends_of_the_range() {
 }
 
 #[test]
-fn whatever_the_window() {
+fn any_window_has_a_scale_in_its_range() {
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they are good"));
     let mut noise = Noise::new(3);
     for round in 0..200 {

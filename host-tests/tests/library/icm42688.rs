@@ -9,7 +9,6 @@ use gyronet::sensor::icm42688::registers::{self as reg, Register};
 use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
 use gyronet::units::{CentiCelsius, Micros};
 use proptest::prelude::*;
-use std::f64::consts::PI;
 
 /// az 1 g, gz 10 deg/s at 2000 deg/s, 25 deg C, time 1000.
 const PACKET_3: [u8; 16] = [0x68, 0, 0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0xa4, 0, 3, 0xe8];
@@ -38,7 +37,7 @@ fn packet_4() -> Packet {
 }
 
 #[test]
-fn packets() {
+fn packets_are_read_as_the_data_sheet_says() {
     assert_eq!(Packet::parse(Resolution::Bits16, &PACKET_3), Ok(packet_3()));
     assert_eq!(Packet::parse(Resolution::Bits20, &PACKET_4), Ok(packet_4()));
     assert_eq!(packet_3().emit()[..], PACKET_3);
@@ -46,7 +45,7 @@ fn packets() {
 }
 
 #[test]
-fn invalid_marks() {
+fn invalid_marks_are_no_readings() {
     let mut bytes = PACKET_4;
     bytes[0] |= 0x80;
     assert_eq!(Packet::parse(Resolution::Bits20, &bytes), Err(PacketError::Empty));
@@ -178,7 +177,7 @@ const REGISTERS: [(u8, u8, u8, u8); 17] = [
 ];
 
 #[test]
-fn driver() {
+fn the_driver_configures_and_reads() {
     let mut bus = Bus::default();
     bus.start(&REGISTERS);
     // Nothing waits.
@@ -229,7 +228,7 @@ fn driver() {
 }
 
 #[test]
-fn a_part_at_1_khz_with_16_bits() {
+fn a_part_at_1_khz_with_16_bits_is_read() {
     let mut registers = REGISTERS;
     registers[2].3 = 0x66;
     registers[3].3 = 0x06;
@@ -262,7 +261,7 @@ fn a_part_at_1_khz_with_16_bits() {
 
 /// The part keeps its reset value, 92.3 Hz, in the register of the bandwidths.
 #[test]
-fn a_bandwidth_that_does_not_read_back() {
+fn a_bandwidth_that_does_not_read_back_is_refused() {
     let mut bus = Bus::default();
     bus.reset(0x47);
     for &(bank, address, after_reset, value) in &REGISTERS {
@@ -282,30 +281,8 @@ fn a_bandwidth_that_does_not_read_back() {
     spi.done();
 }
 
-/// The attenuations that `Bandwidth`'s table gives, by the formula of a Butterworth filter; its noise
-/// bandwidths are those of the data sheet (tables of 5.5, output rate 100 Hz).
 #[test]
-fn attenuation_of_what_folds_back() {
-    let power = |order: i32, bandwidth: f64, at: f64| 1.0 + (at / bandwidth).powi(2 * order);
-    println!("order, -3 dB Hz, dB at 50 Hz, dB at 100 Hz");
-    for (order, bandwidth, noise_bandwidth, [half, whole]) in [
-        (2, 92.3, None, [0.4, 3.8]),
-        (3, 39.2, Some(40.0), [7.2, 24.4]),
-        (3, 24.3, Some(25.2), [18.9, 36.9]),
-        (3, 18.7, Some(19.5), [25.6, 43.7]),
-        (3, 10.1, Some(10.6), [41.7, 59.7]),
-    ] {
-        let [at_half, at_whole] = [50.0, 100.0].map(|at| 10.0 * power(order, bandwidth, at).log10());
-        println!("{order} {bandwidth} -{at_half:.1} -{at_whole:.1}");
-        assert!((at_half - half).abs() <= 0.05 && (at_whole - whole).abs() <= 0.05);
-        let order = f64::from(order);
-        let own = bandwidth * (PI / 2.0 / order) / (PI / 2.0 / order).sin();
-        assert!(noise_bandwidth.is_none_or(|sheet: f64| (own / sheet - 1.0).abs() < 0.03), "{own}");
-    }
-}
-
-#[test]
-fn a_part_that_is_another_or_none() {
+fn another_part_or_none_is_named() {
     let mut bus = Bus::default();
     bus.reset(0x42);
     let mut spi = Mock::new(&bus.seen);

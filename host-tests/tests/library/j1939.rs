@@ -18,7 +18,7 @@ fn encode(rate: AngularRate) -> Vdc2 {
 }
 
 #[test]
-fn published_vectors() {
+fn frames_equal_published_vectors() {
     assert_eq!(encode(rate(10.0)).emit()[3..5], [0x06, 0x83]);
     assert_eq!(encode(rate(0.0)).emit()[3..5], [0x71, 0x7D]);
     assert_eq!(broadcast_id(VDC2_PGN, VDC2_PRIORITY, 0x80).map(|id| id.as_raw()), Some(0x18F0_0980));
@@ -31,7 +31,7 @@ fn published_vectors() {
 }
 
 #[test]
-fn a_parameter_group_of_others() {
+fn a_parameter_group_of_others_is_refused() {
     // ARI (61482): pitch, roll and yaw rate, 1/128 deg/s from -250; read as any input is.
     let ari = [0x00, 0x7D, 0x00, 0x7D, 0x00, 0x82, 0xFF, 0xFF];
     let rates = [0, 16, 32].map(|start| {
@@ -42,7 +42,7 @@ fn a_parameter_group_of_others() {
 }
 
 #[test]
-fn accelerations() {
+fn accelerations_are_encoded_and_limited() {
     let force = |value: f32| SpecificForce::from_metre_per_sec2(value).expect("in range");
     let vdc2 = Vdc2Encoder::default().encode(
         AngularRate::ZERO,

@@ -155,7 +155,7 @@ fn the_navigation_rate_of_a_refused_reading_is_unusable() {
 
 /// The limits in physical units, by the types' own conversion.
 #[test]
-fn limits_in_physical_units() {
+fn the_limits_are_1_rad_per_s_and_30_m_per_s2() {
     assert_eq!(AngularRate::from_rad_per_sec(1.0), Ok(AngularRate(RATE_LIMIT)));
     assert_eq!(SpecificForce::from_metre_per_sec2(30.0), Ok(SpecificForce(FORCE_LIMIT)));
 }

@@ -39,7 +39,7 @@ fn bytes(increments: &[f64]) -> impl Iterator<Item = (Micros, Vec<u8>)> {
     })
 }
 
-/// What the board makes of it: angle in each step of the grid.
+/// Returns the angle of each step of the grid, as the board finds it.
 fn turns(increments: &[f64]) -> Vec<Angle> {
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
     let mut streams = Streams::new(Fitted { imu: false, fog: true });
@@ -59,7 +59,7 @@ fn turns(increments: &[f64]) -> Vec<Angle> {
     turns
 }
 
-/// With every correction off: the yaw on CAN is the plain sum of the increments.
+/// The yaw on CAN is the plain sum of the increments where every correction is off.
 #[test]
 fn yaw_is_the_plain_sum() {
     let Some(increments) = increments("yaw_is_the_plain_sum") else { return };

@@ -11,7 +11,7 @@ use gyronet::sensor::dsp1760::{
 use gyronet::units::{Angle, CentiCelsius, Micros};
 use proptest::prelude::*;
 
-/// Of a real part.
+/// The bytes of a message that a real part has sent.
 const RECORDED: &str = "FE81FF55 BC646C1E 3C3FF981 3B3C1E78 BC065FB7 BB2FBD79 3F7E9800 77470014 168D8B1D";
 const PLUS_10_DPS: &str = "fe81ff55 0000000000000000 393702d3 000000000000000000000000 07000019 ce6fb608";
 const MINUS_10_DPS: &str = "fe81ff55 0000000000000000 b93702d3 000000000000000000000000 037ffffb 09a87f88";
@@ -50,7 +50,7 @@ fn message(sequence: u8, z: f32) -> Message {
 }
 
 #[test]
-fn recorded_frame() {
+fn a_recorded_frame_is_read() {
     let raw = bytes(RECORDED);
     let message = Message::parse(&raw).expect("it is intact");
     assert_eq!(message.rotation, [-0.013_941_793, 0.011_717_201, 0.002_870_468_4]);
@@ -61,7 +61,7 @@ fn recorded_frame() {
 }
 
 #[test]
-fn constructed_frames() {
+fn constructed_frames_are_read() {
     let ten = f32::from_bits(0x3937_02d3);
     let slow = Message { extra: Extra::Temperature(2534), ..message(5, f32::from_bits(0x3727_c5ac)) };
     let cold = Message { extra: Extra::Temperature(-5), validity: Validity(3), ..message(127, -ten) };
@@ -116,7 +116,7 @@ fn there_are_three_axes() {
 }
 
 #[test]
-fn resynchronises() {
+fn the_parser_resynchronises() {
     let (recorded, other) = (bytes(RECORDED), bytes(PLUS_10_DPS));
     let false_start = [0xFE, 0x81, 0xFE, 0x81, 0xFF];
     for before in [&false_start[..], &other[16..], &[&false_start, &other[16..]].concat()] {
@@ -149,7 +149,7 @@ fn self_tests_are_passed_over() {
 }
 
 #[test]
-fn lost_and_repeated_messages() {
+fn lost_and_repeated_messages_are_counted() {
     let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
     let mut take = |sequence| feed(part, &message(sequence, 1e-6).emit())[0].map(|s| (s.time.0, s.lost));
     assert_eq!(take(126), Ok((1_000, 0)));
@@ -177,7 +177,7 @@ fn a_number_that_is_none_is_not_valid() {
 }
 
 #[test]
-fn units() {
+fn units_are_those_of_the_manual() {
     let expected = 10f64.to_radians() * 1e-3;
     for (rotation, angle, value) in [
         (Rotation::Delta, AngleUnit::Radians, expected),
@@ -236,7 +236,7 @@ fn crc_has_its_check_value() {
 }
 
 #[test]
-fn commands() {
+fn commands_equal_those_of_the_manual() {
     let config = Dsp1760Config { temperature: TemperatureUnit::Hundredths, ..Dsp1760Config::DEFAULT };
     let lines: Vec<_> = setup(&config).iter().map(|command| command.emit().to_string()).collect();
     assert_eq!(lines, ["=config,1\n", "=dr,1000\n", "=rotfmt,delta\n", "=tempunits,C_100\n", "=config,0\n"]);

@@ -13,7 +13,7 @@ fn rate(value: i32) -> Word {
 }
 
 #[test]
-fn words() {
+fn words_are_read_and_written() {
     for (bytes, value) in [([0x80, 0x02, 0x8B, 0x0B], 166_667), ([0x87, 0xFD, 0x74, 0xF5], -166_667)] {
         let word = Word::parse(bytes).expect("odd parity");
         assert_eq!(word, rate(value));
@@ -33,7 +33,7 @@ fn words() {
     assert_eq!(Word::parse([0x98, 0, 0, 0]), Err(WordError::Type { word: 0x9800_0000 }));
 }
 
-/// All values that come out when one byte of 200 words is lost, with and without pauses.
+/// Returns the values that come out when one byte of 200 words is lost, with and without pauses.
 fn with_a_byte_lost(lost: usize, pauses: bool) -> (Vec<i32>, Vec<i32>) {
     let values: Vec<i32> = (0..200).map(|n| 166_667 - 37 * n).collect();
     let mut part = Dsp3000Binary::new(Mode::Rate, 0);
@@ -51,7 +51,7 @@ fn with_a_byte_lost(lost: usize, pauses: bool) -> (Vec<i32>, Vec<i32>) {
 }
 
 #[test]
-fn a_lost_byte() {
+fn a_lost_byte_costs_few_words() {
     for lost in 400..440 {
         let (values, got) = with_a_byte_lost(lost, true);
         assert!(got.iter().all(|value| values.contains(value)), "byte {lost}: a wrong value");
@@ -78,7 +78,7 @@ fn words_of_another_kind_are_no_readings() {
 }
 
 #[test]
-fn samples() {
+fn readings_become_samples() {
     let expected = 0.1f64.to_radians();
     let word = rate(166_667).sample(Micros(5), 10_000).expect("a rate");
     let line = Reading { millionths: 100_000, valid: true };
@@ -98,7 +98,7 @@ fn lines(text: &[u8]) -> Vec<Result<Reading, LineError>> {
 }
 
 #[test]
-fn text() {
+fn lines_are_read_and_written() {
     let good = |millionths, valid| Ok(Reading { millionths, valid });
     assert_eq!(
         lines(b"   10.000000  1\r\n  -0.000123 0\r\n\r\n359.999999 1 \r\n-12.500000\t1\n"),
@@ -113,7 +113,7 @@ fn text() {
 }
 
 #[test]
-fn commands() {
+fn commands_equal_those_of_the_manual() {
     for letter in 0..=255u8 {
         assert_eq!(Command::parse(letter).map(Command::emit), b"RAPZ".contains(&letter).then_some(letter));
     }

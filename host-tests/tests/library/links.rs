@@ -41,7 +41,7 @@ fn no_link_is_dead() {
     assert!(seen > 10, "{seen} links found in all pages: are they read at all?");
 }
 
-/// What stands in the round brackets of `[text](link)`.
+/// Returns the targets in the round brackets of `[text](link)`.
 fn links(text: &str) -> Vec<String> {
     text.split("](")
         .skip(1)

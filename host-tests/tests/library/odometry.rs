@@ -6,7 +6,7 @@ use gyronet_host_tests::noise::{Noise, cases};
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// What the board is off by, position in m and heading in rad, and the bounds that it states.
+/// Returns the errors of the board, position in m and heading in rad, and the bounds that it states.
 fn compare(steps: impl IntoIterator<Item = ([WheelSpeed; 2], AngularRate, u32)>) -> [(f64, f64); 2] {
     let (mut board, mut exact) = (Odometry::default(), Track::default());
     let (mut way, mut count, mut worst) = (0.0, 0.0, [0.0f64; 2]);
@@ -29,7 +29,7 @@ fn compare(steps: impl IntoIterator<Item = ([WheelSpeed; 2], AngularRate, u32)>)
 }
 
 #[test]
-fn straight_on_and_around() {
+fn straight_lines_and_circles_end_where_they_must() {
     let mut track = Track::default();
     (0..100).for_each(|_| track.step([0.1, 0.1], 0.0));
     assert!((track.position[0] - 10.0).abs() < 1e-12 && track.position[1] == 0.0);
@@ -54,7 +54,7 @@ fn wheels_are_averaged() {
 
 /// An hour of a town at 100 Hz.
 #[test]
-fn an_hour_on_the_board() {
+fn an_hour_on_the_board_stays_within_its_stated_error() {
     let mut noise = Noise::new(7);
     let (mut speed, mut rate) = (10.0, 0.0);
     let steps = (0..360_000).map(|_| {

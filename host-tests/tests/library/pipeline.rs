@@ -43,15 +43,20 @@ fn init_then_degraded_then_ready() {
 }
 
 #[test]
-fn windows_hold_the_features_oldest_first() {
-    let samples =
-        (0..KNOWN + 40).map(|tick| turning(tick, AngularRate(if tick < KNOWN { 5 } else { tick as i32 })));
+fn windows_hold_the_features_in_the_order_of_the_training_oldest_first() {
+    let standing = |tick: u64| tick < KNOWN;
+    let samples = (0..KNOWN + 40).map(|tick| {
+        let [x, y, z] = if standing(tick) { [7, 9, 5] } else { [107, 209, tick as i32] };
+        let mut sample = turning(tick, AngularRate(z));
+        (sample.specific_force[0].0, sample.specific_force[1].0) = (11, 22);
+        (sample.angular_rate[0].0, sample.angular_rate[1].0) = (x, y);
+        sample
+    });
+    let up = turning(0, AngularRate(0)).specific_force[2].0;
     for due in run(&mut new(), samples, constant(0.0)).iter().filter_map(|output| output.window) {
         for (features, tick) in due.features.iter().zip(due.end + 1 - WINDOW as u32..) {
-            assert_eq!(
-                features,
-                &[0, 0, turning(0, AngularRate(0)).specific_force[2].0, 0, 0, tick as i32 - 5]
-            );
+            // Specific force x, y, z; angular rate x, y, z less the bias: what the weights were trained on.
+            assert_eq!(features, &[11, 22, up, 100, 200, tick as i32 - 5]);
         }
     }
 }
@@ -129,8 +134,8 @@ fn misplaced_samples_are_a_gap_and_change_no_rate() {
     let (mut pipeline, mut noise) = (new(), Noise::new(6));
     for (sample, clean) in drive(0..600).zip(&clean) {
         let outputs = run(&mut pipeline, [sample], constant(0.0));
-        let told = outputs[0].vehicle.navigation.faults == Faults::GAP;
-        assert_eq!(told, clean.vehicle.prompt.tick > KNOWN as u32);
+        let reported = outputs[0].vehicle.navigation.faults == Faults::GAP;
+        assert_eq!(reported, clean.vehicle.prompt.tick > KNOWN as u32);
         let prompt = |output: &Output| {
             (output.vehicle.prompt.tick, output.vehicle.prompt.rate, output.vehicle.prompt.yaw)
         };
@@ -147,7 +152,7 @@ fn misplaced_samples_are_a_gap_and_change_no_rate() {
 }
 
 #[test]
-fn the_same_sample_once_more_changes_nothing() {
+fn the_same_sample_again_changes_nothing() {
     let clean = run(&mut new(), drive(0..600), constant(0.004));
     let mut pipeline = new();
     let mut twice = |sample| {
@@ -161,7 +166,7 @@ fn the_same_sample_once_more_changes_nothing() {
 }
 
 #[test]
-fn a_misplaced_sample_starts_static_initialisation_anew() {
+fn a_misplaced_sample_starts_static_initialisation_again() {
     let standing = |ticks: core::ops::Range<u64>| ticks.map(|tick| turning(tick, rate(0.001)));
     let mut pipeline = new();
     run(&mut pipeline, standing(0..200), constant(0.0));
@@ -170,7 +175,7 @@ fn a_misplaced_sample_starts_static_initialisation_anew() {
     assert_eq!(statuses(&outputs)[0], (Init, KNOWN as usize));
 }
 
-/// Time that no sample stands for is told, wherever between two grid steps the clock lands. What is
+/// Time that no sample covers is reported, wherever between two grid steps the clock lands. What is
 /// within the jitter of a stamp is not time that is missing.
 #[test]
 fn a_clock_that_jumps_by_a_few_milliseconds_is_a_gap() {
@@ -183,12 +188,12 @@ fn a_clock_that_jumps_by_a_few_milliseconds_is_a_gap() {
             sample.time.0 = sample.time.0.strict_add_signed(jump_us);
             sample
         });
-        let told: Vec<Output> = stamped.filter_map(|sample| pipeline.correct(sample).ok()).collect();
+        let outputs: Vec<Output> = stamped.filter_map(|sample| pipeline.correct(sample).ok()).collect();
         let counters = pipeline.counters();
         let counted = counters.missing + counters.misplaced + counters.clock_jumps;
         let within = jump_us.abs() <= 2_000;
         assert_eq!(counted > 0, !within, "{jump_us} us");
-        assert_eq!(told[0].vehicle.navigation.faults == Faults::GAP, !within, "{jump_us} us");
+        assert_eq!(outputs[0].vehicle.navigation.faults == Faults::GAP, !within, "{jump_us} us");
     }
 }
 

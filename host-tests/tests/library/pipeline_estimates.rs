@@ -16,7 +16,7 @@ use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::stream::{constant, drive, faults, new, run, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
 
-/// What the navigation rate owes where all samples that wait for it are alike, and no revision.
+/// Returns the angle that the navigation rate owes where all samples that wait for it are alike, and no revision.
 fn waiting(last: &YawEstimate) -> Yaw {
     Yaw(CompensateConfig::DEFAULT.lag.samples() as i64 * i64::from(last.rate.0))
 }

@@ -71,7 +71,7 @@ fn static_initialisation_waits_for_the_wheels() {
 }
 
 #[test]
-fn one_turn_of_a_wheel_starts_it_anew() {
+fn one_turn_of_a_wheel_starts_it_again() {
     let outputs = run(1_000, |tick| Some(u16::from(tick == 200)));
     assert_eq!(outputs[200].refused, Some(StaticError::Wheels));
     assert_eq!(statuses(&outputs)[0], (Init, 201 + 300));

@@ -13,7 +13,7 @@ use gyronet::sensor::xsens::dialogue::{Step, mid};
 use gyronet::sensor::xsens::xbus;
 use gyronet_host_tests::noise::Noise;
 
-/// All copies of some bytes with one bit flipped.
+/// Returns all copies of some bytes with one bit flipped.
 fn flips(bytes: &[u8]) -> impl Iterator<Item = Vec<u8>> {
     (0..bytes.len() * 8).map(|bit| {
         let mut damaged = bytes.to_vec();
@@ -23,7 +23,7 @@ fn flips(bytes: &[u8]) -> impl Iterator<Item = Vec<u8>> {
 }
 
 #[test]
-fn messages_of_the_mti_dialogue() {
+fn a_damaged_message_of_the_mti_dialogue_is_refused() {
     let steps = [Step::GoToConfig, Step::SetOutputConfiguration, Step::GoToMeasurement];
     let sent = steps.map(|step| step.emit().to_vec());
     let answers = [
@@ -72,7 +72,7 @@ fn samples(bytes: &[u8]) -> usize {
 
 /// Damaged as they may be, they give no sample and take none away.
 #[test]
-fn built_in_test_messages() {
+fn damaged_built_in_test_messages_take_no_sample_away() {
     let data = data_message();
     for message in
         [&b"\xFE\x81\x00\xAA\x7F\x01\x40\x00\x2A\x15\x55"[..], b"\xFE\x81\x00\xAB\x7F\x01\0\0\0\0\0\x7F\x55"]
@@ -91,7 +91,7 @@ fn built_in_test_messages() {
 /// Lines of text without a checksum, but of few words: a flipped bit makes another rate of the same
 /// list, another case of a letter (which means the same), or nothing.
 #[test]
-fn commands_and_answers_of_the_dsp1760() {
+fn damaged_commands_and_answers_of_the_dsp1760_are_refused() {
     for hertz in OutputRate::OFFERED {
         let rate = OutputRate::new(hertz).expect("offered");
         let (command, reply) = (Command::Rate(rate), Reply::Rate(rate));
@@ -113,7 +113,7 @@ fn commands_and_answers_of_the_dsp1760() {
 /// No checksum: a bit that flips on the bus is found in the header, and anywhere else it changes
 /// exactly one reading, or makes it none.
 #[test]
-fn packets_of_the_icm42688() {
+fn a_flipped_bit_of_an_icm42688_packet_breaks_its_header_or_changes_a_value() {
     let narrow = Packet {
         resolution: Resolution::Bits16,
         acceleration: [12, -40, 2048].map(Some),
@@ -169,7 +169,7 @@ fn lines(bytes: &[u8]) -> Vec<Result<Reading, LineError>> {
 /// No checksum: a flipped bit is found where it leaves the form of a line; else it changes a digit,
 /// or the mark of validity.
 #[test]
-fn lines_of_the_dsp3000() {
+fn a_flipped_bit_of_a_dsp3000_line_breaks_its_form_or_changes_a_digit() {
     let (mut refused, mut same, mut wrong) = (0, 0, 0);
     let next = Reading { millionths: 5_000_000, valid: true };
     for millionths in [10_000_000, -123, 359_999_999, -12_345_678] {
@@ -208,7 +208,7 @@ fn lines_of_the_dsp3000() {
 
 /// A million random bytes in lines of noise, good lines strewn in, one of ten damaged.
 #[test]
-fn lines_of_the_dsp3000_in_noise() {
+fn lines_of_the_dsp3000_are_found_in_noise() {
     let mut noise = Noise::new(17);
     let (mut stream, mut sent, mut random) = (Vec::new(), Vec::new(), 0);
     while random < 1_000_000 {

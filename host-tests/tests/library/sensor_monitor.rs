@@ -177,3 +177,28 @@ fn every_round_of_the_background_check_sees_a_flipped_bit() {
     let mut check = BackgroundCheck::new(&Blob { content: &damaged, ..blob });
     assert!(matches!(round(&mut check), Err(BlobError::Crc { stored, .. }) if stored == blob.crc));
 }
+
+/// Nobody has time for a set that should have gone out earlier, and it is of no use later.
+#[test]
+fn a_late_poll_sends_one_set_and_catches_up_none() {
+    let (mut coprocessor, _) = fed(400);
+    let late = at(399).0 + TIMEOUT_US + 45_000;
+    let mut sets = |now| usize::from(coprocessor.poll(Micros(now)).expect("time goes on").is_some());
+    assert_eq!(sets(late), 1);
+    assert_eq!([1, 5_000, 9_999].map(|after| sets(late + after)), [0; 3]);
+    assert_eq!(sets(late + PERIOD_US), 1);
+}
+
+#[test]
+fn a_part_that_is_stuck_while_it_recovers_is_reported_as_stuck() {
+    let (mut coprocessor, mut noise) = fed(400);
+    let held = idling(400, 0.001, &mut noise);
+    let saturated = usize::from(STUCK_AFTER) - 3;
+    let mut validities = (0..saturated + 4).zip(400..).map(|(number, tick)| {
+        let validity = Validity::reported(number < saturated);
+        sample(&mut coprocessor, ImuSample { validity, ..held }, tick).sample.expect("a sample").validity
+    });
+    assert!(validities.by_ref().take(saturated).all(|validity| validity == Validity::reported(true)));
+    let [recovering @ .., last] = [(); 4].map(|()| validities.next().expect("four more"));
+    assert_eq!((recovering, last), ([Validity::Recovering; 3], Validity::Stuck));
+}

@@ -73,7 +73,7 @@ impl<P: Part> Write for Port<P> {
     }
 }
 
-/// An MTi that loses the first messages, and sends measurements until it is told to stop.
+/// An MTi that loses the first messages, and sends measurements until it gets the command to stop.
 struct FakeMti {
     deaf: u32,
     refuses: bool,
@@ -208,7 +208,7 @@ fn a_dsp1760_is_configured() {
 }
 
 #[test]
-fn a_dsp1760_that_does_not_do_as_it_is_told() {
+fn a_dsp1760_that_does_not_obey_is_given_up() {
     let run = |part| {
         let rate = OutputRate::new(250).expect("offered");
         let config = Dsp1760Config { rate, ..Dsp1760Config::DEFAULT };

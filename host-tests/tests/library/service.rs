@@ -17,8 +17,9 @@ use gyronet::store::{
     Configuration, Field, FieldError, FogPart, ImuPart, Mounting, Record, Slot, StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
-use gyronet_host_tests::flash::{F405, MappedRegion, Region};
+use gyronet_host_tests::flash::{Cut, F405, MappedRegion, Region};
 use gyronet_host_tests::noise::{Noise, cases};
+use gyronet_host_tests::stored::other_weights;
 use proptest::prelude::*;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -96,7 +97,7 @@ fn sample(k: u64, force: [f32; 3], rate: f32) -> ImuSample {
 }
 
 #[test]
-fn frame_bytes() {
+fn a_frame_has_its_documented_bytes() {
     // 00, COBS of (number 7, request 0, CRC-32 of 07 00), 00.
     let frame = emit(7, &Request::Info).expect("it fits");
     let crc = gyronet::model::blob::CRC.checksum(&[7, 0]).to_le_bytes();
@@ -177,7 +178,7 @@ fn sensor_that_does_not_answer_is_noted_once() {
     assert_eq!(kinds, failed.map(EventKind::Sensor));
 }
 
-/// As in the emulator, whose flash is mapped but has no controller.
+/// The flash is mapped but has no controller, as in the emulator.
 #[test]
 fn what_is_stored_is_read_without_a_controller() {
     let flash = Rc::new(RefCell::new(F405::default()));
@@ -214,7 +215,7 @@ fn nothing_is_stored_without_flash() {
     );
 }
 
-/// Whether a configuration can be stored after so many samples.
+/// Returns whether a configuration can be stored after so many samples.
 fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standstill) -> bool {
     for k in samples {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
@@ -356,8 +357,46 @@ fn weights_are_replaced() {
     assert!(about.refused_slots.iter().all(Option::is_some), "{:?}", about.refused_slots);
 }
 
+/// Uploads a file over the line and has it checked.
+fn upload(board: &mut Board, file: &[u8]) {
+    ask(board, &Request::WeightsBegin { length: file.len() as u32 });
+    for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
+        let bytes = heapless::Vec::from_slice(block).expect("a block");
+        ask(board, &Request::WeightsBlock { offset, bytes });
+    }
+    let checked = ask(board, &Request::WeightsVerify);
+    assert!(matches!(checked, Reply::Weights { checked: Some(_), .. }), "{checked:?}");
+}
+
+/// The upload itself touches the unused slot alone (`store_power_cut`); here the board changes over to it.
 #[test]
-fn log_is_bounded_and_says_what_is_lost() {
+fn a_power_cut_during_activation_leaves_the_old_or_the_new_weights() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    upload(&mut board, &other_weights(1));
+    assert_eq!(ask(&mut board, &Request::WeightsActivate), Reply::Done);
+    let before = flash.borrow().clone();
+    let mut cuts = 0;
+    let changed_over = loop {
+        let flash = Rc::new(RefCell::new(before.clone()));
+        let mut board = start(&flash);
+        upload(&mut board, &other_weights(2));
+        flash.borrow_mut().cut_after(cuts, Cut::ALL[cuts as usize % Cut::ALL.len()]);
+        let answer = ask(&mut board, &Request::WeightsActivate);
+        if !flash.borrow_mut().restore() {
+            break answer;
+        }
+        assert!(matches!(answer, Reply::Refused(_)), "cut {cuts}: {answer:?}");
+        let weights = info(&mut start(&flash)).weights;
+        assert!(matches!(weights, WeightSource::Slot(_)), "cut {cuts}: the board runs on weights {weights}");
+        cuts += 1;
+    };
+    assert_eq!(changed_over, Reply::Done);
+    assert!(cuts > 3, "{cuts} operations to cut");
+}
+
+#[test]
+fn the_log_is_bounded_and_reports_what_is_lost() {
     let mut board = bare();
     let page = |board: &mut Board, after| match ask(board, &Request::Log { after }) {
         Reply::Log(page) => page,
@@ -455,7 +494,7 @@ proptest! {
 }
 
 #[test]
-fn too_long_is_said() {
+fn a_message_that_is_too_long_is_refused() {
     let mut deframer = Deframer::new();
     let long: Vec<_> =
         [0].into_iter().chain([1; 2_000]).chain([0]).filter_map(|b| deframer.receive::<Request>(b)).collect();

@@ -31,7 +31,7 @@ fn examples() -> [(DataFrame, &'static [u8]); 5] {
 }
 
 #[test]
-fn examples_both_ways() {
+fn examples_are_read_and_written() {
     for (frame, line) in examples() {
         assert_eq!(slcan::emit(&frame).as_deref(), Some(line));
         assert_eq!(parse(&line[..line.len() - 1]), Ok(frame));

@@ -29,7 +29,7 @@ fn session() -> Session {
 }
 
 #[test]
-fn what_clients_send() {
+fn commands_of_known_clients_are_answered() {
     // python-can with a bit rate: close, rate, no data rate, open, and open again.
     assert_eq!(converse(&mut session(), b"C\rS6\r\rO\rO\r").0, b"\r\r\r\r\r");
     assert_eq!(converse(&mut session(), b"C\rS6\rL\r").0, b"\r\r\r");
@@ -42,7 +42,7 @@ fn what_clients_send() {
 }
 
 #[test]
-fn what_is_refused() {
+fn other_commands_are_refused() {
     let bel = b"\x07";
     for line in [
         &b"S5\r"[..],
@@ -80,14 +80,14 @@ fn bit_rates_have_their_digits() {
 }
 
 #[test]
-fn status_is_told() {
+fn the_status_is_reported() {
     let flags =
         StatusFlags(StatusFlags::BUS_ERROR.0 | StatusFlags::TRANSMIT_FULL.0 | StatusFlags::ERROR_PASSIVE.0);
     assert_eq!(session().execute(b"F", flags).answer, b"FA2\r");
 }
 
 #[test]
-fn frames_from_the_host() {
+fn frames_from_the_host_are_taken() {
     let (answer, frames) = converse(&mut session(), b"t0AA21A6F\rT18FEBF0B101\r");
     assert_eq!(answer, b"\r\r");
     assert_eq!(frames.len(), 2);
@@ -96,7 +96,7 @@ fn frames_from_the_host() {
 }
 
 #[test]
-fn time_stamps_on_demand() {
+fn time_stamps_come_on_demand() {
     let mut session = session();
     assert!(!session.stamped());
     converse(&mut session, b"Z1\r");

@@ -14,7 +14,7 @@ use gyronet_host_tests::synthetic;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
-/// As many as the image has.
+/// The number of frames that may wait, as in the image.
 const QUEUE: usize = 32;
 /// Bits for a byte: start, eight, stop.
 const BITS: u32 = 10;
@@ -70,7 +70,7 @@ fn frame(number: u64) -> DataFrame {
     DataFrame::new(StandardId::new(0x174).expect("11 bits"), &number.to_le_bytes()).expect("eight bytes")
 }
 
-/// What a host takes apart: CR ends a line, BEL is an answer of its own.
+/// Returns the lines as a host splits them: CR ends a line, BEL is an answer of its own.
 fn texts(sent: &[u8]) -> impl Iterator<Item = &[u8]> {
     sent.split(|byte| [b'\r', 7].contains(byte))
 }
@@ -164,7 +164,7 @@ fn commands_are_answered_between_frames() {
 }
 
 #[test]
-fn the_bus_state_is_told_beside_drops() {
+fn the_bus_state_is_reported_beside_drops() {
     let mut port = Port::<1>::new(500_000);
     let mut line = Line { room: 1_000, ..Line::default() };
     port.set_bus(StatusFlags::BUS_ERROR);
@@ -181,7 +181,7 @@ fn the_bus_state_is_told_beside_drops() {
 }
 
 #[test]
-fn drops_are_told_once() {
+fn drops_are_reported_once() {
     let mut port = Port::<2>::new(500_000);
     let mut line = Line::default();
     for number in 0..5 {

@@ -70,7 +70,7 @@ fn records_come_back() {
 }
 
 #[test]
-fn each_value_has_a_range() {
+fn a_value_out_of_its_range_is_refused() {
     let default = Configuration::DEFAULT;
     let tilted = |roll_deg, pitch_deg, yaw_deg| Configuration {
         mounting: Mounting { roll_deg, pitch_deg, yaw_deg },
@@ -209,6 +209,21 @@ fn no_flipped_bit_is_believed() {
         }
     }
     println!("{flips} flipped bits, none believed");
+}
+
+#[test]
+fn the_newest_record_counts_whichever_sector_holds_it() {
+    let flash = Flash::default();
+    let mut store = open(&flash);
+    let (mut changes, mut first) = (0, None);
+    for k in 0..500 {
+        let configuration = Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT };
+        store.set(&configuration).expect("it is stored");
+        let header = flash.borrow().bytes()[layout::STORE.start as usize];
+        changes += usize::from(first.replace(header).is_some_and(|before| before != header));
+        assert_eq!(open(&flash).get::<Configuration>(), Ok(Some(configuration)), "write {k}");
+    }
+    assert!(changes > 0, "the first sector has been used again");
 }
 
 proptest! {

@@ -54,7 +54,7 @@ fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
     panic!("only {changes} changes of sector in 5,000 writes");
 }
 
-/// What must be there after a cut: the record before or the new one, and all others.
+/// Checks that after a cut the record before or the new one is there, and all others.
 fn whole<R: Record + PartialEq + std::fmt::Debug>(
     flash: &Rc<RefCell<F405>>,
     make: fn(usize) -> R,
@@ -73,7 +73,7 @@ fn whole<R: Record + PartialEq + std::fmt::Debug>(
     }
 }
 
-/// Every cut of every write, and after it every cut of the next attempt.
+/// Tries every cut of every write, and after it every cut of the next attempt.
 fn every_cut<R: Record + PartialEq + std::fmt::Debug>(name: &str, make: fn(usize) -> R) {
     let (mut cuts, mut second_cuts) = (0u64, 0u64);
     for (start, k, operations) in starts(make) {
@@ -109,16 +109,16 @@ fn every_cut<R: Record + PartialEq + std::fmt::Debug>(name: &str, make: fn(usize
 }
 
 #[test]
-fn configuration_write() {
+fn a_cut_while_a_configuration_is_written_leaves_the_old_or_the_new_one() {
     every_cut("configuration", configuration);
 }
 
 #[test]
-fn calibration_write() {
+fn a_cut_while_a_calibration_is_written_leaves_the_old_or_the_new_one() {
     every_cut("calibration", calibration);
 }
 
-/// What the board would run on after a restart.
+/// Returns the weights that the board would run on after a restart.
 fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
     let accepted = open(flash).and_then(|mut store| store.get::<Accepted>());
     let accepted = accepted.expect("records are whole").unwrap_or(Accepted::NONE);
@@ -128,7 +128,7 @@ fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
 }
 
 #[test]
-fn weight_upload() {
+fn a_cut_during_the_upload_of_weights_leaves_the_accepted_ones() {
     let (old, new) = (weights::DEFAULT.0.to_vec(), other_weights(1));
     let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     let flash = Rc::new(RefCell::new(F405::default()));

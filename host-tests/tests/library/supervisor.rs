@@ -5,7 +5,7 @@ use gyronet::health::supervisor::{Supervisor, Task};
 const TASKS: [Task; 3] = [Task::Tick, Task::Window, Task::Idle];
 /// Turns of the output task, 1 ms each.
 const TURNS: u32 = 20_000;
-/// What the watchdog allows.
+/// The time that the watchdog allows.
 const BITES_AFTER: u32 = 4_000;
 
 /// Turn at which the watchdog bites when `hangs` does so at `at`, ms.

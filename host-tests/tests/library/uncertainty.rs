@@ -72,7 +72,7 @@ fn a_sigma_is_rounded_up_and_ends_with_its_code() {
 /// The pipeline sends this very number: before the first window, that of an uncorrected rate and of the
 /// bias' own uncertainty; without updates of the bias, of the rate alone.
 #[test]
-fn the_pipeline_sends_it() {
+fn the_pipeline_sends_the_expected_error() {
     let mut pipeline = Pipeline::new(PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT });
     let mut noise = Noise::new(1);
     for tick in 0..u64::from(STATIC_SAMPLES) + 5 {

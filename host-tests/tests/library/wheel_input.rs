@@ -63,7 +63,7 @@ fn at_kmh(kmh: f64) -> DataFrame {
 }
 
 #[test]
-fn speeds_in_metres_per_second() {
+fn speeds_are_read_in_metres_per_second() {
     let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
     // 0.01 km/h: 6767 + 3600 for the front right wheel, standstill for the others.
     let sample = receiver
@@ -92,7 +92,7 @@ fn standing_still_is_asserted_late_and_dropped_at_once() {
     assert_eq!(step(0.0), Standstill::Still);
     assert_eq!(step(-0.03), Standstill::Still);
     assert_eq!(step(0.05), Standstill::Moving);
-    assert_eq!(step(0.0), Standstill::Unknown, "it starts anew");
+    assert_eq!(step(0.0), Standstill::Unknown, "it starts again");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn silence_is_neither_standing_nor_moving() {
     assert_eq!(receiver.poll(Micros(450 * MS)).expect("frames have come").standstill, Standstill::Still);
     let silent = receiver.poll(Micros(451 * MS)).expect("frames have come");
     assert_eq!((silent.standstill, silent.speeds), (Standstill::Unknown, [None; 4]));
-    // After the gap the time of standing starts anew.
+    // After the gap the time of standing starts again.
     let sample = receiver.decode(&at_kmh(0.0), Micros(800 * MS)).expect("a wheel frame").expect("valid");
     assert_eq!(sample.standstill, Standstill::Unknown);
     // The same without anyone having asked in between.
@@ -154,7 +154,7 @@ fn wheels_may_be_spread_over_frames() {
 }
 
 #[test]
-fn checksums_and_counters() {
+fn wrong_checksums_and_counters_are_refused() {
     let j1850 = |data: &[u8]| gyronet::can::bosch::CRC.checksum(&data[..7]);
     let xor = |data: &[u8]| data[..7].iter().fold(0, |sum, byte| sum ^ byte);
     let sum = |data: &[u8]| data[..7].iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
@@ -187,7 +187,7 @@ fn checksums_and_counters() {
 }
 
 #[test]
-fn e2e_protected_input() {
+fn e2e_protected_frames_are_checked() {
     let profile = Profile::P01(P01 { data_id: 0x321, mode: DataIdMode::Nibble });
     let layout = WheelFrame { counter: None, ..two_wheels(Checksum::E2e(profile)) };
     let mut receiver = WheelReceiver::new(settings(layout)).expect("checked");
@@ -202,7 +202,7 @@ fn e2e_protected_input() {
 }
 
 #[test]
-fn settings_that_cannot_be() {
+fn settings_that_cannot_be_are_refused() {
     let refused = |frame| WheelReceiver::new(settings(frame)).expect_err("refused");
     let [first, second, third, _] = car().signals;
     let with = |signals| WheelFrame { signals, ..car() };

@@ -27,7 +27,7 @@ fn vector(values: [f32; 3]) -> Vec<u8> {
 }
 
 #[test]
-fn a_real_frame() {
+fn a_real_frame_is_read() {
     let raw = real_frame();
     let message = MtData2::parse(&raw[4..raw.len() - 1]).expect("it is intact");
     assert_eq!(message.packet_counter, Some(43_398));
@@ -59,7 +59,7 @@ fn a_real_frame() {
 }
 
 #[test]
-fn a_synthetic_frame() {
+fn a_synthetic_frame_is_read() {
     let expected = ImuSample {
         time: Micros(10_000),
         specific_force: [SpecificForce(0), SpecificForce(0), SpecificForce(10_286_531)],
@@ -80,7 +80,7 @@ fn a_synthetic_frame() {
 }
 
 #[test]
-fn readings_that_cannot_be() {
+fn readings_that_cannot_be_are_refused() {
     use RangeError::{NotFinite, OutOfRange};
     for (value, error) in
         [(f32::NAN, NotFinite), (f32::INFINITY, NotFinite), (f32::NEG_INFINITY, NotFinite), (1e9, OutOfRange)]
@@ -100,7 +100,7 @@ fn readings_that_cannot_be() {
 }
 
 #[test]
-fn missing_packets() {
+fn missing_packets_are_named() {
     let whole = message(1);
     for (id, message) in [
         (0x1060, MtData2 { sample_time_fine: None, ..whole }),
@@ -114,14 +114,14 @@ fn missing_packets() {
 }
 
 #[test]
-fn any_coordinate_system() {
+fn any_coordinate_system_is_read() {
     // The coordinate system is not the parser's business.
     let (time, values) = (100u32.to_be_bytes(), vector([1.0, 2.0, 3.0]));
     assert!(feed_new(frame(&[(0x1060, &time), (0x4024, &values), (0x8028, &values)]))[0].is_ok());
 }
 
 #[test]
-fn packets_of_a_wrong_length() {
+fn packets_of_a_wrong_length_are_refused() {
     for id in [0x1020u16, 0x1060, 0x0810, 0x4020, 0x8020, 0xE020] {
         for len in [0, 1, 3, 5, 11, 13] {
             assert_eq!(
@@ -137,7 +137,7 @@ fn packets_of_a_wrong_length() {
 }
 
 #[test]
-fn status_and_temperature() {
+fn status_and_temperature_are_read() {
     for bit in 0..32 {
         let made = MtData2 { status: Some(1 << bit), ..message(1) };
         let saturated = feed_new(made.emit())[0].unwrap().validity == Validity::Saturated;

@@ -40,7 +40,7 @@ fn outputs_ack(acceleration: u16, rate_of_turn: u16) -> Vec<u8> {
 }
 
 #[test]
-fn frames() {
+fn frames_equal_those_of_the_manual() {
     assert_eq!(Step::GoToConfig.emit()[..], GO_TO_CONFIG);
     assert_eq!(Step::GoToMeasurement.emit()[..], GO_TO_MEASUREMENT);
     assert_eq!(Step::SetOutputConfiguration.emit()[..], SET_OUTPUT_CONFIGURATION);
@@ -55,7 +55,7 @@ fn frames() {
 }
 
 #[test]
-fn a_part_that_answers() {
+fn a_part_that_answers_is_configured() {
     let mut dialogue = Dialogue::new();
     assert_eq!(sent(&mut dialogue, 0), GO_TO_CONFIG);
     assert_eq!(dialogue.poll(Micros(1)), Ok(Action::Wait));
@@ -73,7 +73,7 @@ fn a_part_that_answers() {
 }
 
 #[test]
-fn a_part_that_is_silent() {
+fn a_silent_part_is_given_up() {
     let mut dialogue = Dialogue::new();
     let mut now = 7;
     for _ in 0..ATTEMPTS {
@@ -89,7 +89,7 @@ fn a_part_that_is_silent() {
 }
 
 #[test]
-fn a_part_that_refuses() {
+fn a_refusal_is_reported() {
     let mut dialogue = Dialogue::new();
     sent(&mut dialogue, 0);
     push(&mut dialogue, &GO_TO_CONFIG_ACK);
@@ -102,7 +102,7 @@ fn a_part_that_refuses() {
 }
 
 #[test]
-fn a_part_that_sets_another_rate() {
+fn a_part_that_sets_another_rate_is_refused() {
     for (acceleration, rate_of_turn, id, rate) in [(100, 50, 0x8020, 50), (0, 100, 0x4020, 0)] {
         let mut dialogue = Dialogue::new();
         sent(&mut dialogue, 0);
@@ -114,7 +114,7 @@ fn a_part_that_sets_another_rate() {
 }
 
 #[test]
-fn a_part_that_wakes_up() {
+fn a_part_that_wakes_up_is_configured_again() {
     let mut dialogue = Dialogue::new();
     sent(&mut dialogue, 0);
     push(&mut dialogue, &frame(mid::WAKE_UP, &[]));
@@ -123,7 +123,7 @@ fn a_part_that_wakes_up() {
 }
 
 #[test]
-fn a_part_that_wakes_up_again_and_again() {
+fn a_part_that_wakes_up_again_and_again_is_given_up() {
     let mut dialogue = Dialogue::new();
     for now in 0..u64::from(ATTEMPTS) {
         push(&mut dialogue, &frame(mid::WAKE_UP, &[]));

@@ -9,7 +9,7 @@ const ALL: [Precision; 4] =
     [Precision::Single, Precision::Fixed1220, Precision::Fixed1632, Precision::Double];
 
 #[test]
-fn published_numbers() {
+fn numbers_equal_published_ones() {
     for (precision, bytes, value, tolerance) in [
         (Precision::Fixed1220, &[0x03, 0x9a, 0xdf, 0x03][..], 57.679_446_22, 5e-9),
         (Precision::Fixed1220, &[0x00, 0xbe, 0x1f, 0x81], 11.882_691_38, 5e-9),
@@ -25,7 +25,7 @@ fn published_numbers() {
 }
 
 #[test]
-fn one_message_in_each() {
+fn one_message_is_the_same_in_each_precision() {
     // Numbers that each form holds exactly.
     let message = MtData2 {
         packet_counter: Some(7),
@@ -48,7 +48,7 @@ fn one_message_in_each() {
 }
 
 #[test]
-fn a_length_that_is_not_that_of_the_precision() {
+fn a_length_of_another_precision_is_refused() {
     for id in [0x0810u16, 0x4020, 0x8020] {
         for (low, precision) in (0u16..).zip(ALL) {
             for system in [0, 4, 8] {

@@ -6,7 +6,7 @@ use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::wire::{bytes, feed, feed_new, message, real_frame, synthetic_frame};
 
 #[test]
-fn resynchronises() {
+fn the_parser_resynchronises() {
     let (first, second) = (synthetic_frame(), real_frame());
     let expected = feed_new(second.clone());
     for before in [
@@ -25,7 +25,7 @@ fn resynchronises() {
 }
 
 #[test]
-fn header_inside_the_payload() {
+fn a_header_inside_the_payload_is_passed_over() {
     let inner = f32::from_be_bytes([0x3E, 0xFA, 0xFF, 0x36]);
     let made = MtData2 { acceleration: Some([inner, inner, 9.81]), ..message(100) };
     let [Ok(sample)] = feed_new(made.emit())[..] else { panic!("one sample") };

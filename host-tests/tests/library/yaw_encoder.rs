@@ -49,7 +49,7 @@ fn integrate(rates: impl Iterator<Item = AngularRate>, every: u8) -> (f64, f64, 
 }
 
 #[test]
-fn ten_minutes_parked_at_a_thousandth_of_a_degree() {
+fn ten_minutes_parked_at_a_thousandth_of_a_degree_lose_nothing() {
     let (sum, angle, yaw) = integrate((0..60_000).map(|_| rate(0.001)), 1);
     println!("sum of rates {sum:.9} deg, accumulated yaw {angle:.9} deg, true {yaw:.9} deg");
     assert!((yaw - 0.6).abs() < 2e-4);
@@ -70,7 +70,7 @@ fn a_period_of_several_samples_loses_nothing() {
 }
 
 #[test]
-fn many_turns_wrap_and_unwrap() {
+fn many_turns_wrap_as_an_angle_does() {
     // 100 turns left, then 200 right, at 90 deg/s.
     let rates = (0..120_000).map(|k| rate(if k < 40_000 { 90.0 } else { -90.0 }));
     let (sum, angle, yaw) = integrate(rates, 1);
@@ -122,7 +122,7 @@ fn a_fault_between_two_messages_is_not_lost() {
 }
 
 #[test]
-fn details() {
+fn details_are_encoded_and_limited() {
     let mut feed = YawEncoder::new(p01(), 1);
     let detailed = YawEstimate {
         correction: rate(-0.022),
@@ -180,6 +180,16 @@ proptest! {
             prop_assert_eq!(AngleMessage::parse(&bytes), Err(YawError::Length(bytes.len())));
             prop_assert_eq!(DetailMessage::parse(&bytes), Err(YawError::Length(bytes.len())));
         }
+    }
+
+    #[test]
+    fn an_expected_error_is_rounded_up_and_by_less_than_an_lsb(code in 0..1_535_000i32) {
+        let mut feed = YawEncoder::new(p01(), 1);
+        let sigma = Some(AngularRate(code));
+        let [.., detail] = feed.encode(&YawEstimate { sigma, ..sample(rate(5.0), Yaw(0)) }).expect("every sample");
+        let sent = f64::from(DetailMessage::parse(&detail).expect("a detail message").sigma);
+        let beyond = sent - AngularRate(code).rad_per_sec().to_degrees() * 1e5;
+        prop_assert!((-1e-3..1.001).contains(&beyond), "{code}: {beyond} LSB");
     }
 
     /// Every single rate is within one LSB of the truth, whatever came before.

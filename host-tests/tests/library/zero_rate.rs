@@ -1,10 +1,10 @@
 //! Standing still: what it teaches of the bias, what it must not, and that no turn is lost to it.
 
-use gyronet::bias::{StandstillSource, ZeroRate, ZeroRateConfig};
+use gyronet::bias::{StandstillSource, ZeroRate, ZeroRateConfig, ZeroRateOutcome};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::{Faults, Status};
 use gyronet::pipeline::{Output, Pipeline, PipelineConfig};
-use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
+use gyronet::sample::{ImuSample, RATE_HZ, Standstill, WHEELS, WheelSample};
 use gyronet::units::{AngularRate, CentiCelsius, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stream::constant;
@@ -14,12 +14,12 @@ use gyronet_host_tests::synthetic::{force, rate, turning};
 const BIAS: f64 = 0.003;
 const NETWORK: f64 = 0.0002;
 
-/// What the wheels say at a tick.
+/// Returns the report of the wheels with a sample.
 fn wheels(sample: &ImuSample, standstill: Standstill) -> WheelSample {
     WheelSample { time: sample.time, speeds: [Some(WheelSpeed(0)); WHEELS], standstill }
 }
 
-/// A car with its engine off: white noise on every axis.
+/// Returns a sample of a car with its engine off: white noise on every axis.
 fn parked(tick: u64, noise: &mut Noise) -> ImuSample {
     let mut sample = turning(tick, AngularRate::ZERO);
     for axis in 0..3 {
@@ -29,8 +29,7 @@ fn parked(tick: u64, noise: &mut Noise) -> ImuSample {
     sample
 }
 
-/// A car that turns at `turn(tick)`, rad/s, and is quiet otherwise, with wheels that say
-/// `standstill(tick)`.
+/// Runs a car that turns at `turn(tick)`, rad/s, and is quiet otherwise, with wheels that report `standstill(tick)`.
 fn run(
     ticks: u64,
     turn: impl Fn(u64) -> f64,
@@ -98,7 +97,7 @@ fn proven_standing_is_zero_and_the_prompt_rate_goes_on() {
     assert!(live > 2_500, "a receiver that watches for stuck sensors sees {live} live samples");
 }
 
-/// What the errors of static initialisation and network come to without any turn, deg.
+/// The sum of the errors of static initialisation and network without any turn, deg.
 fn drift(ticks: u64) -> f64 {
     let alone = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
     let (_, outputs) = run_with(alone, NETWORK, ticks, |_| 0.0, |_| None);
@@ -176,8 +175,8 @@ fn locked_wheels_in_a_turn_never_hold_the_rate_at_zero() {
     let (_, outputs) = run(3_400, turn, locked);
     for (tick, output) in outputs.iter().enumerate().skip(2_910) {
         assert!((output.vehicle.navigation.rate.rad_per_sec() - 0.3).abs() < 0.01, "sample {tick}");
-        let told = output.vehicle.navigation.faults.0 & Faults::WHEELS.0 != 0;
-        assert_eq!(told, (3_001..3_200).contains(&tick), "sample {tick}");
+        let reported = output.vehicle.navigation.faults.0 & Faults::WHEELS.0 != 0;
+        assert_eq!(reported, (3_001..3_200).contains(&tick), "sample {tick}");
     }
 }
 
@@ -200,4 +199,35 @@ fn uncertainty_grows_with_time_and_temperature_and_shrinks_at_stops() {
     assert!((warm - 20.0 * ZeroRateConfig::DEFAULT.per_kelvin).abs() < 2e-4, "{warm}");
     let (hot, _) = go(2, StandstillSource::None, 327);
     assert!(hot <= ZeroRateConfig::DEFAULT.max_bias, "bounded: {hot}");
+}
+
+/// Feeds a second of standing by the wheels.
+fn second(zero_rate: &mut ZeroRate, left: f64) -> Option<ZeroRateOutcome> {
+    let sample = |_| zero_rate.observe(Some(rate(left)), StandstillSource::Wheels, None);
+    (0..RATE_HZ).filter_map(sample).last()
+}
+
+/// Wheels show late that a car pulls away.
+#[test]
+fn a_second_of_standing_counts_only_when_the_next_one_is_over() {
+    let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
+    assert_eq!(second(&mut zero_rate, 0.002), Some(ZeroRateOutcome::Waits));
+    assert_eq!(zero_rate.bias(), AngularRate::ZERO);
+    assert_eq!(second(&mut zero_rate, 0.0), Some(ZeroRateOutcome::Used));
+    let bias = zero_rate.bias().rad_per_sec();
+    assert!(bias > 0.0015, "the first second is used, not the second: {bias}");
+}
+
+#[test]
+fn a_stop_begins_without_the_offset_of_the_one_before() {
+    let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
+    for _ in 0..20 {
+        let _ = second(&mut zero_rate, 0.002);
+    }
+    let standing = zero_rate.bias();
+    zero_rate.observe(None, StandstillSource::None, None);
+    let driving = zero_rate.bias();
+    assert!(2 * standing.0 > 3 * driving.0 && driving.0 > 0, "{standing:?} {driving:?}");
+    zero_rate.observe(Some(rate(0.002)), StandstillSource::Wheels, None);
+    assert_eq!(zero_rate.bias(), driving);
 }

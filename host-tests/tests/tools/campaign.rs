@@ -1,5 +1,5 @@
-//! A small part of the fault campaign on the simulated drive: nothing panics, and nothing goes
-//! undetected that is not on the named list.
+//! A small part of the fault campaign on the simulated drive: nothing panics, and no fault moves the yaw unseen that is
+//! not on the named list.
 
 use gyronet::model::{Blob, weights};
 use gyronet_tools::bundled;
@@ -20,7 +20,7 @@ fn blob() -> Blob<'static> {
     Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library")
 }
 
-/// A stretch in which the car drives and turns, and the same with one fault.
+/// Returns the outcome of a stretch in which the car drives and turns, with or without a fault.
 fn outcome(scene: &Scene<'_>, fault: Option<Fault>) -> Outcome {
     let span = Span { from: 2_000, to: 2_800, healthy: 101 };
     scene.run(span, fault.as_slice(), &mut Integer::new(blob()))
@@ -32,7 +32,7 @@ fn fault(kind: Kind, rows: usize, size: f64) -> Fault {
 }
 
 #[test]
-fn quick_campaign() {
+fn no_fault_moves_yaw_unseen() {
     let drives = [drive()];
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let scenes = campaign::scenes(&drives, &blob(), threads, || {});
@@ -41,8 +41,8 @@ fn quick_campaign() {
         let good = 100.0 * seconds as f64 / scene.rows() as f64;
         assert!(good > 0.9, "{}: {good} of the undamaged drive is good", scene.part.name());
         let undamaged = outcome(scene, None);
-        let told = (undamaged.told_after, undamaged.counted, undamaged.moved, undamaged.grown);
-        assert_eq!(told, (None, false, 0.0, 0.0), "{}: a stretch is the whole drive's", scene.part.name());
+        let seen = (undamaged.told_after, undamaged.counted, undamaged.moved, undamaged.grown);
+        assert_eq!(seen, (None, false, 0.0, 0.0), "{}: a stretch is the whole drive's", scene.part.name());
         assert!(undamaged.error > 0.0, "the reference is there");
         // A build that is wrong by itself, or states another error than it has, is not to be held against itself.
         let errors = scene.baseline.against_truth().expect("a reference");
@@ -64,23 +64,23 @@ fn quick_campaign() {
 }
 
 #[test]
-fn the_campaign_sees_what_is_there() {
+fn the_judge_sees_known_faults() {
     let drive = drive();
     let scene = Scene::new(&drive, Part::Icm42688, &mut Integer::new(blob()));
     // 0.01 rad/s from one sample to the next, in a turn: nothing can tell, and the yaw shows it.
     let bias = outcome(&scene, Some(fault(Kind::BiasStep, 650, 0.01)));
     assert!(bias.is_undetected() && bias.told_after.is_none() && !bias.counted, "{bias:?}");
     assert!((0.008..0.02).contains(&bias.moved), "{bias:?}");
-    // A frozen yaw axis is told of after seven samples, before any of it has gone out.
+    // A frozen yaw axis is reported after seven samples, before any of it has gone out.
     let stuck = outcome(&scene, Some(fault(Kind::Stuck, 200, 0.0)));
-    assert!((0.06..0.08).contains(&stuck.told_after.expect("told")), "{stuck:?}");
+    assert!((0.06..0.08).contains(&stuck.told_after.expect("it is reported")), "{stuck:?}");
     assert!(!stuck.is_undetected() && stuck.recovery < 0.2 && !stuck.not_recovered, "{stuck:?}");
-    // Nothing for 100 ms: told by the time-out.
+    // Nothing comes for 100 ms: the time-out reports it.
     let silent = outcome(&scene, Some(Fault { rows: 10, ..fault(Kind::Stall, 10, 0.0) }));
-    assert!(silent.told_after.expect("told") < 0.035, "{silent:?}");
+    assert!(silent.told_after.expect("it is reported") < 0.035, "{silent:?}");
     // A bit that makes a reading jump is no reading, whatever the part's checksum is.
     let spikes = outcome(&scene, Some(fault(Kind::BitFlip, 200, 0.0)));
-    assert!(spikes.told_after.expect("told") < 0.3 && spikes.moved < 0.05, "{spikes:?}");
+    assert!(spikes.told_after.expect("it is reported") < 0.3 && spikes.moved < 0.05, "{spikes:?}");
     // Twice the same is once.
     let twice = outcome(&scene, Some(fault(Kind::Duplicate, 200, 0.0)));
     assert!(twice.is_harmless() && twice.counted && twice.moved == 0.0, "{twice:?}");
@@ -97,7 +97,7 @@ fn a_clock_that_drifts_moves_yaw_by_that_share_of_the_turn() {
             let drift = outcome(&scene, Some(fault(Kind::ClockDrift, 650, ppm)));
             let Outcome { moved, moved_limits, told_after, .. } = drift;
             println!(
-                "{}: {ppm} ppm: {moved:.1e} rad, {moved_limits:.2} of the limit, told after {told_after:?} s",
+                "{}: {ppm} ppm: {moved:.1e} rad, {moved_limits:.2} of the limit, reported after {told_after:?} s",
                 part.name()
             );
             // 0.7 rad/s is the fastest turn of the drives.

@@ -14,7 +14,7 @@ type Window = [[f32; INPUTS]; STEPS];
 
 /// RMS of integer less f32, of the spread between the windows. An input that is missing makes it 1.
 const WINDOW: f64 = 0.03;
-/// The same of what an input moves by, rad; and what rounding may make of an input that hardly counts.
+/// The largest such difference of what an input moves, and of what rounding makes of an input that hardly counts, rad.
 const INPUT: f64 = 0.3;
 const ROUNDING: f64 = 2.5e-7;
 
@@ -35,7 +35,7 @@ fn minute(window: &Window) -> Minute {
     minute
 }
 
-/// The part of a correction that is not linear, by both networks, rad.
+/// Returns the part of a correction that is not linear, by both networks, rad.
 fn bent(integer: &mut FogNet<'_, '_>, float: &mut FogNetF32<'_>, window: &Window) -> [f64; 2] {
     let minute = minute(window);
     let window = minute.window(Padding::None).expect("a minute");

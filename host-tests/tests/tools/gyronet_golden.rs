@@ -47,7 +47,7 @@ fn codes(sample: &[f32; FEATURES]) -> Features {
 }
 
 #[test]
-fn integer_network_equals_pytorch() {
+fn the_integer_network_equals_pytorch() {
     let golden = Golden::read("gyronet");
     let input = golden.tensor("input", &[WINDOWS, WINDOW, FEATURES]);
     let error = golden.tensor("gyro_error", &[WINDOWS, WINDOW]);

@@ -9,7 +9,6 @@ mod gyronet_golden;
 mod mounting;
 mod recordings_bad_input;
 mod replay_via;
-mod sequence_cost;
 mod standstill;
 mod still_stretches;
 mod trajectory_evo;

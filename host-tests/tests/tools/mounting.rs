@@ -15,10 +15,10 @@ use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use proptest::prelude::*;
 
-/// By how much the sensor is turned, about x, then about y.
+/// The angle by which the sensor is turned, about x, then about y, deg.
 const TURNED: f32 = 30.0;
 
-/// What a sensor that is turned by 30 degrees about x and y says of the same drive: the inverse
+/// Returns the readings of a sensor that is turned by 30 degrees about x and y on the same drive: the inverse
 /// of its mounting, as the transpose of a rotation is.
 fn turned(recording: &Recording) -> Recording {
     let (sin, cos) = f64::from(TURNED).to_radians().sin_cos();
@@ -81,13 +81,16 @@ fn check(recording: &Recording, noise: f64, street: f64) {
 }
 
 #[test]
-fn turned_by_30_degrees_on_the_simulated_drive() {
+fn a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_the_simulated_drive() {
     check(&bundled::simulated_drive().expect("it comes with the tools"), 0.0014, 0.01);
 }
 
 #[test]
-fn turned_by_30_degrees_on_a_real_drive() {
-    let Some(path) = recordings::trial("turned_by_30_degrees_on_a_real_drive", 8) else { return };
+fn a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_a_real_drive() {
+    let Some(path) = recordings::trial("a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_a_real_drive", 8)
+    else {
+        return;
+    };
     check(&Recording::read(&path).expect("a recording"), 0.0014, 0.01);
 }
 

@@ -46,7 +46,7 @@ fn the_drive_itself_is_good() {
 }
 
 #[test]
-fn missing_columns() {
+fn missing_columns_are_named() {
     for missing in ["t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"] {
         let error = parse(&with(400, 1, missing, "other")).expect_err("a column is missing");
         assert!(matches!(error.fault, DataFault::MissingColumn(column) if column == missing), "{error}");
@@ -56,7 +56,7 @@ fn missing_columns() {
 }
 
 #[test]
-fn fields_that_are_no_reading() {
+fn fields_that_are_no_reading_are_named() {
     for (field, expected, text) in [
         ("fast", ValueError::NotANumber, "not a number"),
         ("1,5", ValueError::NotANumber, ""),
@@ -81,7 +81,7 @@ fn fields_that_are_no_reading() {
 }
 
 #[test]
-fn time_that_does_not_rise() {
+fn time_that_does_not_rise_is_refused() {
     for (field, text) in [
         ("1.00", "drive.csv: line 123: time goes backwards from 1.2000 s to 1.0000 s"),
         ("1.20", "drive.csv: line 123: time goes nowhere from 1.2000 s to 1.2000 s"),
@@ -93,7 +93,7 @@ fn time_that_does_not_rise() {
 }
 
 #[test]
-fn less_than_three_seconds() {
+fn less_than_three_seconds_are_refused() {
     let error = parse(&with(299, 1, "t_s", "t_s")).expect_err("2.99 s are too short");
     assert!(matches!(error.fault, DataFault::TooShort { .. }), "{error}");
     assert_eq!(error.to_string(), "drive.csv: is 2.99 s long, static initialisation alone needs 3 s");
@@ -102,7 +102,7 @@ fn less_than_three_seconds() {
 }
 
 #[test]
-fn a_simulated_drive_that_starts_moving() {
+fn a_simulated_drive_that_starts_moving_is_refused() {
     // With its wheel rates the recording itself is refused.
     let error = parse(&cut(SIMULATED_DRIVE, 2_000)).expect_err("the car drives");
     assert!(matches!(error.fault, DataFault::Moving { .. }), "{error}");
@@ -112,8 +112,8 @@ fn a_simulated_drive_that_starts_moving() {
 /// Real trials, cut in the middle of the drive: refused by their wheels, and by static
 /// initialisation where no wheel was recorded.
 #[test]
-fn real_drives_that_start_moving() {
-    let trials = [9, 11].map(|trial| recordings::trial("real_drives_that_start_moving", trial));
+fn real_drives_that_start_moving_are_refused() {
+    let trials = [9, 11].map(|trial| recordings::trial("real_drives_that_start_moving_are_refused", trial));
     for path in trials.into_iter().flatten() {
         let text = std::fs::read_to_string(&path).expect("a recording");
         let without_wheels = text.replacen("wheel", "other", 4);

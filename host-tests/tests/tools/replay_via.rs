@@ -40,7 +40,7 @@ fn same_time_and_place(one: &Row, other: &Row) -> bool {
     (one.line, one.sample.time, one.sample.validity) == (other.line, other.sample.time, other.sample.validity)
 }
 
-/// All parts on one recording.
+/// Replays one recording through all parts.
 fn check(recording: &Recording) {
     let direct = drive(recording);
     for part in Part::ALL {
@@ -74,13 +74,15 @@ fn check(recording: &Recording) {
 }
 
 #[test]
-fn the_simulated_drive() {
+fn every_part_stays_within_its_rounding_on_the_simulated_drive() {
     check(&bundled::simulated_drive().expect("it comes with the tools"));
 }
 
 #[test]
-fn a_real_drive() {
-    let Some(path) = recordings::trial("a_real_drive", 11) else { return };
+fn every_part_stays_within_its_rounding_on_a_real_drive() {
+    let Some(path) = recordings::trial("every_part_stays_within_its_rounding_on_a_real_drive", 11) else {
+        return;
+    };
     check(&Recording::read(&path).expect("a recording"));
 }
 

@@ -12,7 +12,7 @@ const STEP: usize = 25;
 /// rad/s: what the wheel sensors show at standstill, and what no standing wheel shows.
 const STANDS: f64 = 0.15;
 const TURNS: f64 = 0.5;
-/// Of the driven stretches this share must be noticed.
+/// The share of the driven stretches that must be noticed.
 const NOTICED: f64 = 0.9;
 
 /// Mean of the wheels that were recorded, rad/s.
@@ -30,9 +30,13 @@ fn accepted(rows: &[Row]) -> bool {
 }
 
 #[test]
-fn still_and_driven() {
-    let paths: Vec<_> =
-        TRIALS.iter().filter_map(|trial| recordings::trial("still_and_driven", *trial)).collect();
+fn static_initialisation_tells_rest_from_driving_on_real_drives() {
+    let paths: Vec<_> = TRIALS
+        .iter()
+        .filter_map(|trial| {
+            recordings::trial("static_initialisation_tells_rest_from_driving_on_real_drives", *trial)
+        })
+        .collect();
     if paths.len() < TRIALS.len() {
         return;
     }

@@ -21,14 +21,14 @@ const YAW_RATE: usize = 5;
 /// Largest change of the mean correction, rad/s: 1 % of a turn of 0.1 rad/s.
 const LARGEST: f64 = 0.001;
 
-/// Every twentieth window that the pipeline hands out.
+/// Returns every twentieth window of the pipeline.
 fn windows(recording: &Recording) -> Vec<[Features; WINDOW]> {
     let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
     let outputs = recording.rows.iter().filter_map(|row| pipeline.correct(row.sample).ok());
     outputs.filter_map(|output| output.window).map(|due| due.features).step_by(20).collect()
 }
 
-/// Mean correction over all windows with a turn added, rad/s.
+/// Returns the mean correction over all windows with a turn added, rad/s.
 fn mean_correction(network: &mut GyroNet<'_>, windows: &[[Features; WINDOW]], yaw_rate: f32) -> f64 {
     let rate = AngularRate::from_rad_per_sec(yaw_rate).expect("in range").0;
     let lateral = (yaw_rate * SPEED).clamp(-LATERAL_MAX, LATERAL_MAX);
@@ -59,12 +59,12 @@ fn check(recording: &Recording) {
 }
 
 #[test]
-fn turns_on_the_simulated_drive() {
+fn a_turn_is_no_error_on_the_simulated_drive() {
     check(&bundled::simulated_drive().expect("it comes with the tools"));
 }
 
 #[test]
-fn turns_on_a_real_drive() {
-    let Some(path) = recordings::trial("turns_on_a_real_drive", 8) else { return };
+fn a_turn_is_no_error_on_a_real_drive() {
+    let Some(path) = recordings::trial("a_turn_is_no_error_on_a_real_drive", 8) else { return };
     check(&Recording::read(&path).expect("a recording"));
 }

@@ -28,7 +28,7 @@ const WITHIN: f64 = 1.1;
 /// Validation first, then the test trials, on which nothing is chosen.
 const TRIALS: [u32; 3] = [8, 9, 11];
 
-/// What is different about a unit.
+/// The differences of a unit.
 #[derive(Debug, Clone, Copy)]
 struct Unit {
     name: &'static str,
@@ -41,7 +41,7 @@ struct Unit {
 }
 
 const BIAS: f64 = 0.5_f64.to_radians();
-/// What a gyro drifts by after static initialisation, rad/s.
+/// The drift of a gyro after static initialisation, rad/s.
 const DRIFT: f64 = 0.03_f64.to_radians();
 const TILT: f64 = 2.0_f64.to_radians();
 const SAME: Unit = Unit { name: "unmodified", bias: 0.0, gain: 1.0, mounting: [0.0; 3] };
@@ -96,7 +96,7 @@ impl WindowNetwork for Seen<'_> {
     }
 }
 
-/// What comes of a recording: yaw rates of its settled part, rad/s.
+/// The yaw rates of the settled part of a recording, rad/s.
 struct Rates {
     settled: Vec<f64>,
     /// Gyro less its static mean.
@@ -105,7 +105,7 @@ struct Rates {
 }
 
 impl Rates {
-    /// No wheels: nothing but the network corrects.
+    /// Runs a recording without wheels, so that nothing but the network corrects.
     fn new(recording: &Recording, seen: Unit) -> Self {
         let network =
             GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
@@ -125,7 +125,7 @@ impl Rates {
         }
     }
 
-    /// By how much the unit's gyro itself is off from another's, at each sample, rad/s.
+    /// Returns the difference of this unit's gyro from another's at each sample, rad/s.
     fn difference(&self, other: &Self) -> Vec<f64> {
         self.uncorrected.iter().zip(&other.uncorrected).map(|(ours, theirs)| ours - theirs).collect()
     }
@@ -177,8 +177,8 @@ fn judge(trial: u32, path: &Path) -> (String, Vec<String>) {
 }
 
 #[test]
-fn another_unit_of_the_part() {
-    let paths = TRIALS.map(|trial| recordings::trial("another_unit_of_the_part", trial));
+fn another_unit_of_the_part_moves_no_correction() {
+    let paths = TRIALS.map(|trial| recordings::trial("another_unit_of_the_part_moves_no_correction", trial));
     if paths.iter().any(Option::is_none) {
         return;
     }

@@ -32,6 +32,9 @@ const INITIALISED: u32 = 100 * RATE_HZ;
 /// Half a least bit of the angle message, and one of each value that is summed, deg.
 const YAW_TOLERANCE: f64 = 1e-6;
 
+/// Half a least bit of the drop-in rate for 10 ms, and what a sum of floats needs: deg.
+const DROP_IN_TOLERANCE: f64 = 2.5e-5 + 1e-9;
+
 /// The results of a soak.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Soak {
@@ -53,6 +56,9 @@ pub struct Soak {
     pub gyro_lost: u32,
     /// Yaw at the receiver less that of the pipeline, deg.
     pub yaw_error_deg: f64,
+    /// The sum of the drop-in rates at the receiver less that of the rates they were encoded from, deg. What rounding
+    /// takes from one is in the next, so it stays below half a least bit for 10 ms.
+    pub drop_in_error_deg: f64,
     /// Whole turns of the car, in all.
     pub turns: f64,
     /// Times that the part's ticks, the board's and the gyro's 32-bit microseconds wrapped.
@@ -92,6 +98,7 @@ struct Drive {
     /// Yaw of the pipeline, and of the receiver, when the receiver first had one.
     yaw: Option<(Yaw, Yaw)>,
     turned: f64,
+    drop_in_error: f64,
     clock_error_us: i64,
     gyro_clock_error_us: i64,
     gyro_lost: u32,
@@ -118,6 +125,7 @@ impl Drive {
             statuses: [0; 3],
             yaw: None,
             turned: 0.0,
+            drop_in_error: 0.0,
             clock_error_us: 0,
             gyro_clock_error_us: 0,
             gyro_lost: 0,
@@ -158,6 +166,11 @@ impl Drive {
             let line = emit_stamped(&sent.frame, sent.time).expect("a data frame");
             let line = std::str::from_utf8(&line).expect("ASCII").trim_end();
             self.monitor.take_line(line, 0.0);
+        }
+        if matches!(vehicle.prompt.status, Status::Degraded | Status::Ready) {
+            let received = self.monitor.drop_in.unwrap_or(f64::NAN);
+            self.drop_in_error +=
+                (received - vehicle.prompt.rate.rad_per_sec().to_degrees()) / f64::from(RATE_HZ);
         }
         let yaw = vehicle.navigation.yaw;
         self.yaw = Some((self.yaw.map_or(yaw, |(first, _)| first), yaw));
@@ -202,6 +215,7 @@ impl Drive {
             gyro_lost: self.gyro_lost,
             yaw_error_deg: self.monitor.state.yaw.unwrap_or(f64::NAN)
                 - (last.rad() - first.rad()).to_degrees(),
+            drop_in_error_deg: self.drop_in_error,
             turns: self.turned / std::f64::consts::TAU,
             wraps: [wraps(ticks, TICKS.into()), wraps(board, PERIOD_US), wraps(gyro, PERIOD_US)],
             memory_kib: early.zip(resident_kib()).map(|(early, late)| [early, late]),
@@ -233,6 +247,7 @@ impl Soak {
             ("the part's clock", self.clock_error_us == 0),
             ("the gyro's clock or sequence", (self.gyro_clock_error_us, self.gyro_lost) == (0, 0)),
             ("yaw at the receiver", yaw),
+            ("drop-in rates at the receiver", self.drop_in_error_deg.abs() <= DROP_IN_TOLERANCE),
             ("memory grows", memory),
         ]
         .into_iter()
@@ -267,6 +282,7 @@ impl fmt::Display for Soak {
             self.clock_error_us, self.gyro_clock_error_us
         )?;
         writeln!(f, "yaw at the receiver less the pipeline's: {:.1e} deg", self.yaw_error_deg)?;
+        writeln!(f, "drop-in rates at the receiver less what they say: {:.1e} deg", self.drop_in_error_deg)?;
         match self.memory_kib {
             Some([early, late]) => write!(f, "memory: {early} KiB after a tenth, {late} KiB at the end"),
             None => write!(f, "memory: not to be told on this system"),

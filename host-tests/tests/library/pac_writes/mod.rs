@@ -131,9 +131,9 @@ fn what_is_explained_or_zero_passes() {
 }
 
 #[test]
-fn what_is_hidden_or_out_of_date_is_told() {
-    let Some(values) = reset_values("what_is_hidden_or_out_of_date_is_told") else { return };
-    for (text, told) in [
+fn what_is_hidden_or_out_of_date_is_reported() {
+    let Some(values) = reset_values("what_is_hidden_or_out_of_date_is_reported") else { return };
+    for (text, begins) in [
         // Another value than the crate's.
         (
             "fn f(can: pac::CAN1) {\n    // reset value: 0x0001_0000\n    can.mcr().write(|w| w);\n}",
@@ -166,6 +166,6 @@ fn what_is_hidden_or_out_of_date_is_told() {
         ("fn f(can: pac::CAN1) {\n    check!(can.mcr().write(|w| w));\n}", "2: a write inside a macro"),
     ] {
         let found = complaints(text, &values);
-        assert!(found.len() == 1 && found[0].starts_with(told), "{text}\n{found:?}");
+        assert!(found.len() == 1 && found[0].starts_with(begins), "{text}\n{found:?}");
     }
 }
