@@ -115,13 +115,8 @@ fn kernels_fit_in_8_kib() {
 #[test]
 fn kernels_on_the_target_equal_the_hosts() {
     let Some(()) = qemu::available("kernels_on_the_target_equal_the_hosts") else { return };
-    let Some(elf) = image::firmware(
-        "kernels_on_the_target_equal_the_hosts",
-        env!("CARGO_TARGET_TMPDIR"),
-        "kernels_on_the_target_equal_the_hosts",
-    ) else {
-        return;
-    };
+    let name = "kernels_on_the_target_equal_the_hosts";
+    let Some(elf) = image::firmware(name, env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
     let (printed, _) = bench::emulate(&elf, &[]).unwrap_or_else(|error| panic!("{error}"));
     println!("{printed}");
     assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
