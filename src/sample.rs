@@ -1,9 +1,8 @@
 //! A sample is what a sensor delivers; a frame is a sample on the grid.
 
+pub use crate::units::RATE_HZ;
 use crate::units::{Angle, AngularRate, CentiCelsius, Micros, SpecificForce, WheelSpeed};
 
-/// Rate of the common grid that the networks see, Hz.
-pub const RATE_HZ: u32 = 100;
 /// One step of the grid, microseconds.
 pub const PERIOD_US: u64 = 1_000_000 / RATE_HZ as u64;
 

@@ -4,6 +4,9 @@
 //! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
 //! and the scaled reading are different methods.
 
+/// Rate of the common grid that the networks see, Hz.
+pub const RATE_HZ: u32 = 100;
+
 /// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
@@ -126,7 +129,7 @@ impl Yaw {
     #[must_use]
     pub fn rad(self) -> f64 {
         // Exact to 2^53 codes: 2^53 x 7.5e-11 rad is 671,000 rad.
-        self.0 as f64 / (f64::from(AngularRate::PER_RAD_PER_SEC) * f64::from(crate::sample::RATE_HZ))
+        self.0 as f64 / (f64::from(AngularRate::PER_RAD_PER_SEC) * f64::from(RATE_HZ))
     }
 }
 

@@ -8,7 +8,7 @@
 use crate::boards::{BOARD, Line};
 use crate::crash;
 use crate::ring::Ring;
-use crate::serial;
+use crate::serial::{self, SENDING};
 use crate::stm32f405::can::{Can, Mode};
 use crate::stm32f405::clocks::Clocks;
 use crate::stm32f405::pins::{self, Speed};
@@ -31,8 +31,6 @@ pub const FOG_RING: usize = 256;
 pub const SLCAN_RING: usize = 256;
 /// Bytes of the service line that may wait: a frame.
 pub const SERVICE_RING: usize = 256;
-/// Bytes on their way to a line.
-pub const SENDING: usize = 128;
 
 /// Collects which tasks have run.
 pub static SUPERVISOR: Supervisor = Supervisor::new();

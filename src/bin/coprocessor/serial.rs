@@ -2,13 +2,14 @@
 //! other ends of the rings to a task.
 #![allow(unsafe_code, reason = "the interrupt mask; the block says why it is sound")]
 
-use crate::board::SENDING;
 use crate::ring::Ring;
 use crate::stm32f405::usart::{Status, Usart};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 
+/// Bytes on their way to a line.
+pub const SENDING: usize = 128;
 /// Polls before a flush gives up: about ten byte times at 115200.
 const FLUSH_POLLS: u32 = 100_000;
 /// Counts a line's faults since the start. The handler alone counts.

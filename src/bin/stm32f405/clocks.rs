@@ -5,11 +5,10 @@
 //! oscillator can be 8 % wrong, and the reason is reported.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::{crystal, pac, supply};
+use super::crystal::{self, INTERNAL_HZ};
+use super::{pac, supply};
 use gyronet::service::event::ClockFault;
 
-/// The internal oscillator.
-pub const INTERNAL_HZ: u32 = 16_000_000;
 const FULL_HZ: u32 = 168_000_000;
 const MHZ: u32 = 1_000_000;
 /// Polls before a step is given up: above 25 ms at 16 MHz. A crystal takes 2 ms (DS8626 table 37).

@@ -6,9 +6,11 @@
 //! table 39), so frequencies that differ by less than 10 % cannot be told apart.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::{clock_delay, clocks::INTERNAL_HZ, pac};
+use super::{clock_delay, pac};
 use gyronet::service::event::ClockFault;
 
+/// Frequency of the internal oscillator, Hz.
+pub const INTERNAL_HZ: u32 = 16_000_000;
 /// The crystal's divider ahead of the timer (RTCPRE), and captures are of every eighth edge.
 const DIVIDER: u8 = 31;
 const EDGES: u32 = 8;
