@@ -22,6 +22,7 @@ mod firmware {
     use embedded_io::{ErrorType, Read, ReadReady};
     use gyronet::can::DataFrame;
     use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
+    use gyronet::model::gyronet::GyroNetState;
     use gyronet::sensor::serial::Serial;
     use gyronet::sensor::xsens::{MtData2, Mti};
     use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, TransmitQueue, weights};
@@ -43,14 +44,19 @@ mod firmware {
 
     /// Corrects a parked car's samples. Returns whether every frame went out.
     fn run(weights: Blob<'static>) -> bool {
-        let mut coprocessor = Coprocessor::new(Config::DEFAULT);
-        let mut network = GyroNet::new(weights);
+        // Some 10 and 27 KB: in statics, not on the stack. Both are taken once.
+        let Some(coprocessor) = cortex_m::singleton!(: Coprocessor = Coprocessor::START) else {
+            return false;
+        };
+        let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return false };
+        coprocessor.configure(&Config::DEFAULT);
+        let mut network = GyroNet::with_state(weights, state);
         let mut imu = Serial::new(Port::default(), Mti::new());
         let (mut queue, mut can) = (TransmitQueue::new(), Bus::default());
         for sample in 0..SAMPLES {
             // The clock of your board.
             let now = Micros(u64::from(sample) * 10_000);
-            poll(&mut coprocessor, &mut network, &mut imu, &mut queue, &mut can, now);
+            poll(coprocessor, &mut network, &mut imu, &mut queue, &mut can, now);
         }
         let Bus { frames, last } = can;
         let good = last.filter(|tx1| tx1.yaw_rate_status == SignalStatus::OK);
@@ -79,24 +85,21 @@ mod firmware {
             if self.read < self.message.len() {
                 return Ok(true);
             }
-            let emptied = !self.message.is_empty();
+            // A parked car: a bias, and a least bit that moves; an axis without noise is a stuck one.
+            let noise = 0.001 * (self.sent % 2) as f32;
+            let message = MtData2 {
+                packet_counter: Some(self.sent as u16),
+                sample_time_fine: Some(100 * self.sent),
+                acceleration: Some([noise, noise, 9.81 + noise]),
+                rate_of_turn: Some([noise, noise, 0.01 + noise]),
+                temperature: None,
+                status: Some(3),
+            };
+            // A message of these fields has 54 bytes.
             self.message.clear();
-            if !emptied {
-                // A parked car: a bias, and a least bit that moves; an axis without noise is a stuck one.
-                let noise = 0.001 * (self.sent % 2) as f32;
-                let message = MtData2 {
-                    packet_counter: Some(self.sent as u16),
-                    sample_time_fine: Some(100 * self.sent),
-                    acceleration: Some([noise, noise, 9.81 + noise]),
-                    rate_of_turn: Some([noise, noise, 0.01 + noise]),
-                    temperature: None,
-                    status: Some(3),
-                };
-                // A message of these fields has 54 bytes.
-                let _ = self.message.extend_from_slice(&message.emit());
-                (self.read, self.sent) = (0, self.sent + 1);
-            }
-            Ok(!emptied)
+            let _ = self.message.extend_from_slice(&message.emit());
+            (self.read, self.sent) = (0, self.sent + 1);
+            Ok(true)
         }
     }
 

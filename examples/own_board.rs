@@ -1,11 +1,11 @@
 use embedded_can::nb::Can;
 use gyronet::sensor::Source;
-use gyronet::{Coprocessor, GyroNet, ImuSample, Micros, TransmitQueue, WindowNetwork};
+use gyronet::{Coprocessor, ImuSample, Micros, TransmitQueue, WindowNetwork};
 
 /// Call it every few milliseconds; `now` is your clock. Errors are counted and reported on the bus.
 pub fn poll<CAN: Can>(
     coprocessor: &mut Coprocessor,
-    network: &mut GyroNet<'static>,
+    network: &mut impl WindowNetwork,
     imu: &mut impl Source<Sample = ImuSample>,
     queue: &mut TransmitQueue<CAN::Frame, 24>,
     can: &mut CAN,

@@ -67,7 +67,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # use gyronet::sensor::xsens::MtData2;
 //! use gyronet::sensor::{serial::Serial, xsens::Mti};
-//! use gyronet::{Blob, Config, weights};
+//! use gyronet::{Blob, Config, GyroNet, weights};
 //! # let messages = (0..400_u32).flat_map(|k| { let noise = 0.001 * (k % 2) as f32; MtData2 {
 //! #     packet_counter: Some(k as u16), sample_time_fine: Some(100 * k), temperature: None, status: Some(3),
 //! #     acceleration: Some([noise, noise, 9.81 + noise]), rate_of_turn: Some([noise, noise, 0.01 + noise]),
