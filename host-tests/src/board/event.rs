@@ -1,4 +1,4 @@
-//! What the model notes: events with their board time, and counts of a run.
+//! The model records events with their board time, and counts of a run.
 
 use serde_json::Value;
 use std::time::Duration;

@@ -71,7 +71,7 @@ fn ask(board: &mut Board, request: &Request) -> Reply {
     Device::new(board.line(SERVICE), "the virtual board").ask(request).expect("an answer")
 }
 
-/// What the board reports of itself.
+/// The state that the board reports.
 pub fn info(board: &mut Board) -> Info {
     match ask(board, &Request::Info) {
         Reply::Info(info) => info,

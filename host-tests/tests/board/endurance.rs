@@ -50,7 +50,7 @@ const STACK_SIZE: u32 = 0x8000;
 const STACK_BUDGET: usize = 12 << 10;
 const PAINT: u8 = 0xA5;
 
-/// What the outside sends, and what the host makes of it.
+/// Holds the inputs that the outside sends and the frames that the host computes from them.
 struct Outside {
     drive: Simulation,
     number: usize,
@@ -106,7 +106,7 @@ impl Outside {
     }
 }
 
-/// What the board has sent, checked as it comes.
+/// Checks the board's output as it arrives.
 struct Received {
     can: Vec<DataFrame>,
     slcan: Vec<u8>,

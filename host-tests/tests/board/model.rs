@@ -13,10 +13,10 @@ use std::time::Duration;
 const IMU: usize = 1;
 const SLCAN: usize = 2;
 const SERVICE: usize = 6;
-/// Of the SLCAN line.
+/// The state of the SLCAN line.
 const BAUD: u32 = 921_600;
 const SAMPLE: Duration = Duration::from_millis(10);
-/// From power-on until the image listens to all lines.
+/// The time from power-on until the image listens to all lines.
 const START: Duration = Duration::from_millis(200);
 /// One second of a drive.
 const SAMPLES: usize = 100;

@@ -61,13 +61,13 @@ fn keep(board: &mut Board, name: &str) {
     board.snapshot(name);
 }
 
-/// What a board says after a cut.
+/// The board's answers after a cut.
 struct After {
     configuration: Configuration,
     info: Info,
 }
 
-/// How many cuts were tried, and how many different contents of the flash they left.
+/// Counts the cuts, and the different contents of the flash that they left.
 #[derive(Debug, Default)]
 struct Tried {
     cuts: usize,

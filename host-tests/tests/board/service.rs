@@ -61,7 +61,7 @@ pub fn configuration(board: &mut Board) -> Configuration {
     }
 }
 
-/// What the board reports of itself.
+/// The state that the board reports.
 pub fn info(board: &mut Board) -> Info {
     match ask(board, &Request::Info) {
         Ok(Reply::Info(info)) => info,

@@ -1,6 +1,6 @@
 //! The watchdog's check: the chip must reset when it is not fed, within the limit's tolerance.
 //!
-//! What is known of the first start is kept in RAM that a reset does not clear.
+//! RAM that a reset does not clear keeps the results of the first start.
 #![allow(unsafe_code, reason = "memory without a value at the start; each block says why it is sound")]
 
 use crate::report::Report;

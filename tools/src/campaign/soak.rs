@@ -285,7 +285,7 @@ impl fmt::Display for Soak {
         writeln!(f, "drop-in rates at the receiver less what they say: {:.1e} deg", self.drop_in_error_deg)?;
         match self.memory_kib {
             Some([early, late]) => write!(f, "memory: {early} KiB after a tenth, {late} KiB at the end"),
-            None => write!(f, "memory: not to be told on this system"),
+            None => write!(f, "memory: unknown on this system"),
         }
     }
 }
