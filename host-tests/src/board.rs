@@ -1,25 +1,34 @@
 //! The virtual STM32F405 for tests: the image as it is flashed, on a model of the chip in Python (`board/README.md`).
 //!
-//! The model runs in a process of its own. Its time passes only in [`Board::run`] and [`Board::run_until`], so a test sees the
-//! same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its clock) is a panic with the
-//! model's own words.
+//! The model runs in a process of its own. Its time passes only in [`Board::run`] and [`Board::run_until`], so a test
+//! sees the same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its clock) is
+//! a panic with the model's own words.
 
 pub mod event;
 pub mod line;
 mod link;
 
-use crate::require;
+use crate::{image, require};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 pub use event::{Counts, Event};
 use gyronet::can::DataFrame;
+use gyronet_tools::target::bench;
 use line::Line;
 use link::{Link, hex, unhex};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Packages that the model needs.
 pub const PACKAGES: &[&str] = &["unicorn"];
+
+/// Returns the ELF file of an image for a board, named by its feature. The test is reported as skipped where the model
+/// cannot run, for which nothing is built, or the image cannot be built.
+#[must_use]
+pub fn firmware(board: &str, test: &str, scratch: &str, name: &str) -> Option<PathBuf> {
+    require::python(test, PACKAGES)?;
+    image::firmware_for((board, bench::TARGET), test, scratch, name)
+}
 
 /// A place in memory.
 #[derive(Debug, Clone, Copy)]
@@ -85,15 +94,6 @@ impl Board {
         duration(&answer["time_us"])
     }
 
-    /// Runs as [`Board::run`] does, and returns the model's refusal to a test that expects one.
-    ///
-    /// # Errors
-    /// The model's words.
-    pub fn try_run(&mut self, time: Duration) -> Result<Duration, String> {
-        let answer = self.link.ask("run", json!({ "us": micros(time) }))?;
-        Ok(duration(&answer["time_us"]))
-    }
-
     /// Lets board time pass until an event of this kind, and returns its time; `None` after the limit.
     #[must_use]
     pub fn run_until(&mut self, event: &str, limit: Duration) -> Option<Duration> {
@@ -104,12 +104,6 @@ impl Board {
     #[must_use]
     pub fn run_until_sent(&mut self, usart: usize, bytes: usize, limit: Duration) -> bool {
         self.run_until_any(&[json!({ "usart": usart, "bytes": bytes })], limit).is_some()
-    }
-
-    /// Lets board time pass until the board has got so many frames onto the bus that were not taken; returns whether it has.
-    #[must_use]
-    pub fn run_until_frames(&mut self, frames: usize, limit: Duration) -> bool {
-        self.run_until_any(&[json!({ "can": frames })], limit).is_some()
     }
 
     /// Lets board time pass until one of the model's conditions holds; returns which and when.
@@ -220,7 +214,8 @@ impl Board {
         self.ask("registers", json!({ "set": { name: value } }));
     }
 
-    /// Cuts the power after so many accesses to the flash controller's registers or the flash array, then some time later.
+    /// Cuts the power after so many accesses to the flash controller's registers or the flash array, then some time
+    /// later.
     pub fn cut_after(&mut self, accesses: usize, delay: Duration) {
         self.ask("cut_after", json!({ "accesses": accesses, "delay_us": micros(delay) }));
     }

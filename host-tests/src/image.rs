@@ -18,16 +18,21 @@ use std::sync::{Mutex, PoisonError};
 /// When the build fails: that is an error, not a missing tool.
 #[must_use]
 pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
-    firmware_for("netduino-plus-2", test, scratch, image)
+    firmware_for(("netduino-plus-2", bench::TARGET), test, scratch, image)
 }
 
-/// Returns the ELF file of an image for another board, named by its feature.
+/// Returns the ELF file of an image for another board, named by its feature, and its target.
 ///
 /// # Panics
 /// As [`firmware`].
 #[must_use]
-pub fn firmware_for(board: &str, test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
-    require::wants(test, Need::Qemu, bench::target_installed())?;
+pub fn firmware_for(
+    (board, target): (&str, &str),
+    test: &str,
+    scratch: &str,
+    image: &str,
+) -> Option<PathBuf> {
+    require::wants(test, Need::Qemu, bench::target_installed(target))?;
     static BUILT: Mutex<BTreeMap<String, PathBuf>> = Mutex::new(BTreeMap::new());
     // A test that panicked here has left the map as it was.
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
@@ -35,9 +40,13 @@ pub fn firmware_for(board: &str, test: &str, scratch: &str, image: &str) -> Opti
     if let Some(elf) = built.get(&name) {
         return Some(elf.clone());
     }
-    let folder = Path::new(scratch).join(format!("fw-{board}"));
-    let elf = bench::build_for(board, workspace(), image, &folder);
-    let elf = elf.unwrap_or_else(|error| panic!("{error}"));
+    // One folder for all boards, so that they share what does not depend on the board; the next one's image takes the
+    // place of this one's there.
+    let scratch = Path::new(scratch);
+    let fresh = bench::build_for((board, target), workspace(), image, &scratch.join("images"));
+    let fresh = fresh.unwrap_or_else(|error| panic!("{error}"));
+    let elf = scratch.join(format!("{image}-{board}"));
+    std::fs::copy(fresh, &elf).expect("there is room");
     built.insert(name, elf.clone());
     Some(elf)
 }

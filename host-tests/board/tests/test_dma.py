@@ -43,6 +43,30 @@ class Dma(unittest.TestCase):
         self.assertEqual(self.board.read("DMA1", base + 4), 6)
         self.assertFalse(self.board.read("USART2", 0) & 1 << 3)
 
+    def test_bytes_without_interrupts_are_there_when_the_stream_is_looked_at(self):
+        base = self.stream(5, 4 << 25 | 1 << 10 | 1 << 8, 8)
+        self.board.write("USART2", 0x14, 1 << 6)
+        self.usart.inject(b"0123456789")
+        frame = self.usart.frame_ps
+        for count in range(1, 11):
+            self.board.advance(frame)
+            self.assertEqual(self.board.read("DMA1", base + 4), 8 - count % 8)
+        self.board.advance(frame)
+        self.assertEqual(self.board.memory_read(RAM, 8), b"89234567")
+        self.assertFalse(self.board.read("USART2", 0) & 1 << 3)
+
+    def test_an_interrupt_that_is_wanted_amid_bytes_comes_in_time(self):
+        self.stream(5, 4 << 25 | 1 << 10 | 1 << 8, 8)
+        self.board.write("USART2", 0x14, 1 << 6)
+        self.usart.inject(b"0123456789")
+        frame = self.usart.frame_ps
+        self.board.advance(2 * frame)
+        self.board.write("DMA1", 0x10 + 0x18 * 5, 4 << 25 | 1 << 10 | 1 << 8 | 1 << 4 | 1)
+        self.board.advance(5 * frame)
+        self.assertFalse(self.board.lines.get(16))
+        self.board.advance(frame)
+        self.assertTrue(self.board.lines[16])
+
     def test_transmission_ends_the_stream(self):
         self.board.memory_write(RAM, b"hello")
         self.board.write("USART2", 0x14, 1 << 7)

@@ -171,7 +171,7 @@ class Board:
         """Names the function that holds an address."""
         return self.elf.symbol_at(address & ~1) if self.elf else None
 
-    # What the core tells the board.
+    # What the core reports to the board.
 
     def violate(self, violation: Violation) -> None:
         """Stops the run with a violation, with time and place added."""

@@ -28,6 +28,9 @@ class Peripheral:
         """Writes 1, 2 or 4 bytes."""
         raise NotImplementedError
 
+    def catch_up(self) -> None:
+        """Does what is due by now, where DMA may do several steps at once. The DMA calls it before its registers are read."""
+
     def configure(self, name: str, value) -> None:
         """Sets a fault or a condition of the environment, such as the crystal's frequency."""
         raise KeyError(f"{self.name} has no setting {name!r}")

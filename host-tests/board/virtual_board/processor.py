@@ -103,7 +103,7 @@ class Processor:
         #: A block with FPU instructions was reached while the FPU is off.
         self.fpu_ahead = False
         self._stale_code: list[tuple[int, int]] = []
-        #: Pages of SRAM that were executed.
+        #: Begins of pages of SRAM that were executed.
         self._code_pages: set[int] = set()
         self._fpu_blocks: dict[tuple[int, int], bool] = {}
         board.memory.on_code_change = self._on_code_change
@@ -234,7 +234,7 @@ class Processor:
         if map_.SRAM <= address < map_.SRAM + map_.SRAM_SIZE:
             if kind != const.UC_MEM_FETCH:
                 return read | write
-            self._code_pages.add(address)
+            self._code_pages.add(address & -PAGE)
             return read | write | execute
         if map_.FLASH <= address < map_.FLASH + map_.FLASH_SIZE:
             return read | write | execute  # A write goes to the flash controller.
@@ -257,7 +257,8 @@ class Processor:
         return True
 
     def _on_code_change(self, address: int, size: int) -> None:
-        if address < map_.SRAM or any(address < page + PAGE and page < address + size for page in self._code_pages):
+        first, last = address & -PAGE, address + size - 1 & -PAGE
+        if address < map_.SRAM or any(page in self._code_pages for page in range(first, last + 1, PAGE)):
             self._stale_code.append((address, size))
 
     def forget_code(self) -> None:

@@ -1,8 +1,7 @@
 //! The bring-up image on the virtual board: every line of its output, on a board in order and on one that is not.
 
 use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, SLOTS};
-use gyronet_host_tests::board::{At, Board};
-use gyronet_host_tests::image;
+use gyronet_host_tests::board::{self, At, Board};
 use std::time::Duration;
 
 const REPORT: usize = 6;
@@ -12,7 +11,7 @@ const SPARE: u32 = FLASH_BASE + SLOTS.start + SLOT_SIZE as u32;
 
 /// Runs the image to its end and gives its lines, without the cycles that the model counts.
 fn lines(test: &str, prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
-    let elf = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "bringup")?;
+    let elf = board::firmware("netduino-plus-2", test, env!("CARGO_TARGET_TMPDIR"), "bringup")?;
     let mut board = Board::unpowered(test, &elf)?;
     board.configure("USART2.baud", 921_600);
     board.configure("USART3.baud", 921_600);
@@ -113,7 +112,9 @@ fn panic_leaves_its_reason_on_the_line_and_starts_again() {
     /// A place in memory that the image does not use, for the panic's location: file, its length, line, column.
     const LOCATION: u32 = 0x1000_0000;
     const FILE: &[u8] = b"src/provoked.rs";
-    let Some(elf) = image::firmware(TEST, env!("CARGO_TARGET_TMPDIR"), "bringup") else { return };
+    let Some(elf) = board::firmware("netduino-plus-2", TEST, env!("CARGO_TARGET_TMPDIR"), "bringup") else {
+        return;
+    };
     let Some(mut board) = Board::boot(TEST, &elf) else { return };
     board.run(Duration::from_millis(300));
     let _ = (board.sent(REPORT), board.events());

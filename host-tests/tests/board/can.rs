@@ -148,7 +148,7 @@ fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
     assert_eq!((counters.lines.frames_lost, counters.lines.unsent), (0, 0));
     let sent = frames(&board.can_frames());
     let faults = flags(&sent);
-    assert!(!has(faults[0], Faults::BUS), "the first 0x1A1 tells of a bus without faults");
+    assert!(!has(faults[0], Faults::BUS), "the first 0x1A1 reports a bus without faults");
     // The wheels stand (67.67 km/h is their zero), which holds the rate at zero after initialisation; that
     // the drive turns meanwhile is contradicted. Without wheels neither is known.
     assert!(counters.pipeline.zero_rate_updates + counters.pipeline.contradicted == 0 || !faults.is_empty());
@@ -163,7 +163,8 @@ fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
 fn status(board: &mut Board) -> String {
     let _ = board.sent(SLCAN);
     board.send(SLCAN, b"F\r");
-    board.run(2 * MS);
+    // It is taken with a tick, and waits for the bytes that DMA is sending.
+    board.run(5 * MS);
     let text = String::from_utf8(board.sent(SLCAN)).expect("ASCII");
     // An answer is sent between two frames.
     let status = text.split('\r').find_map(|line| line.strip_prefix('F'));
@@ -199,7 +200,7 @@ fn no_acknowledgement_for_a_while() {
     assert_eq!(run.during.len(), 0, "nothing is acknowledged");
     assert_eq!(stale(&run.after, &run.made), [], "nothing old goes out");
     let faults = flags(&frames(&run.after));
-    assert!(has(faults[0], Faults::BUS), "the first angle message tells of frames that were dropped");
+    assert!(has(faults[0], Faults::BUS), "the first angle message reports frames that were dropped");
     assert!(!has(faults[faults.len() - 1], Faults::BUS), "and the last one of a bus in order");
     let mut board = run.board;
     let dropped = counters(&mut board).lines.unsent as usize;
@@ -294,4 +295,8 @@ fn an_erase_is_announced_and_costs_no_time() {
     let ticks = |frames: &[(Duration, DataFrame)]| frames.iter().filter(|(_, f)| f.id() == id(0x174)).count();
     let missing = ((after[after.len() - 1].0 - before[0].0).as_millis() / SAMPLE.as_millis()) as usize;
     assert!(missing - ticks(&before) - ticks(&after) >= 20, "the samples of 250 ms are missing");
+    // DMA went on and wrote over what waited.
+    let _ = board.sent(common::SERVICE);
+    let lost = counters(&mut board).lines.line_errors;
+    assert!(lost >= 512, "{lost} bytes lost");
 }

@@ -3,8 +3,7 @@
 use crate::common::{self, SAMPLE, SET, SLCAN, START, boot, drive, frames, host, info, resets, unpowered};
 use gyronet::service::crash::CrashKind;
 use gyronet::service::event::{CanFault, ClockFault, ResetCause};
-use gyronet_host_tests::board::Board;
-use gyronet_host_tests::image;
+use gyronet_host_tests::board::{self, Board};
 use serde_json::Value;
 use std::time::Duration;
 
@@ -108,7 +107,7 @@ fn bootloader_that_leaves_the_pll_on() {
 #[test]
 fn olimex_board_with_its_crystal_of_8_mhz() {
     const TEST: &str = "olimex_board_with_its_crystal_of_8_mhz";
-    let elf = image::firmware_for("olimex-stm32-h405", TEST, env!("CARGO_TARGET_TMPDIR"), "coprocessor");
+    let elf = board::firmware("olimex-stm32-h405", TEST, env!("CARGO_TARGET_TMPDIR"), "coprocessor");
     let Some(mut board) = elf.and_then(|elf| Board::unpowered(TEST, &elf)) else { return };
     board.configure(CRYSTAL, 8_000_000);
     board.configure("USART2.baud", 921_600);

@@ -3,9 +3,9 @@
 use gyronet::can::{DataFrame, slcan};
 use gyronet::service::message::{AllCounters, Info};
 use gyronet::service::{Reply, Request};
-use gyronet_host_tests::board::Board;
+use gyronet_host_tests::board::{self, Board};
 use gyronet_host_tests::recordings::{self, workspace};
-use gyronet_host_tests::{image, replay};
+use gyronet_host_tests::replay;
 use gyronet_tools::client::device::Device;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -23,7 +23,7 @@ pub const SET: usize = 6;
 
 /// The image that is flashed, for a test that is skipped (aloud) where it cannot be built.
 pub fn elf(test: &str) -> Option<PathBuf> {
-    image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")
+    board::firmware("netduino-plus-2", test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")
 }
 
 /// A board with the image in its flash and without power.

@@ -44,7 +44,8 @@ const WHEELS_AFTER: Duration = Duration::from_millis(8);
 const OTHERS: [u16; 3] = [0x0AB, 0x2C1, 0x3D0];
 /// Samples between two questions on the service line.
 const QUESTION: usize = 10;
-/// The end and the size of the stack's region (memory.x), the bytes that may be used of it, and what the rest is filled with.
+/// The end and the size of the stack's region (memory.x), the bytes that may be used of it, and what the rest is filled
+/// with.
 const STACK_END: u32 = 0x2000_8000;
 const STACK_SIZE: u32 = 0x8000;
 const STACK_BUDGET: usize = 12 << 10;

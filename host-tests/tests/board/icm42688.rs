@@ -103,7 +103,8 @@ fn on_the_grid(board: &mut Board, seconds: usize) -> Vec<usize> {
     per_second
 }
 
-/// A part in order for so many seconds: each sample is a message set, on the grid, and nothing is counted that should not be.
+/// A part in order for so many seconds: each sample is a message set, on the grid, and nothing is counted that should
+/// not be.
 fn in_order(test: &str, seconds: usize) {
     let Some(mut board) = equipped(test, Configuration::DEFAULT) else { return };
     board.power_on();

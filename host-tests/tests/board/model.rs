@@ -3,9 +3,9 @@
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::{FlashState, Identity, Info, Origin};
 use gyronet::service::{Reply, Request};
-use gyronet_host_tests::board::{At, Board, PACKAGES};
+use gyronet_host_tests::board::{self, At, Board, PACKAGES};
 use gyronet_host_tests::recordings::{self, workspace};
-use gyronet_host_tests::{image, replay, require};
+use gyronet_host_tests::{replay, require};
 use gyronet_tools::client::device::Device;
 use std::process::Command;
 use std::time::Duration;
@@ -22,7 +22,7 @@ const START: Duration = Duration::from_millis(200);
 const SAMPLES: usize = 100;
 
 fn boot(test: &str) -> Option<Board> {
-    let elf = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")?;
+    let elf = board::firmware("netduino-plus-2", test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")?;
     let mut board = Board::boot(test, &elf)?;
     board.configure(&format!("USART{SLCAN}.baud"), BAUD);
     Some(board)

@@ -1,7 +1,8 @@
-//! The power is cut at each access to the flash controller or the array, while the image stores a configuration or takes a
-//! weight file over the service line. After each cut the board comes up with the old or the new value, whole.
+//! The power is cut at each access to the flash controller or the array, while the image stores a configuration or
+//! takes a weight file over the service line. After each cut the board comes up with the old or the new value, whole.
 //!
-//! All that outlives a cut is the flash. Cuts that leave the same flash are therefore one case: the board is started once for it.
+//! All that outlives a cut is the flash. Cuts that leave the same flash are therefore one case: the board is started
+//! once for it.
 
 use crate::common::{self, SLCAN, START};
 use crate::service::{self, ANSWER, storing};
@@ -44,7 +45,8 @@ fn crc(file: &[u8]) -> u32 {
     u32::from_le_bytes(*file.last_chunk().expect("a checksum"))
 }
 
-/// A board with accepted weights in slot A, a calibration, and so many configurations in its records, the last one in force.
+/// A board with accepted weights in slot A, a calibration, and so many configurations in its records, the last one in
+/// force.
 fn used(test: &str, configurations: usize) -> Option<Board> {
     let mut board = common::unpowered(test)?;
     let stored = Stored::default().weights(Slot::A, &other_weights(2)).record(&calibration());
@@ -55,7 +57,8 @@ fn used(test: &str, configurations: usize) -> Option<Board> {
     Some(board)
 }
 
-/// Keeps the board's state. What it has sent of the sensor's silence is not kept with it: it would be copied with every cut.
+/// Keeps the board's state. What it has sent of the sensor's silence is not kept with it: it would be copied with every
+/// cut.
 fn keep(board: &mut Board, name: &str) {
     let _ = (board.sent(SLCAN), board.can_frames());
     board.snapshot(name);
@@ -192,8 +195,8 @@ fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy() {
     }
 }
 
-/// Cuts an upload at the accesses of each request that `chosen` picks by the request's number, the number of requests, and
-/// the accesses that it takes.
+/// Cuts an upload at the accesses of each request that `chosen` picks by the request's number, the number of requests,
+/// and the accesses that it takes.
 fn upload(test: &str, chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
     let Some(mut board) = used(test, 3) else { return };
     let (old, new) = (crc(&other_weights(2)), other_weights(1));
@@ -258,8 +261,8 @@ fn old_weights_stay_usable_until_the_new_ones_are_activated() {
     });
 }
 
-/// An upload takes 102,490 accesses, and a cut 0.2 s of processor time (402 cuts in 93 s): all of them take six hours. A
-/// test of two minutes has time for some 500, which is why the one above samples the blocks.
+/// An upload takes 102,490 accesses, and a cut 0.2 s of processor time (402 cuts in 93 s): all of them take six hours.
+/// A test of two minutes has time for some 500, which is why the one above samples the blocks.
 ///
 /// `cargo test -p gyronet-host-tests --test board each_access -- --ignored --nocapture`
 #[test]

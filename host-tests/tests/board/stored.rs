@@ -1,5 +1,5 @@
-//! What is stored, through the service line and the flash controller: records over used sectors, weight files, and
-//! what an erase does to the rest of the board.
+//! The board stores records over used sectors and weight files, through the service line and the flash
+//! controller, and works on while it erases as far as the part lets it.
 
 use crate::common::{self, IMU, SERVICE, START};
 use crate::service::{self, ask, storing};

@@ -2,9 +2,9 @@
 //! a person must look.
 //!
 //! The lines go out on USART6 (115200 8N1) and over RTT. This
-//! is the first image for a new board: it needs no sensor, no bus and no host. The drivers are those of the coprocessor.
-//! The last check lets the watchdog reset the chip, so the image starts twice and reports that check the second
-//! time. It erases nothing but the last sector, and that only where it is blank.
+//! is the first image for a new board: it needs no sensor, no bus and no host. The drivers are those of the
+//! coprocessor. The last check lets the watchdog reset the chip, so the image starts twice and reports that check the
+//! second time. It erases nothing but the last sector, and that only where it is blank.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

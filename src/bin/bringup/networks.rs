@@ -24,7 +24,7 @@ fn gyronet(report: &mut Report) {
         return report.fail("GyroNet", format_args!("the weight file is refused"));
     };
     let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return };
-    let mut network = GyroNet::with_state(blob, state);
+    let Ok(mut network) = GyroNet::with_state(blob, state) else { return };
     let features = [[0; FEATURES]; WINDOW];
     let begin = DWT::cycle_count();
     black_box(network.estimate(black_box(&features)));

@@ -3,7 +3,7 @@
 use crate::boards::BOARD;
 use crate::stm32f405::pins::{self, Speed};
 use crate::stm32f405::usart::Usart;
-use crate::stm32f405::{Chip, pac, watchdog};
+use crate::stm32f405::{Chip, watchdog};
 use core::fmt::{self, Write};
 
 /// Polls before a byte is given up: several byte times at 115200.
@@ -38,7 +38,7 @@ impl Report {
 
     /// Uses the outputs once more, for a panic.
     pub fn again() -> Self {
-        Self { usart: Usart::new(pac::USART6::ptr(), pac::Interrupt::USART6), failed: 0 }
+        Self { usart: Usart::six(), failed: 0 }
     }
 
     /// Prints a line.

@@ -5,51 +5,32 @@
     reason = "rings; a comment above them names both ends"
 )]
 
-use crate::boards::{BOARD, Line};
-use crate::crash;
-use crate::ring::Ring;
-use crate::serial::{self, SENDING};
+use crate::boards::{self, BOARD};
 use crate::stm32f405::can::{Can, Mode};
 use crate::stm32f405::clocks::Clocks;
 use crate::stm32f405::pins::{self, Speed};
 use crate::stm32f405::spi::{self, Spi};
 use crate::stm32f405::usart::Usart;
-use crate::stm32f405::{Chip, pac, supply};
+use crate::stm32f405::{Chip, pac, supply, timer};
+use crate::{crash, serial};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use embedded_can::Id;
 use gyronet::health::supervisor::Supervisor;
-use gyronet::service::event::{CanFault, ClockFault};
+use gyronet::service::event::CanFault;
 use gyronet::service::message::Identity;
-use pac::Interrupt;
-
-/// Bytes of the inertial sensor that may wait: more than come in the 20 ms that an estimate is waited for.
-pub const IMU_RING: usize = 512;
-/// Bytes of the fibre-optic gyro that may wait: 7 ms at 1000 messages a second; they are looked at every
-/// millisecond.
-pub const FOG_RING: usize = 256;
-/// Bytes of an SLCAN host that may wait: a window's worth of wheel frames.
-pub const SLCAN_RING: usize = 256;
-/// Bytes of the service line that may wait: a frame.
-pub const SERVICE_RING: usize = 256;
 
 /// Collects which tasks have run.
 pub static SUPERVISOR: Supervisor = Supervisor::new();
 
-static FAULTS: [serial::Faults; 4] = [const { serial::Faults::new() }; 4];
-
-// SAFETY, for all rings: the handler of a line is at one end, and the task that has its port at the other.
-static IMU: Ring<u8, IMU_RING> = unsafe { Ring::new() };
-static FOG: Ring<u8, FOG_RING> = unsafe { Ring::new() };
-static SLCAN: Ring<u8, SLCAN_RING> = unsafe { Ring::new() };
-static SERVICE: Ring<u8, SERVICE_RING> = unsafe { Ring::new() };
-static TO_LINES: [Ring<u8, SENDING>; 4] = [const { unsafe { Ring::new() } }; 4];
+// SAFETY: each belongs to one line, which `Board::start` starts.
+static MEMORY: [serial::Memory; 4] = [const { unsafe { serial::Memory::new() } }; 4];
 
 /// The tasks' ends of everything.
 pub struct Board {
-    pub imu: serial::Port<IMU_RING>,
-    pub fog: serial::Port<FOG_RING>,
-    pub slcan: serial::Port<SLCAN_RING>,
-    pub service: serial::Port<SERVICE_RING>,
+    pub imu: serial::Port,
+    pub fog: serial::Port,
+    pub slcan: serial::Port,
+    pub service: serial::Port,
     /// The CAN controller; `None` where it does not answer, or the clock is not exact enough.
     pub can: Option<Can>,
     pub spi: Spi,
@@ -60,12 +41,13 @@ pub struct Board {
     pub identity: Identity,
 }
 
-/// The interrupts' ends.
+/// The interrupts' ends; the tick's are `None` in the emulator.
 pub struct Handlers {
-    pub imu: serial::Handler<IMU_RING>,
-    pub fog: serial::Handler<FOG_RING>,
-    pub slcan: serial::Handler<SLCAN_RING>,
-    pub service: serial::Handler<SERVICE_RING>,
+    pub imu: serial::Handler,
+    pub fog: serial::Handler,
+    pub slcan: serial::Handler,
+    pub service: serial::Handler,
+    pub receptions: [Option<serial::Reception>; 4],
 }
 
 impl Board {
@@ -84,45 +66,41 @@ impl Board {
             reset,
             crash: crash::take(),
         };
-        let (imu_handler, imu) =
-            line(0, pac::USART1::ptr(), Interrupt::USART1, &IMU, (&BOARD.imu, clocks.apb2_hz, &clocks));
-        let (slcan_handler, slcan) =
-            line(1, pac::USART2::ptr(), Interrupt::USART2, &SLCAN, (&BOARD.slcan, clocks.apb1_hz, &clocks));
-        let (fog_handler, fog) =
-            line(2, pac::USART3::ptr(), Interrupt::USART3, &FOG, (&BOARD.fog, clocks.apb1_hz, &clocks));
-        let (service_handler, service) = line(
-            3,
-            pac::USART6::ptr(),
-            Interrupt::USART6,
-            &SERVICE,
-            (&BOARD.service, clocks.apb2_hz, &clocks),
-        );
+        let now = timer::micros() as u32;
+        let [imu, slcan, fog, service] = lines(&clocks)
+            .map(|(usart, rates, memory)| serial::start(usart, memory, rates, (device_id.is_none(), now)));
         let spi = spi::start(&p.SPI1, BOARD.spi);
         if clocks.exact() {
             supply::watch(&p.EXTI);
         }
         start_ticks(systick, &clocks);
-        let handlers =
-            Handlers { imu: imu_handler, fog: fog_handler, slcan: slcan_handler, service: service_handler };
+        let handlers = Handlers {
+            receptions: [imu.1, slcan.1, fog.1, service.1],
+            imu: imu.0,
+            slcan: slcan.0,
+            fog: fog.0,
+            service: service.0,
+        };
+        let (imu, slcan, fog, service) = (imu.2, slcan.2, fog.2, service.2);
         let emulated = device_id.is_none();
         (Self { imu, fog, slcan, service, can: can.ok(), spi, emulated, clocks, identity }, handlers)
     }
 }
 
-/// Starts a line and gives both of its ends.
-fn line<const N: usize>(
-    number: usize,
-    registers: *const pac::usart1::RegisterBlock,
-    interrupt: Interrupt,
-    received: &'static Ring<u8, N>,
-    (line, bus_hz, clocks): (&Line, u32, &Clocks),
-) -> (serial::Handler<N>, serial::Port<N>) {
-    let usart = Usart::new(registers, interrupt);
-    let emulated = clocks.fault == Some(ClockFault::Emulated);
-    let ends = serial::line(usart, received, &TO_LINES[number % 4], &FAULTS[number % 4], emulated);
+/// A line's USART, the frequency of its bus with its bit rate, and its memory.
+type Line = (Usart, (u32, u32), &'static serial::Memory);
+
+/// Names what belongs to the lines, in the order IMU, SLCAN, fibre-optic gyro, service.
+fn lines(clocks: &Clocks) -> [Line; 4] {
+    let [imu, slcan, fog, service] = &MEMORY;
     // At 16 MHz, 921600 baud would be 2.1 % off before the oscillator's own error.
-    usart.start(bus_hz, if clocks.exact() { line.baud } else { line.fallback_baud });
-    ends
+    let baud = |line: &boards::Line| if clocks.exact() { line.baud } else { line.fallback_baud };
+    [
+        (Usart::one(), (clocks.apb2_hz, baud(&BOARD.imu)), imu),
+        (Usart::two(), (clocks.apb1_hz, baud(&BOARD.slcan)), slcan),
+        (Usart::three(), (clocks.apb1_hz, baud(&BOARD.fog)), fog),
+        (Usart::six(), (clocks.apb2_hz, baud(&BOARD.service)), service),
+    ]
 }
 
 /// Starts SysTick, which interrupts every millisecond.

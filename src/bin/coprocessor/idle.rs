@@ -5,8 +5,8 @@ use crate::fog_network::{FogNetwork, FogParts};
 use crate::imu::BringUp;
 use crate::regions::{Records, Slots};
 use crate::ring::Ring;
+use crate::serial;
 use crate::stm32f405::{clocks, timer};
-use crate::{board, serial};
 use embedded_io::{Write, WriteReady};
 use gyronet::health::Status;
 use gyronet::model::background::BackgroundCheck;
@@ -41,7 +41,7 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
 pub struct Idle {
     device: &'static mut Device<Records, Slots>,
     check: Option<BackgroundCheck<'static>>,
-    service: serial::Port<{ board::SERVICE_RING }>,
+    service: serial::Port,
     fog_network: FogNetwork,
     bring_up: Option<BringUp>,
     /// The reason why the internal oscillator runs, and the time of the last look whether that is over, ms.
@@ -60,7 +60,7 @@ impl Idle {
     #[inline(never)]
     pub fn new(
         (device, check): Stored,
-        service: serial::Port<{ board::SERVICE_RING }>,
+        service: serial::Port,
         fog_network: Option<&'static mut FogParts>,
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
@@ -132,6 +132,7 @@ impl Idle {
     /// The service line's turn: the answer on its way, then the next question.
     #[inline(never)]
     fn answer(&mut self, counters: &AllCounters) {
+        self.service.advance();
         if !self.answer.is_empty() {
             while let Some(rest) = self.answer.get(self.sent..).filter(|rest| !rest.is_empty()) {
                 let Ok(true) = self.service.write_ready() else { return };

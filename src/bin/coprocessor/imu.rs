@@ -21,7 +21,7 @@ use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
 /// Bytes of a line in one turn: all that can wait.
-pub const TURN: usize = board::IMU_RING;
+pub const TURN: usize = serial::RECEIVED;
 /// The bytes that a look at the part on SPI counts as: four looks a turn.
 const LOOK: usize = TURN / 4;
 /// The time from one attempt to bring it up to the next one.
@@ -46,14 +46,14 @@ static WANTED: AtomicBool = AtomicBool::new(true);
 /// The output task's end.
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; there is one of them")]
 pub enum Imu {
-    Line(serial::Port<{ board::IMU_RING }>, Mti),
+    Line(serial::Port, Mti),
     Spi(SpiPart),
 }
 
 impl Imu {
     /// Returns the end of the part that is configured. A configuration names only parts that the image drives.
     #[inline]
-    pub fn new(part: ImuPart, line: serial::Port<{ board::IMU_RING }>) -> Self {
+    pub fn new(part: ImuPart, line: serial::Port) -> Self {
         if part == ImuPart::Icm42688 { Self::Spi(SpiPart::default()) } else { Self::Line(line, Mti::new()) }
     }
 

@@ -14,8 +14,9 @@
 //! # What runs when
 //! | priority | task | when | what |
 //! |---|---|---|---|
-//! | 4 | `imu_line`, `fog_line`, `slcan_line`, `tick` | a byte, 1 ms | a byte into or out of its queue; board time |
-//! | 3 | `service_line`, `can_received`, `can_sent` | a byte, a frame | into and out of their queues |
+//! | 4 | `tick` | 1 ms | board time; counts the bytes that DMA has received |
+//! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte; in the emulator, a byte | counts it; moves it |
+//! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 2 | `output` | pended by these | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
 //! | 0 | `idle` | the rest | FoGNet in pieces, service line, weights against their checksum; else it sleeps |
@@ -118,10 +119,11 @@ mod app {
 
     #[local]
     struct Local {
-        imu: serial::Handler<{ board::IMU_RING }>,
-        fog_handler: serial::Handler<{ board::FOG_RING }>,
-        slcan: serial::Handler<{ board::SLCAN_RING }>,
-        service: serial::Handler<{ board::SERVICE_RING }>,
+        imu: serial::Handler,
+        fog_handler: serial::Handler,
+        slcan: serial::Handler,
+        service: serial::Handler,
+        receptions: [Option<serial::Reception>; 4],
         sender: &'static mut Output,
         network: Option<GyroNet<'static, &'static mut GyroNetState>>,
         rest: &'static mut Idle,
@@ -139,7 +141,7 @@ mod app {
         let start::Parts { output, config, weights, fog_network, device } = parts;
         let coprocessor = cx.local.coprocessor;
         coprocessor.configure(&config);
-        let network = weights.map(|blob| GyroNet::with_state(blob, cx.local.network_state));
+        let network = weights.and_then(|blob| GyroNet::with_state(blob, cx.local.network_state).ok());
         let service = board.service;
         let bring_up = BringUp::new(output.part, board.spi);
         let ports = (board.imu, board.fog, board.slcan, board.can);
@@ -147,9 +149,9 @@ mod app {
         let rest = start::place(cx.local.rest_place, || {
             Idle::new(device, service, fog_network, bring_up, board.clocks.fault)
         });
-        let board::Handlers { imu, fog: fog_handler, slcan, service } = handlers;
+        let board::Handlers { imu, fog: fog_handler, slcan, service, receptions } = handlers;
         let shared = Shared { coprocessor, counters: AllCounters::default() };
-        (shared, Local { imu, fog_handler, slcan, service, sender, network, rest })
+        (shared, Local { imu, fog_handler, slcan, service, receptions, sender, network, rest })
     }
 
     // Short handlers end with a barrier: a store that is still on its way while the handler returns can make
@@ -168,10 +170,11 @@ mod app {
         dsb();
     }
 
-    #[task(binds = SysTick, priority = 4)]
+    #[task(binds = SysTick, priority = 4, local = [receptions])]
     #[unsafe(link_section = ".ram_code.tick")]
-    fn tick(_: tick::Context) {
-        timer::tick();
+    fn tick(cx: tick::Context) {
+        let now = timer::tick();
+        cx.local.receptions.iter_mut().flatten().for_each(|reception| reception.count(now));
         board::SUPERVISOR.report(Task::Tick);
         rtic::pend(Interrupt::UART4);
         dsb();

@@ -1,7 +1,7 @@
 //! The two lines that frames leave by: SLCAN always, CAN where its controller is up.
 
+use crate::serial;
 use crate::stm32f405::can::{self, Can, STALE_MS, State};
-use crate::{board, serial};
 use gyronet::can::DataFrame;
 use gyronet::can::queue::TransmitQueue;
 use gyronet::can::slcan::host::StatusFlags;
@@ -11,11 +11,9 @@ use gyronet::units::Micros;
 /// Frames that may wait for a line.
 const QUEUE: usize = 24;
 
-pub type SlcanPort = serial::Port<{ board::SLCAN_RING }>;
-
 /// Both lines and what waits for them.
 pub struct Outgoing {
-    slcan: SlcanPort,
+    slcan: serial::Port,
     port: Port<QUEUE>,
     can: Option<Can>,
     /// Frames for CAN, with the millisecond in which they were made.
@@ -25,7 +23,7 @@ pub struct Outgoing {
 }
 
 impl Outgoing {
-    pub fn new(slcan: SlcanPort, bits_per_second: u32, can: Option<Can>) -> Self {
+    pub fn new(slcan: serial::Port, bits_per_second: u32, can: Option<Can>) -> Self {
         Self { slcan, port: Port::new(bits_per_second), can, queue: TransmitQueue::new(), now: 0 }
     }
 
@@ -50,6 +48,7 @@ impl Outgoing {
             State::Passive => StatusFlags::ERROR_PASSIVE,
             State::Off => StatusFlags::BUS_ERROR,
         });
+        self.slcan.advance();
         // A byte that the line lost is answered as a bad line, or missing in it.
         let _ = self.port.service(&mut self.slcan, take);
         self.refill();

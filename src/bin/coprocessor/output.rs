@@ -4,12 +4,12 @@ use crate::board::SUPERVISOR;
 use crate::boards::BOARD;
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{Imu, TURN};
-use crate::outgoing::{Outgoing, SlcanPort};
+use crate::outgoing::Outgoing;
 use crate::pause;
 use crate::received::{self, FRAMES};
+use crate::serial;
 use crate::stm32f405::can::{Can, State};
 use crate::stm32f405::{timer, watchdog};
-use crate::{board, serial};
 use gyronet::coprocessor::{self, Coprocessor};
 use gyronet::health::count;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
@@ -29,7 +29,7 @@ pub struct OutputParts {
 /// The output task.
 pub struct Output {
     imu: Imu,
-    fog: FogPort,
+    fog: serial::Port,
     dsp1760: Dsp1760,
     outgoing: Outgoing,
     /// The millisecond in which the other lines were looked at.
@@ -39,9 +39,7 @@ pub struct Output {
     lines: LineCounters,
 }
 
-type FogPort = serial::Port<{ board::FOG_RING }>;
-type ImuPort = serial::Port<{ board::IMU_RING }>;
-type Ports = (ImuPort, FogPort, SlcanPort, Option<Can>);
+type Ports = (serial::Port, serial::Port, serial::Port, Option<Can>);
 
 impl OutputParts {
     #[inline]
@@ -129,7 +127,7 @@ impl Output {
         while let Some(frame) = FRAMES.pop() {
             let _ = coprocessor.can(&frame, now);
         }
-        for _ in 0..board::FOG_RING {
+        for _ in 0..serial::RECEIVED {
             let Some(byte) = self.fog.receive() else { break };
             self.dsp1760.receive(byte);
             while let Some(sample) = self.dsp1760.next_sample() {

@@ -35,7 +35,7 @@ pub fn is_requested() -> bool {
     STATE.load(Ordering::Relaxed) != RUNNING
 }
 
-/// Tells idle that the announcement is on its way. For the output task.
+/// Reports to idle that the announcement is on its way. For the output task.
 pub fn announce() {
     let _ = STATE.compare_exchange(REQUESTED, ANNOUNCED, Ordering::Relaxed, Ordering::Relaxed);
 }

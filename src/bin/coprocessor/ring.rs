@@ -3,7 +3,7 @@
 //! Each end is moved by one task alone, so neither masks interrupts: a value is written before the end
 //! that releases it, and read before the end that frees its place. The ends count on and on; the
 //! length is a power of two, so a place is their low bits. One processor needs no barrier between its tasks:
-//! what the compiler must not reorder is fenced.
+//! what the compiler must not reorder is fenced. Hardware may stand in for a task at either end.
 #![allow(
     unsafe_code,
     reason = "places that are written and read by address; each block says why it is sound"
@@ -47,8 +47,9 @@ impl<T, const N: usize> Ring<T, N> {
         self.places.get(count & Self::MASK).map_or(core::ptr::null_mut(), |place| place.get().cast())
     }
 
+    /// Returns how many values wait.
     #[inline(always)]
-    fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         let len = self.written.load(Ordering::Relaxed).wrapping_sub(self.read.load(Ordering::Relaxed));
         compiler_fence(Ordering::Acquire);
         len
@@ -86,6 +87,37 @@ impl<T, const N: usize> Ring<T, N> {
         compiler_fence(Ordering::Release);
         self.read.store(read.wrapping_add(1), Ordering::Relaxed);
         Some(value)
+    }
+
+    /// Returns where the values lie, for hardware that writes or reads them in place of a task.
+    pub fn places(&self) -> *mut T {
+        self.place(0)
+    }
+
+    /// Counts values that hardware has written at the end, also over values that were not read. In place of
+    /// [`Ring::push`].
+    #[inline(always)]
+    pub fn written(&self, count: usize) {
+        compiler_fence(Ordering::Release);
+        let written = self.written.load(Ordering::Relaxed);
+        self.written.store(written.wrapping_add(count), Ordering::Relaxed);
+    }
+
+    /// Returns the oldest values as far as they lie behind each other, for hardware that reads them.
+    pub fn oldest(&self) -> &[T] {
+        let first = self.read.load(Ordering::Relaxed) & Self::MASK;
+        let len = self.len().min(N - first);
+        // SAFETY: the places are inside the ring and have been written; the writing task leaves them alone until they
+        // are dropped.
+        unsafe { core::slice::from_raw_parts(self.place(first), len) }
+    }
+
+    /// Drops values that have been read elsewhere, or must not be. For the reading task.
+    #[inline(always)]
+    pub fn drop_oldest(&self, count: usize) {
+        compiler_fence(Ordering::Release);
+        let read = self.read.load(Ordering::Relaxed);
+        self.read.store(read.wrapping_add(count), Ordering::Relaxed);
     }
 
     /// Returns whether nothing waits.

@@ -1,164 +1,146 @@
-//! Serial lines: an interrupt handler moves bytes between the USART and two rings, and a port gives the
-//! other ends of the rings to a task.
-#![allow(unsafe_code, reason = "the interrupt mask; the block says why it is sound")]
+//! Serial lines: DMA moves bytes between the USART and two rings, and a port gives the other ends of the rings to a
+//! task. In the emulator, which has no DMA, interrupts move them.
+#![allow(unsafe_code, reason = "memory that DMA reads and writes; each block says why it is sound")]
+
+mod handler;
+mod reception;
+
+pub use handler::{Faults, Handler};
+pub use reception::Reception;
 
 use crate::ring::Ring;
-use crate::stm32f405::usart::{Status, Usart};
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use cortex_m::peripheral::NVIC;
+use crate::stm32f405::usart::Usart;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 
+/// Bytes that may wait for a task: more than a sensor sends in the 20 ms that an estimate is waited for, and 4 ms of a
+/// line at 921600 baud.
+pub const RECEIVED: usize = 512;
 /// Bytes on their way to a line.
 pub const SENDING: usize = 128;
+/// Places of a ring that DMA may write between two ticks: 92 bytes come at 921600 baud.
+const AHEAD: usize = 128;
+const _: () = assert!(RECEIVED >= 2 * AHEAD, "the stream must not overtake the reader unseen");
 /// Polls before a flush gives up: about ten byte times at 115200.
 const FLUSH_POLLS: u32 = 100_000;
-/// Counts a line's faults since the start. The handler alone counts.
-pub struct Faults {
-    lost: AtomicU32,
-    held: AtomicU32,
-    /// A byte waits in the register, and the handler has been switched off.
-    holding: AtomicBool,
+
+/// The statics of a line.
+pub struct Memory {
+    pub received: Ring<u8, RECEIVED>,
+    pub sending: Ring<u8, SENDING>,
+    pub faults: Faults,
 }
 
-impl Faults {
-    /// Starts at zero.
-    pub const fn new() -> Self {
-        Self { lost: AtomicU32::new(0), held: AtomicU32::new(0), holding: AtomicBool::new(false) }
-    }
-}
-
-fn count(counter: &AtomicU32) {
-    counter.store(counter.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
-}
-
-/// The interrupt's end of a line.
-pub struct Handler<const N: usize> {
-    usart: Usart,
-    received: &'static Ring<u8, N>,
-    sending: &'static Ring<u8, SENDING>,
-    faults: &'static Faults,
-    /// True while room for a byte raises the interrupt.
-    room_requested: bool,
-    emulated: bool,
-}
-
-impl<const N: usize> Handler<N> {
-    /// Moves a byte each way; waits for nothing. The interrupt is raised again for the next one, in the emulator
-    /// by hand: its USART has all bytes of the host at once, and raises it for the first.
-    #[inline(always)]
-    pub fn serve(&mut self) {
-        let status = self.usart.status();
-        let took = status.received() && self.take(status);
-        // Also where there was no room for a byte: a task that waits to send would never make room.
-        let gave = status.room() && self.give();
-        let wanted = !self.sending.is_empty();
-        if wanted != self.room_requested {
-            self.room_requested = wanted;
-            self.usart.request_room(wanted);
-        }
-        if self.emulated && (took || gave) {
-            NVIC::pend(self.usart.interrupt);
-        }
-    }
-
-    /// Takes the byte that has come; whether there was room for it.
-    #[inline(always)]
-    fn take(&mut self, status: Status) -> bool {
-        if !self.received.push_with(|| self.usart.read()) {
-            self.hold();
-            return false;
-        }
-        if status.damaged() {
-            count(&self.faults.lost);
-        }
-        true
-    }
-
-    /// Leaves the byte in the register until there is room; the line then reports an overrun. The interrupt is
-    /// masked in the NVIC: the emulated USART keeps it raised whatever its own enable bit says.
-    #[cold]
-    fn hold(&self) {
-        NVIC::mask(self.usart.interrupt);
-        if !self.faults.holding.swap(true, Ordering::Relaxed) {
-            count(&self.faults.held);
-        }
-    }
-
-    /// Gives the line the next byte; whether there was one.
-    #[inline(always)]
-    fn give(&mut self) -> bool {
-        let byte = self.sending.pop();
-        if let Some(byte) = byte {
-            self.usart.write(byte);
-        }
-        byte.is_some()
+impl Memory {
+    /// Starts empty.
+    ///
+    /// # Safety
+    /// One line uses it, and its ends are moved by one task each.
+    pub const unsafe fn new() -> Self {
+        // SAFETY: the caller's.
+        unsafe { Self { received: Ring::new(), sending: Ring::new(), faults: Faults::new() } }
     }
 }
 
 /// A task's end of a line. It never waits: where nothing is ready it gives an error (`TimedOut`).
-pub struct Port<const N: usize> {
+pub struct Port {
     usart: Usart,
-    received: &'static Ring<u8, N>,
-    sending: &'static Ring<u8, SENDING>,
-    faults: &'static Faults,
-}
-
-/// Both ends of a line.
-pub fn line<const N: usize>(
-    usart: Usart,
-    received: &'static Ring<u8, N>,
-    sending: &'static Ring<u8, SENDING>,
-    faults: &'static Faults,
+    memory: &'static Memory,
+    /// True where the interrupt moves the bytes.
     emulated: bool,
-) -> (Handler<N>, Port<N>) {
-    (
-        Handler { usart, received, sending, faults, room_requested: false, emulated },
-        Port { usart, received, sending, faults },
-    )
+    /// Bytes that DMA is sending.
+    under_way: usize,
+    /// Bytes that were written over before they were read.
+    overwritten: u32,
 }
 
-impl<const N: usize> Port<N> {
+/// The ends of a line: the interrupt's, the tick's where the line has DMA, and a task's.
+pub type Ends = (Handler, Option<Reception>, Port);
+
+/// Starts a line of which neither end has been used, at `now`, us.
+pub fn start(
+    usart: Usart,
+    memory: &'static Memory,
+    (clock_hz, baud): (u32, u32),
+    (emulated, now): (bool, u32),
+) -> Ends {
+    let Memory { received, sending, faults } = memory;
+    let handler = Handler { usart, received, sending, faults, emulated, room_requested: false };
+    let reception = (!emulated).then(|| {
+        // SAFETY: the ring's writing end is the DMA's alone.
+        unsafe { usart.receive_to(received.places(), RECEIVED as u16) };
+        usart.request_dma();
+        Reception::new(usart.receiver(), received, baud, now)
+    });
+    usart.start(clock_hz, baud);
+    if emulated {
+        usart.interrupt_with_bytes();
+    }
+    (handler, reception, Port { usart, memory, emulated, under_way: 0, overwritten: 0 })
+}
+
+impl Port {
     /// The next received byte.
+    #[inline]
     pub fn receive(&mut self) -> Option<u8> {
-        let byte = self.received.pop()?;
-        // There is room again.
-        if self.faults.holding.swap(false, Ordering::Relaxed) {
-            self.wake();
+        let Memory { received, faults, .. } = self.memory;
+        if self.emulated {
+            let byte = received.pop()?;
+            faults.release(&self.usart);
+            return Some(byte);
         }
-        Some(byte)
+        let waiting = received.len();
+        if waiting > RECEIVED - AHEAD {
+            // The stream is, or soon will be, where the oldest bytes lie.
+            received.drop_oldest(waiting);
+            self.overwritten = self.overwritten.saturating_add(waiting as u32);
+            return None;
+        }
+        received.pop()
     }
 
     /// Bytes that came damaged, or when there was no room for them.
     pub fn lost(&self) -> u32 {
-        self.faults.lost.load(Ordering::Relaxed)
+        self.memory.faults.lost().saturating_add(self.overwritten)
     }
 
     /// Bytes that had to wait in the line's register because there was no room for them.
     pub fn held(&self) -> u32 {
-        self.faults.held.load(Ordering::Relaxed)
+        self.memory.faults.held()
     }
 
-    /// Runs the handler, even where reception is held up. Pended by hand: the emulated line raises no interrupt when it can send, nor a
-    /// second time for a byte that came while the one before was read.
-    fn wake(&self) {
-        // SAFETY: the handler shares nothing but the rings, and nobody masks an interrupt to
-        // keep it from them.
-        unsafe { NVIC::unmask(self.usart.interrupt) };
-        NVIC::pend(self.usart.interrupt);
+    /// Sends on what waits, where DMA has sent what went before. A task that sends calls it at every turn.
+    pub fn advance(&mut self) {
+        let sending = &self.memory.sending;
+        if self.emulated {
+            if !sending.is_empty() {
+                handler::raise(&self.usart);
+            }
+            return;
+        }
+        if self.usart.is_sending() {
+            return;
+        }
+        sending.drop_oldest(core::mem::take(&mut self.under_way));
+        let bytes = sending.oldest();
+        if !bytes.is_empty() {
+            self.under_way = bytes.len();
+            // SAFETY: the bytes stay in the ring until DMA has read them.
+            unsafe { self.usart.send_from(bytes.as_ptr(), bytes.len() as u16) };
+        }
     }
 }
 
-impl<const N: usize> ErrorType for Port<N> {
+impl ErrorType for Port {
     type Error = ErrorKind;
 }
 
-impl<const N: usize> ReadReady for Port<N> {
+impl ReadReady for Port {
     fn read_ready(&mut self) -> Result<bool, ErrorKind> {
-        Ok(!self.received.is_empty())
+        Ok(!self.memory.received.is_empty())
     }
 }
 
-impl<const N: usize> Read for Port<N> {
+impl Read for Port {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
         let Some(first) = bytes.first_mut() else { return Ok(0) };
         *first = self.receive().ok_or(ErrorKind::TimedOut)?;
@@ -166,27 +148,28 @@ impl<const N: usize> Read for Port<N> {
     }
 }
 
-impl<const N: usize> WriteReady for Port<N> {
+impl WriteReady for Port {
     fn write_ready(&mut self) -> Result<bool, ErrorKind> {
-        if !self.sending.is_empty() {
-            self.wake();
-        }
-        Ok(!self.sending.is_full())
+        self.advance();
+        Ok(!self.memory.sending.is_full())
     }
 }
 
-impl<const N: usize> Write for Port<N> {
+impl Write for Port {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
-        let taken = bytes.iter().take_while(|byte| self.sending.push(**byte)).count();
+        let taken = bytes.iter().take_while(|byte| self.memory.sending.push(**byte)).count();
         if taken == 0 && !bytes.is_empty() {
             return Err(ErrorKind::TimedOut);
         }
-        self.wake();
+        self.advance();
         Ok(taken)
     }
 
     fn flush(&mut self) -> Result<(), ErrorKind> {
-        let sent = |_| self.sending.is_empty() && self.usart.status().sent();
+        let sent = |_| {
+            self.advance();
+            self.memory.sending.is_empty() && self.usart.status().sent()
+        };
         if (0..FLUSH_POLLS).any(sent) { Ok(()) } else { Err(ErrorKind::TimedOut) }
     }
 }

@@ -36,7 +36,7 @@ pub fn received() -> impl Iterator<Item = embedded_can::Id> {
 pub struct Parts {
     pub output: OutputParts,
     pub config: Config,
-    /// To be put under the network.
+    /// The weights that the network is to use.
     pub weights: Option<Blob<'static>>,
     pub fog_network: Option<&'static mut FogParts>,
     pub device: Stored,

@@ -3,7 +3,7 @@
 //!
 //! A crystal of another frequency still locks the PLL, and every bit rate would be wrong by the same
 //! factor. The internal oscillator is within -8 and +4.5 % from -40 to 105 degrees Celsius (DS8626
-//! table 39), so frequencies that differ by less than 10 % cannot be told apart.
+//! table 39), so frequencies that differ by less than 10 % cannot be distinguished.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
 use super::{clock_delay, pac};

@@ -7,6 +7,7 @@
 pub mod can;
 pub mod clocks;
 pub mod crystal;
+pub mod dma;
 pub mod flash;
 pub mod pins;
 pub mod reset;
@@ -57,7 +58,10 @@ pub fn clock_delay() {
 
 /// Switches on the clocks of ports and peripherals.
 fn enable_peripherals(rcc: &pac::RCC) {
-    rcc.ahb1enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
+    rcc.ahb1enr().modify(|_, w| {
+        w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled();
+        w.dma1en().enabled().dma2en().enabled()
+    });
     rcc.apb1enr().modify(|_, w| w.usart2en().enabled().usart3en().enabled().can1en().enabled());
     rcc.apb2enr()
         .modify(|_, w| w.usart1en().enabled().usart6en().enabled().spi1en().enabled().syscfgen().enabled());

@@ -31,13 +31,14 @@ fn counter() -> u32 {
     unsafe { &*pac::TIM5::ptr() }.cnt().read().bits()
 }
 
-/// Counts half-wraps. The SysTick handler calls it every millisecond.
+/// Counts half-wraps, and returns the counter. The SysTick handler calls it every millisecond.
 #[inline]
-pub fn tick() {
-    let halves = HALVES.load(Ordering::Relaxed);
-    if counter() >> 31 != halves & 1 {
+pub fn tick() -> u32 {
+    let (halves, count) = (HALVES.load(Ordering::Relaxed), counter());
+    if count >> 31 != halves & 1 {
         HALVES.store(halves.wrapping_add(1), Ordering::Relaxed);
     }
+    count
 }
 
 /// Microseconds since the start.

@@ -1,14 +1,16 @@
 //! A USART (RM0090 30), 8 data bits, no parity, 1 stop bit.
 #![allow(unsafe_code, reason = "registers by address; each block says why it is sound")]
 
-use super::pac::{Interrupt, usart1::RegisterBlock};
+use super::dma::Stream;
+use super::pac::{self, Interrupt, usart1::RegisterBlock};
 
-/// A USART of the chip and its interrupt.
+/// A USART of the chip, its interrupt, and its DMA streams in the order receive, send (RM0090 tables 42 and 43).
 #[derive(Debug, Clone, Copy)]
 pub struct Usart {
     registers: *const RegisterBlock,
-    /// Raised when a byte has come, and when there is room for one if that was asked for.
+    /// Raised by what was asked for: a byte that has come, room for one, a damaged byte.
     pub interrupt: Interrupt,
+    streams: [Stream; 2],
 }
 
 // SAFETY: an address that is always mapped. The interrupt's handler alone reads and writes data; others
@@ -54,9 +56,35 @@ impl Status {
 }
 
 impl Usart {
-    /// Names a USART by its registers, which must be those of one of the chip's, and its interrupt.
-    pub const fn new(registers: *const RegisterBlock, interrupt: Interrupt) -> Self {
-        Self { registers, interrupt }
+    /// USART1, on APB2.
+    pub const fn one() -> Self {
+        Self::new(pac::USART1::ptr(), Interrupt::USART1, [(pac::DMA2::ptr(), 2, 4), (pac::DMA2::ptr(), 7, 4)])
+    }
+
+    /// USART2, on APB1.
+    pub const fn two() -> Self {
+        Self::new(pac::USART2::ptr(), Interrupt::USART2, [(pac::DMA1::ptr(), 5, 4), (pac::DMA1::ptr(), 6, 4)])
+    }
+
+    /// USART3, on APB1.
+    pub const fn three() -> Self {
+        Self::new(pac::USART3::ptr(), Interrupt::USART3, [(pac::DMA1::ptr(), 1, 4), (pac::DMA1::ptr(), 3, 4)])
+    }
+
+    /// USART6, on APB2.
+    pub const fn six() -> Self {
+        Self::new(pac::USART6::ptr(), Interrupt::USART6, [(pac::DMA2::ptr(), 1, 5), (pac::DMA2::ptr(), 6, 5)])
+    }
+
+    /// Streams are controller, number and channel.
+    const fn new(
+        registers: *const RegisterBlock,
+        interrupt: Interrupt,
+        [receiver, sender]: [(*const pac::dma2::RegisterBlock, usize, u8); 2],
+    ) -> Self {
+        let streams =
+            [Stream::new(receiver.0, receiver.1, receiver.2), Stream::new(sender.0, sender.1, sender.2)];
+        Self { registers, interrupt, streams }
     }
 
     fn registers(&self) -> &RegisterBlock {
@@ -64,12 +92,58 @@ impl Usart {
         unsafe { &*self.registers }
     }
 
-    /// Starts both directions at the bit rate nearest to `baud`, and the interrupt of received bytes.
+    /// Starts both directions at the bit rate nearest to `baud`.
     pub fn start(&self, clock_hz: u32, baud: u32) {
         let divider = (clock_hz + baud / 2).checked_div(baud).unwrap_or_default();
         // SAFETY: any 16-bit value is a valid divider (RM0090 30.3.4).
         self.registers().brr().write(|w| unsafe { w.bits(divider as u16) });
-        self.registers().cr1().write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
+        self.registers().cr1().write(|w| w.ue().enabled().te().enabled().re().enabled());
+    }
+
+    /// Raises the interrupt with every byte that comes.
+    pub fn interrupt_with_bytes(&self) {
+        self.registers().cr1().modify(|_, w| w.rxneie().enabled());
+    }
+
+    /// Requests DMA for both directions, and raises the interrupt with every damaged byte (RM0090 30.3.13).
+    pub fn request_dma(&self) {
+        self.registers().cr3().write(|w| w.dmar().enabled().dmat().enabled().eie().enabled());
+    }
+
+    /// Lets DMA write every received byte to `len` bytes of memory, again and again from their begin.
+    ///
+    /// # Safety
+    /// Nothing else writes the memory from now on.
+    pub unsafe fn receive_to(&self, memory: *mut u8, len: u16) {
+        // SAFETY: the stream is this USART's; the rest is the caller's.
+        unsafe { self.streams[0].receive(self.data(), memory, len) };
+    }
+
+    /// Lets DMA send `len` bytes of memory. [`Usart::is_sending`] must have returned false.
+    ///
+    /// # Safety
+    /// Nothing writes the memory until [`Usart::is_sending`] returns false.
+    pub unsafe fn send_from(&self, memory: *const u8, len: u16) {
+        // The end of the last byte is not noticed otherwise (RM0090 30.3.13). Zeros clear flags, ones do nothing.
+        // SAFETY: see above; the stream is this USART's, and the rest is the caller's.
+        unsafe {
+            self.registers().sr().write(|w| w.bits(!Status::SENT)); // reset value: 0x00C0, every bit is written
+            self.streams[1].send(self.data(), memory, len);
+        }
+    }
+
+    /// Returns whether DMA has not read all bytes of [`Usart::send_from`].
+    pub fn is_sending(&self) -> bool {
+        self.streams[1].is_running()
+    }
+
+    fn data(&self) -> *const u32 {
+        core::ptr::from_ref(self.registers().dr()).cast()
+    }
+
+    /// Returns the stream that receives.
+    pub fn receiver(&self) -> Stream {
+        self.streams[0]
     }
 
     /// Reads the status. Reading the data register after it clears the errors (RM0090 30.6.1).

@@ -1,5 +1,6 @@
 """Data and remote frames of CAN 2.0: their bits with stuffing, their length and their priority (ISO 11898-1 section 10)."""
 
+import re
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -27,6 +28,17 @@ def priority(frame):
     return frame.identifier << 21 | frame.remote << 20
 
 
+def _crc_step(byte):
+    crc = byte << 7
+    for _ in range(8):
+        crc = crc << 1 ^ (0x4599 if crc & 0x4000 else 0)
+    return crc & 0x7FFF
+
+
+CRC_TABLE = [_crc_step(byte) for byte in range(256)]
+RUNS = re.compile("0+|1+")
+
+
 @lru_cache(maxsize=4096)
 def stuffed_bits(frame):
     """Number of bits from the start of frame to the end of the CRC, stuff bits included."""
@@ -39,22 +51,20 @@ def stuffed_bits(frame):
     if not frame.remote:
         bits += "".join(f"{byte:08b}" for byte in frame.data)
     bits += f"{_crc(bits):015b}"
-    stuffed, run, last = len(bits), 0, ""
-    for bit in bits:
-        run = run + 1 if bit == last else 1
-        last = bit
-        if run == 5:
-            stuffed += 1
-            run, last = 1, "1" if bit == "0" else "0"
+    # After five equal bits comes a stuff bit, which is the first of those that follow it.
+    stuffed, first = len(bits), 0
+    for run in RUNS.finditer(bits):
+        equal = first + run.end() - run.start()
+        stuffed += equal // 5
+        first = equal % 5 == 0
     return stuffed
 
 
 def _crc(bits):
-    """CRC-15 with the polynomial 0x4599."""
+    """CRC-15 with the polynomial 0x4599, which begins at 0, so that leading zeros change nothing."""
     crc = 0
-    for bit in bits:
-        crc = (crc << 1) ^ (0x4599 if (crc >> 14 & 1) != (bit == "1") else 0)
-        crc &= 0x7FFF
+    for byte in int(bits, 2).to_bytes(len(bits) // 8 + 1, "big"):
+        crc = crc << 8 & 0x7FFF ^ CRC_TABLE[crc >> 7 ^ byte]
     return crc
 
 

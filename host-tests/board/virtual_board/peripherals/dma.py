@@ -1,6 +1,6 @@
 """DMA controllers in direct mode (RM0090 section 10): requests of peripherals move items between a data register and memory.
 
-A request is served at once. CCM RAM is not on the DMA's bus: an access there is a transfer error (section 2.3.1).
+A request is served at once; what requests raise no interrupt may come several at a time, before anyone can see it. CCM RAM is not on the DMA's bus: an access there is a transfer error (section 2.3.1).
 Left out: the FIFO (DMDIS = 1), bursts, memory to memory, PINCOS, peripheral flow control, different sizes on both sides, priorities.
 Rests on the manual's silence: a stream that is enabled with old flags set starts all the same, and `dma_flags` is recorded.
 """
@@ -34,6 +34,8 @@ class Stream:
         self.fcr = 0x21
         self.flags = 0
         self.left = self.total = 0
+        #: The peripheral that PAR points to, found when the stream is enabled.
+        self.peripheral = None
 
     @property
     def width(self):
@@ -52,10 +54,12 @@ class Dma(Peripheral):
         self.requests = REQUESTS[name]
         self.streams = [Stream() for _ in range(8)]
         self.by_request = {}
+        #: The peripherals that the enabled streams serve.
+        self.sources = []
 
     def reset(self, cause):
         self.streams = [Stream() for _ in range(8)]
-        self.by_request = {}
+        self.by_request, self.sources = {}, []
         for number in self.interrupts:
             self.board.irq(number, False)
 
@@ -75,19 +79,19 @@ class Dma(Peripheral):
         memory = stream.m1ar if stream.cr & DBM and stream.cr & CT else stream.m0ar
         if stream.cr & MINC:
             memory += done * width
-        address = stream.par + (done * width if stream.cr & PINC else 0)
+        offset = stream.par - stream.peripheral.base + (done * width if stream.cr & PINC else 0)
         if memory in CCM:
             self._fail(number)
             return False
-        peripheral = self._at(address)
+        peripheral = stream.peripheral
         if stream.cr >> 6 & 3 == TO_MEMORY:
-            item = peripheral.read(address - peripheral.base, 4) & (1 << 8 * width) - 1
+            item = peripheral.read(offset, 4) & (1 << 8 * width) - 1
             self.board.memory_write(memory, item.to_bytes(width, "little"))
             self._advance(number)
         else:
             value = int.from_bytes(self.board.memory_read(memory, width), "little")
             self._advance(number)
-            peripheral.write(address - peripheral.base, value, 4)
+            peripheral.write(offset, value, 4)
         return True
 
     def _at(self, address):
@@ -109,7 +113,37 @@ class Dma(Peripheral):
                     stream.cr ^= CT
             else:
                 self._disable(number)
-        self._interrupt(number)
+        if stream.cr & (TEIE | HTIE | TCIE):
+            self._interrupt(number)
+
+    def take(self, name, data):
+        """Writes bytes that a stream that serves silently is given one after the other."""
+        stream = self.streams[self.by_request[name]]
+        while data:
+            part, data = data[:stream.left], data[stream.left:]
+            self.board.memory_write(stream.m0ar + stream.total - stream.left, part)
+            half = stream.total // 2
+            stream.flags |= HTIF if stream.left > half >= stream.left - len(part) else 0
+            stream.left -= len(part)
+            if not stream.left:
+                stream.flags |= TCIF
+                stream.left = stream.total
+
+    def serves_silently(self, name):
+        """Whether a stream writes bytes to memory, again and again, without an interrupt."""
+        number = self.by_request.get(name)
+        if number is None:
+            return False
+        stream = self.streams[number]
+        mode = stream.cr & (CIRC | MINC | PINC | DBM | 3 << 11 | 3 << 6 | TEIE | HTIE | TCIE)
+        return mode == CIRC | MINC and stream.m0ar not in CCM
+
+    def _catch_up(self):
+        for source in list(self.sources):
+            source.catch_up()
+
+    def _source(self, name):
+        return self.board.peripherals[name.rsplit("_", 1)[0]]
 
     def _fail(self, number):
         self.streams[number].flags |= TEIF
@@ -120,7 +154,11 @@ class Dma(Peripheral):
     def _disable(self, number):
         stream = self.streams[number]
         stream.cr &= ~EN
-        self.by_request = {name: other for name, other in self.by_request.items() if other != number}
+        self._serve({name: other for name, other in self.by_request.items() if other != number})
+
+    def _serve(self, by_request):
+        self.by_request = by_request
+        self.sources = [self._source(name) for name in by_request]
 
     def _interrupt(self, number):
         stream = self.streams[number]
@@ -130,6 +168,7 @@ class Dma(Peripheral):
     # -- registers ---------------------------------------------------------------------------------------------------
 
     def read(self, offset, size):
+        self._catch_up()
         word = offset & ~3
         if word in (0x00, 0x04):
             value = sum(self.streams[word + index].flags << shift for index, shift in enumerate(FLAG_SHIFTS))
@@ -143,6 +182,11 @@ class Dma(Peripheral):
         return registers.cut(value, offset, size)
 
     def write(self, offset, value, size):
+        self._catch_up()
+        self._write(offset, value, size)
+        self._catch_up()
+
+    def _write(self, offset, value, size):
         word = offset & ~3
         value = registers.merge(0 if word < 0x10 else self.read(word, 4), value, offset, size)
         if word in (0x08, 0x0C):
@@ -193,5 +237,6 @@ class Dma(Peripheral):
             stream.cr &= ~EN
             return
         stream.total = stream.left
-        self.by_request[name] = number
-        self.board.peripherals[name.rsplit("_", 1)[0]].serve_dma()
+        stream.peripheral = self._at(stream.par)
+        self._serve(self.by_request | {name: number})
+        self._source(name).serve_dma()

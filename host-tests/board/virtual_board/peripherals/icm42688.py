@@ -231,7 +231,7 @@ class Icm42688:
             self.board.schedule(100 * US, self._end_pulse)
 
     def _end_pulse(self):
-        """A pulsed interrupt ends after 100 us, or 8 us with INT_TPULSE_DURATION, which is not told apart (section 14.52)."""
+        """A pulsed interrupt ends after 100 us, or 8 us with INT_TPULSE_DURATION, which the model does not distinguish (section 14.52)."""
         if self.int1:
             idle = not self.banks[0][reg.INT_CONFIG] & 1
             self.board.peripherals["GPIO" + self.int1[0]].configure("drive", (self.int1[1], idle))

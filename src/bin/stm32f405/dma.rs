@@ -1,0 +1,129 @@
+//! A DMA stream (RM0090 10) between a peripheral's data register and bytes in SRAM, in direct mode.
+//!
+//! The streams raise no interrupt: their owners look at how far they are. The DMA reaches SRAM, not CCM
+//! (RM0090 2.3.1). No stream of DMA2 serves a peripheral of the AHB: beside APB2's, it could corrupt data (ES0182,
+//! "DMA2 data corruption when managing AHB and APB2 peripherals in a concurrent way").
+#![allow(unsafe_code, reason = "registers by address; each block says why it is sound")]
+
+use super::pac::dma2::{RegisterBlock, ST};
+use core::sync::atomic::{Ordering, compiler_fence};
+
+/// One of the eight streams of a controller, and the channel that its requests come from (RM0090 tables 42 and 43).
+#[derive(Debug, Clone, Copy)]
+pub struct Stream {
+    controller: *const RegisterBlock,
+    number: usize,
+    channel: u8,
+}
+
+// SAFETY: an address that is always mapped. A stream has one owner, and of the registers that streams share, the
+// flags are cleared by writing ones.
+unsafe impl Send for Stream {}
+
+impl Stream {
+    /// A stream's flags in its part of the status registers: all, and transfer complete.
+    const FLAGS: u32 = 0x3D;
+    const COMPLETE: u32 = 1 << 5;
+
+    /// Names a stream, 0 to 7, and a channel, 0 to 7, of a controller of the chip.
+    pub const fn new(controller: *const RegisterBlock, number: usize, channel: u8) -> Self {
+        Self { controller, number, channel }
+    }
+
+    fn controller(&self) -> &RegisterBlock {
+        // SAFETY: see above.
+        unsafe { &*self.controller }
+    }
+
+    fn stream(&self) -> &ST {
+        // Eight at most, as the compiler sees: there is no panic.
+        self.controller().st(self.number % 8)
+    }
+
+    /// The place of the stream's flags in a status register.
+    fn shift(&self) -> u32 {
+        [0, 6, 16, 22][self.number % 4]
+    }
+
+    /// Starts to write every byte that the register receives to `len` bytes of memory, again and again from their
+    /// begin.
+    ///
+    /// # Safety
+    /// The register is one that the channel's peripheral receives with, and nothing else writes the memory from now on.
+    pub unsafe fn receive(&self, register: *const u32, memory: *mut u8, len: u16) {
+        // SAFETY: the caller's.
+        unsafe { self.prepare(register, memory, len) };
+        self.stream().cr().write(|w| {
+            w.chsel().set(self.channel).pl().high().minc().incremented().circ().enabled();
+            w.dir().peripheral_to_memory().en().enabled()
+        });
+    }
+
+    /// Starts to give `len` bytes of memory to the register. The stream must have ended.
+    ///
+    /// # Safety
+    /// The register is one that the channel's peripheral sends with, and nothing writes the memory until the stream
+    /// has ended.
+    pub unsafe fn send(&self, register: *const u32, memory: *const u8, len: u16) {
+        // SAFETY: the caller's.
+        unsafe { self.prepare(register, memory.cast_mut(), len) };
+        self.stream().cr().write(|w| {
+            w.chsel().set(self.channel).minc().incremented();
+            w.dir().memory_to_peripheral().en().enabled()
+        });
+    }
+
+    /// Sets both addresses and the count of a stream that has ended, and clears its old flags (RM0090 10.3.17).
+    unsafe fn prepare(&self, register: *const u32, memory: *mut u8, len: u16) {
+        self.clear(Self::FLAGS);
+        let stream = self.stream();
+        // SAFETY: the caller's; any count is valid.
+        unsafe {
+            stream.par().write(|w| w.bits(register as u32));
+            stream.m0ar().write(|w| w.bits(memory as u32));
+            stream.ndtr().write(|w| w.bits(len.into()));
+        }
+        // What the processor has written to the memory comes before the stream's start.
+        compiler_fence(Ordering::SeqCst);
+        cortex_m::asm::dmb();
+    }
+
+    /// Returns how many bytes are left until the end.
+    #[inline(always)]
+    pub fn remaining(&self) -> usize {
+        let left = self.stream().ndtr().read().bits() as u16;
+        compiler_fence(Ordering::SeqCst);
+        left.into()
+    }
+
+    /// Returns whether the stream has not ended.
+    #[inline(always)]
+    pub fn is_running(&self) -> bool {
+        self.stream().cr().read().en().is_enabled()
+    }
+
+    /// Returns whether the end was reached since the last call.
+    #[inline(always)]
+    pub fn take_complete(&self) -> bool {
+        let dma = self.controller();
+        let flags = if self.number < 4 { dma.lisr().read().bits() } else { dma.hisr().read().bits() };
+        let complete = flags >> self.shift() & Self::COMPLETE != 0;
+        if complete {
+            self.clear(Self::COMPLETE);
+        }
+        complete
+    }
+
+    #[inline(always)]
+    fn clear(&self, flags: u32) {
+        let (dma, bits) = (self.controller(), flags << self.shift());
+        // SAFETY: ones clear flags of this stream, zeros do nothing (RM0090 10.5.3).
+        unsafe {
+            if self.number < 4 {
+                dma.lifcr().write(|w| w.bits(bits));
+            } else {
+                dma.hifcr().write(|w| w.bits(bits));
+            }
+        }
+    }
+}
