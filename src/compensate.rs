@@ -67,8 +67,8 @@ impl CompensateConfig {
 
 /// Samples over which a carry may be spread before it is reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
-/// The number of quarters of a second of standing whose angle may still be carried: the last second and the quarter that
-/// is not over. Wheels show late that a vehicle pulls away, but not later than that.
+/// The number of quarters of a second of standing whose angle may still be carried: the last second and the quarter
+/// that is not over. Wheels show late that a vehicle pulls away, but not later than that.
 const HELD_QUARTERS: usize = 5;
 
 /// Samples that are kept: the newest, and as many before it as a window can still change.
@@ -264,8 +264,8 @@ impl Compensator {
         self.prior = 0;
     }
 
-    /// Notes that the vehicle stands no more. It may have moved before that was noticed, so what was held at zero in the
-    /// last second is carried into the next rates; what was before stays zero.
+    /// Notes that the vehicle stands no more. It may have moved before that was noticed, so what was held at zero in
+    /// the last second is carried into the next rates; what was before stays zero.
     pub fn end_standstill(&mut self) {
         self.navigation_carry -= core::mem::take(&mut self.held).iter().sum::<i64>();
         self.held_until = 0;

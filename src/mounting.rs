@@ -95,12 +95,12 @@ impl Rotation {
     #[doc(hidden)]
     pub fn levelling(rest: [SpecificForce; 3]) -> Result<(Self, f32), LevelError> {
         let [x, y, z] = rest.map(|force| force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
-        let norm = libm::sqrtf(x * x + y * y + z * z);
+        let norm = crate::root::sqrt(x * x + y * y + z * z);
         if libm::fabsf(norm - STANDARD_GRAVITY) > GRAVITY_TOLERANCE {
             return Err(LevelError::NotGravity(norm));
         }
         let [x, y, cos] = [x / norm, y / norm, z / norm];
-        let tilt = libm::atan2f(libm::sqrtf(x * x + y * y), cos).to_degrees();
+        let tilt = libm::atan2f(crate::root::sqrt(x * x + y * y), cos).to_degrees();
         if cos < UPSIDE_DOWN {
             return Err(LevelError::UpsideDown(tilt));
         }

@@ -101,7 +101,7 @@ impl Increments {
         let own = end.saturating_sub(span);
         let begin = match self.last_end {
             // Jitter moves the ends about by less than half the span; a part without a sequence
-            // number tells one lost message by nothing but a distance of two spans.
+            // number shows one lost message by nothing but a distance of two spans.
             Some(last) if sample.lost == 0 && 2 * end.saturating_sub(last) <= 3 * span => last,
             Some(last) => {
                 count(&mut self.counters.gaps, 1);

@@ -31,9 +31,9 @@ pub const KEPT: usize = 16;
 pub enum Quality {
     /// A sample was taken at that very time.
     Exact,
-    /// Between two samples.
+    /// The value lies between two samples.
     Interpolated,
-    /// Between two samples with a gap between them.
+    /// The value lies between two samples with a gap between them.
     Bridged {
         /// Its length, microseconds.
         gap: u32,

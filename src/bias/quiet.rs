@@ -1,4 +1,4 @@
-//! Without wheels the inertial sensors judge whether the vehicle stands, and only within tighter limits than at the
+//! The inertial sensors judge whether the vehicle stands where there are no wheels, within tighter limits than at the
 //! start.
 //!
 //! A steady turn looks like a bias, so an estimator that trusts a quiet gyro takes slow turns
@@ -67,7 +67,7 @@ impl QuietDetector {
         }
     }
 
-    /// Takes a sample; says whether all is quiet, as far as the last whole second tells.
+    /// Takes a sample; says whether all is quiet, as far as the last whole second shows.
     pub fn observe(&mut self, sample: &ImuSample) -> bool {
         let [block_x, ..] = &self.block;
         let count = block_x.count() + 1;

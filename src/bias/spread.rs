@@ -40,6 +40,6 @@ impl Spread {
 
     /// Returns the standard deviation of the values.
     pub fn std(&self) -> f32 {
-        libm::sqrtf(self.variance())
+        crate::root::sqrt(self.variance())
     }
 }

@@ -234,7 +234,7 @@ impl ZeroRate {
     /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s.
     #[must_use]
     pub fn sigma(&self) -> f32 {
-        libm::sqrtf(self.covariance.bias)
+        crate::root::sqrt(self.covariance.bias)
     }
 
     /// Returns whether the wheels stand and the gyro does not contradict them.
@@ -275,7 +275,9 @@ impl ZeroRate {
         let Covariance { bias, both, offset } = self.covariance;
         let gate = match self.source {
             StandstillSource::Wheels => self.wheels_gate(),
-            StandstillSource::Inertial => 3.0 * libm::sqrtf(bias + 2.0 * both + offset + measured.variance),
+            StandstillSource::Inertial => {
+                3.0 * crate::root::sqrt(bias + 2.0 * both + offset + measured.variance)
+            }
             StandstillSource::None => 0.0,
         };
         if libm::fabsf(step) > gate {

@@ -56,7 +56,7 @@ impl Uncertainty {
             Some(scale_square) if corrected => per_scale * per_scale * scale_square,
             _ => uncorrected * uncorrected,
         };
-        let sigma = libm::sqrtf(own + bias * bias);
+        let sigma = crate::root::sqrt(own + bias * bias);
         // Beyond the code's range the cast saturates.
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
     }

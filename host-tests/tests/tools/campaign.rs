@@ -41,7 +41,7 @@ fn no_fault_moves_yaw_unseen() {
         let good = 100.0 * seconds as f64 / scene.rows() as f64;
         assert!(good > 0.9, "{}: {good} of the undamaged drive is good", scene.part.name());
         let undamaged = outcome(scene, None);
-        let seen = (undamaged.told_after, undamaged.counted, undamaged.moved, undamaged.grown);
+        let seen = (undamaged.reported_after, undamaged.counted, undamaged.moved, undamaged.grown);
         assert_eq!(seen, (None, false, 0.0, 0.0), "{}: a stretch is the whole drive's", scene.part.name());
         assert!(undamaged.error > 0.0, "the reference is there");
         // A build that is wrong by itself, or states another error than it has, is not to be held against itself.
@@ -55,7 +55,7 @@ fn no_fault_moves_yaw_unseen() {
     assert!(report.failures.is_empty(), "{} undetected or panicked", report.failures.len());
     let all = report.lines.last().expect("a line of all");
     assert_eq!((all.runs, all.panics, all.undetected), (QUICK, 0, 0));
-    assert!(all.told > QUICK / 2 && all.harmless > 0 && all.excepted > 0, "{all:?}");
+    assert!(all.reported > QUICK / 2 && all.harmless > 0 && all.excepted > 0, "{all:?}");
 
     let again = campaign::run(Plan { runs: 4, threads: 1, ..plan }, &scenes, &blob(), || {});
     for (run, again) in runs.iter().zip(&again) {
@@ -69,18 +69,18 @@ fn the_judge_sees_known_faults() {
     let scene = Scene::new(&drive, Part::Icm42688, &mut Integer::new(blob()));
     // 0.01 rad/s from one sample to the next, in a turn: nothing can tell, and the yaw shows it.
     let bias = outcome(&scene, Some(fault(Kind::BiasStep, 650, 0.01)));
-    assert!(bias.is_undetected() && bias.told_after.is_none() && !bias.counted, "{bias:?}");
+    assert!(bias.is_undetected() && bias.reported_after.is_none() && !bias.counted, "{bias:?}");
     assert!((0.008..0.02).contains(&bias.moved), "{bias:?}");
     // A frozen yaw axis is reported after seven samples, before any of it has gone out.
     let stuck = outcome(&scene, Some(fault(Kind::Stuck, 200, 0.0)));
-    assert!((0.06..0.08).contains(&stuck.told_after.expect("it is reported")), "{stuck:?}");
+    assert!((0.06..0.08).contains(&stuck.reported_after.expect("it is reported")), "{stuck:?}");
     assert!(!stuck.is_undetected() && stuck.recovery < 0.2 && !stuck.not_recovered, "{stuck:?}");
     // Nothing comes for 100 ms: the time-out reports it.
     let silent = outcome(&scene, Some(Fault { rows: 10, ..fault(Kind::Stall, 10, 0.0) }));
-    assert!(silent.told_after.expect("it is reported") < 0.035, "{silent:?}");
+    assert!(silent.reported_after.expect("it is reported") < 0.035, "{silent:?}");
     // A bit that makes a reading jump is no reading, whatever the part's checksum is.
     let spikes = outcome(&scene, Some(fault(Kind::BitFlip, 200, 0.0)));
-    assert!(spikes.told_after.expect("it is reported") < 0.3 && spikes.moved < 0.05, "{spikes:?}");
+    assert!(spikes.reported_after.expect("it is reported") < 0.3 && spikes.moved < 0.05, "{spikes:?}");
     // Twice the same is once.
     let twice = outcome(&scene, Some(fault(Kind::Duplicate, 200, 0.0)));
     assert!(twice.is_harmless() && twice.counted && twice.moved == 0.0, "{twice:?}");
@@ -95,9 +95,9 @@ fn a_clock_that_drifts_moves_yaw_by_that_share_of_the_turn() {
         let scene = Scene::new(&drive, part, &mut Integer::new(blob()));
         for ppm in [50.0, 200.0, 1_000.0, 5_000.0, 20_000.0] {
             let drift = outcome(&scene, Some(fault(Kind::ClockDrift, 650, ppm)));
-            let Outcome { moved, moved_limits, told_after, .. } = drift;
+            let Outcome { moved, moved_limits, reported_after, .. } = drift;
             println!(
-                "{}: {ppm} ppm: {moved:.1e} rad, {moved_limits:.2} of the limit, reported after {told_after:?} s",
+                "{}: {ppm} ppm: {moved:.1e} rad, {moved_limits:.2} of the limit, reported after {reported_after:?} s",
                 part.name()
             );
             // 0.7 rad/s is the fastest turn of the drives.

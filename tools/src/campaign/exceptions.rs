@@ -25,7 +25,7 @@ const FASTEST: f64 = 0.7;
 pub const EXCEPTIONS: &[Exception] = &[
     Exception {
         name: "bias step of the gyro about z",
-        why: "one gyro cannot tell a bias from a turn; at standstill the wheels tell one above 0.3 deg/s, and \
+        why: "one gyro cannot tell a bias from a turn; at standstill the wheels contradict one above 0.3 deg/s, and \
               the zero-rate updates take a smaller one; bound 2.5 times the step",
         bound: |fault, _| {
             (fault.kind == Kind::BiasStep && fault.axes == Axes::One(2))
@@ -47,7 +47,7 @@ pub const EXCEPTIONS: &[Exception] = &[
     Exception {
         name: "clock jump of less than a sample",
         why: "a stamp that is so much earlier may be jitter: what is sent is as much older, until a second of it \
-              tells; bound 0.7 rad/s times the jump",
+              shows; bound 0.7 rad/s times the jump",
         bound: |fault, part| {
             // An ICM's stamps wrap: a jump by nearly a whole turn of them is a small one.
             let wraps = if part == Part::Icm42688 { WRAP_US } else { f64::INFINITY };

@@ -54,7 +54,7 @@ struct Row {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Outcome {
     /// Time from the fault's first effect to the first message, or first missing message, that reports it, s.
-    pub told_after: Option<f64>,
+    pub reported_after: Option<f64>,
     /// The board has counted something; a diagnosis would see it.
     pub counted: bool,
     /// The largest yaw moved in a second that is all marked good, before the first report, rad.
@@ -85,7 +85,7 @@ impl Outcome {
     /// Returns whether the fault was not reported and did not move yaw by more than the limit.
     #[must_use]
     pub fn is_harmless(&self) -> bool {
-        self.told_after.is_none() && !self.is_undetected()
+        self.reported_after.is_none() && !self.is_undetected()
     }
 }
 
@@ -196,7 +196,7 @@ impl Baseline {
             let undamaged = seen.set.map_or(Reports::default(), |set| self.rows[set.row].reports);
             if !seen.reports.beyond(undamaged).is_nothing() && seen.at >= times.begin {
                 let after = (seen.at - times.begin) as f64 * 1e-6;
-                outcome.told_after.get_or_insert(after);
+                outcome.reported_after.get_or_insert(after);
                 last_report = Some(seen.at);
                 report_row = seen.set.map_or(last_row, |set| set.row);
             }
@@ -229,7 +229,7 @@ impl Baseline {
             let most = self.limits.moved;
             let limit = set.sigma.map_or(most, |sigma| sigma.min(most));
             let by = f64::from(now.wrapping_sub(then)).abs() * RADIANS;
-            if outcome.told_after.is_none() {
+            if outcome.reported_after.is_none() {
                 outcome.moved = outcome.moved.max(by);
                 outcome.moved_limits = outcome.moved_limits.max(by / limit);
             } else if start >= report_row.saturating_add(PAID) {

@@ -64,7 +64,7 @@ pub fn disturb(
 
 /// A part whose clock is fast by a share samples that much more often, and does not know it.
 ///
-/// The rows then tell of a vehicle that does all it does in less time, and turns faster by that
+/// The rows then show a vehicle that does all it does in less time, and turns faster by that
 /// share: so row n of the disturbed drive has turned as far as row n of the undisturbed one, and
 /// they can be compared. Increments are angles whatever the clock: there the stamps alone drift.
 fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bias: [AngularRate; 3]) {

@@ -24,11 +24,11 @@ pub fn svg(runs: &[Run]) -> Result<String, PlotError> {
         "{} runs with one fault: reported (blue), on the named list (orange), undetected (red)",
         single.len()
     );
-    let told = |run: &Run| run.outcome()?.told_after.map(|s| (1e3 * s).max(1.0));
+    let reported = |run: &Run| run.outcome()?.reported_after.map(|s| (1e3 * s).max(1.0));
     let moved = |run: &Run| run.outcome().map(|outcome| outcome.moved_limits.max(1e-3));
     let moved_label = "moved in a second before that, over the limit";
     let panels = vec![
-        panel("reported after, ms", (0.8, 1.2e4), dots(&single, told), None),
+        panel("reported after, ms", (0.8, 1.2e4), dots(&single, reported), None),
         panel(moved_label, (8e-4, 1e4), dots(&single, moved), Some(1.0)),
     ];
     Figure { title: &title, size: SIZE, side_by_side: true, legend: Vec::new(), panels }.svg()

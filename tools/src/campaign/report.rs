@@ -33,7 +33,7 @@ pub struct Line {
     /// Runs.
     pub runs: usize,
     /// Runs in which a receiver had a report.
-    pub told: usize,
+    pub reported: usize,
     /// Runs without a report in which yaw did not move by more than the limit.
     pub harmless: usize,
     /// Harmless runs in which the board counted something.
@@ -45,7 +45,7 @@ pub struct Line {
     /// Panics.
     pub panics: usize,
     /// Time from the first effect to the report, s.
-    pub told_after: Spread,
+    pub reported_after: Spread,
     /// The most that yaw was moved in a good second before anything was reported, the named ones left
     /// out, rad.
     pub moved: f64,
@@ -165,15 +165,15 @@ impl Report {
 
 fn line<'r>(name: &str, runs: impl Iterator<Item = &'r Run>) -> Line {
     let mut line = Line { name: name.to_owned(), ..Line::default() };
-    let (mut told_after, mut recovery) = (Vec::new(), Vec::new());
+    let (mut reported_after, mut recovery) = (Vec::new(), Vec::new());
     for run in runs {
         line.runs += 1;
         let Some(outcome) = run.outcome() else {
             line.panics += 1;
             continue;
         };
-        told_after.extend(outcome.told_after);
-        line.told += usize::from(outcome.told_after.is_some() && !outcome.is_undetected());
+        reported_after.extend(outcome.reported_after);
+        line.reported += usize::from(outcome.reported_after.is_some() && !outcome.is_undetected());
         line.harmless += usize::from(outcome.is_harmless());
         line.counted += usize::from(outcome.is_harmless() && outcome.counted);
         let excepted = run.exception().is_some();
@@ -186,12 +186,12 @@ fn line<'r>(name: &str, runs: impl Iterator<Item = &'r Run>) -> Line {
         line.grown += usize::from(outcome.grown_limits > 1.0);
         line.grown_limits = line.grown_limits.max(outcome.grown_limits);
         line.error = line.error.max(outcome.error);
-        if outcome.told_after.is_some() {
+        if outcome.reported_after.is_some() {
             recovery.push(outcome.recovery);
         }
         line.not_recovered += usize::from(outcome.not_recovered);
     }
-    line.told_after = Spread::of(told_after);
+    line.reported_after = Spread::of(reported_after);
     line.recovery = Spread::of(recovery);
     line
 }
@@ -238,13 +238,13 @@ impl fmt::Display for Report {
                 "{:<15} {:>6} {:>8} {:>8} {:>7} {:>10} {:>6}  {:>6.0} {:>6.0}  {:>7.2}  {:>8.2} {:>6}  {:>6.2} {:>6.2} {:>5}",
                 line.name,
                 line.runs,
-                line.told,
+                line.reported,
                 line.harmless,
                 line.excepted,
                 line.undetected,
                 line.panics,
-                ms(line.told_after.median),
-                ms(line.told_after.most),
+                ms(line.reported_after.median),
+                ms(line.reported_after.most),
                 line.moved_limits,
                 line.grown_limits,
                 line.grown,

@@ -37,7 +37,7 @@ pub struct Scene<'d> {
     /// The messages of the undamaged run.
     pub baseline: Baseline,
     gyro_bias: [AngularRate; 3],
-    /// Before every [`STATE_EVERY`]th row.
+    /// The states before every [`STATE_EVERY`]th row.
     states: Vec<(Board, Receiver)>,
 }
 

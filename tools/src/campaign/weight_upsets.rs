@@ -8,11 +8,12 @@
 use crate::random::Random;
 use gyronet::compensate::CompensateConfig;
 use gyronet::model::background::BackgroundCheck;
-use gyronet::model::blob::{HEADER_LEN, HIDDEN};
+use gyronet::model::blob::{HEADER_LEN, LINEAR_INPUTS};
 use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork};
 use gyronet::nn::bilstm::Layer;
 use gyronet::nn::dense::Dense;
+use gyronet::nn::linear::Linear;
 use gyronet::nn::lstm::DirectionWeights;
 use gyronet::pipeline::UncertaintyConfig;
 use gyronet::units::AngularRate;
@@ -71,28 +72,36 @@ impl Memory {
             at += words;
             self.words.get(at - words..at)
         };
-        let mut direction = |inputs| {
-            let input = take(DirectionWeights::input_words(HIDDEN, inputs))?;
-            DirectionWeights::new(HIDDEN, inputs, input, take(DirectionWeights::recurrent_words(HIDDEN))?)
-        };
-        let mut layer = |inputs| Some(Layer { forward: direction(inputs)?, backward: direction(inputs)? });
-        let layers = [layer(FEATURES)?, layer(2 * HIDDEN)?];
-        let mut dense = || {
-            let weights = bytemuck::cast_slice(take(HIDDEN)?);
-            let &[bias, multiplier] = take(2)? else { return None };
-            Some(Dense { weights, bias: bias as i32, multiplier: multiplier as i32 })
-        };
-        let (gyro_error, log_scale) = (dense()?, dense()?);
+        let (units, content) = (usize::from(loaded.shape.units), self.file().get(..self.bytes - 4)?);
+        let mut damaged = Blob { content, ..*loaded };
+        if loaded.shape.linear {
+            let rows = bytemuck::cast_slice(take(WINDOW * LINEAR_INPUTS)?);
+            damaged.linear = Linear::new(LINEAR_INPUTS, rows).ok();
+        }
+        if units > 0 {
+            let mut direction = |inputs| {
+                let input = take(DirectionWeights::input_words(units, inputs))?;
+                DirectionWeights::new(units, inputs, input, take(DirectionWeights::recurrent_words(units))?)
+            };
+            let mut layer =
+                |inputs| Some(Layer { forward: direction(inputs)?, backward: direction(inputs)? });
+            damaged.layers = Some([layer(FEATURES)?, layer(2 * units)?]);
+            let mut dense = || {
+                let weights = bytemuck::cast_slice(take(units)?);
+                let &[bias, multiplier] = take(2)? else { return None };
+                Some(Dense { weights, bias: bias as i32, multiplier: multiplier as i32 })
+            };
+            (damaged.gyro_error, damaged.log_scale) = (dense()?, dense()?);
+        }
         let &[scale_unit] = take(1)? else { return None };
-        let content = self.file().get(..self.bytes - 4)?;
-        Some(Blob { layers, gyro_error, log_scale, scale_unit, content, ..*loaded })
+        Some(Blob { scale_unit, ..damaged })
     }
 }
 
 /// Returns the end of the header and its provenance.
 fn first_weight(file: &[u8]) -> usize {
     let length =
-        file.get(20..24).map_or(0, |bytes| bytes.iter().rev().fold(0, |n, byte| n << 8 | usize::from(*byte)));
+        file.get(24..28).map_or(0, |bytes| bytes.iter().rev().fold(0, |n, byte| n << 8 | usize::from(*byte)));
     HEADER_LEN + length
 }
 
@@ -129,7 +138,7 @@ impl WeightUpsets {
             if let Some(blob) = memory.in_use(loaded) {
                 let effect = catch_unwind(AssertUnwindSafe(|| effect(&blob, windows, &undamaged)));
                 match effect {
-                    Ok((told, moved, sigmas)) => upsets.effects.count(told, moved, sigmas),
+                    Ok((reported, moved, sigmas)) => upsets.effects.count(reported, moved, sigmas),
                     Err(_) => upsets.effects.panics += 1,
                 }
                 match found_after(&blob, bit / 8, draw.below(file.len())) {
@@ -152,7 +161,7 @@ impl WeightUpsets {
 fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate]) -> (bool, f64, f64) {
     let limits = CompensateConfig::DEFAULT;
     let mut network = GyroNet::new(*blob);
-    let (mut told, mut moved, mut sigmas) = (false, 0f64, 0f64);
+    let (mut reported, mut moved, mut sigmas) = (false, 0f64, 0f64);
     for (window, before) in windows.iter().zip(undamaged) {
         let estimate = network.estimate(window);
         let mean = |estimate: &Estimate| {
@@ -160,14 +169,14 @@ fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate
                 / WINDOW as f64
         };
         let largest = estimate.corrections.iter().map(|correction| correction.0.unsigned_abs()).max();
-        told |= mean(&estimate).abs() > limits.max_mean.rad_per_sec()
+        reported |= mean(&estimate).abs() > limits.max_mean.rad_per_sec()
             || largest.unwrap_or_default() > limits.max_single.0.unsigned_abs();
         let by = (mean(&estimate) - mean(before)).abs();
         let sigma = f64::from(UncertaintyConfig::DEFAULT.per_scale) * before.scale.rad_per_sec();
         moved = moved.max(by);
         sigmas = sigmas.max(by / sigma.max(AngularRate(1).rad_per_sec()));
     }
-    (told, moved, sigmas)
+    (reported, moved, sigmas)
 }
 
 /// Returns the milliseconds until the background check reports a flip that happens when it has come to byte `at`;
@@ -207,7 +216,7 @@ pub struct Effects {
     /// Bits that changed nothing.
     pub nothing: usize,
     /// Bits whose estimate was rejected, which a receiver sees.
-    pub told: usize,
+    pub reported: usize,
     /// Yaw moved by no more than the stated sigma.
     pub within: usize,
     /// Bits that moved yaw further without a report.
@@ -219,10 +228,10 @@ pub struct Effects {
 }
 
 impl Effects {
-    fn count(&mut self, told: bool, moved: f64, sigmas: f64) {
+    fn count(&mut self, reported: bool, moved: f64, sigmas: f64) {
         self.bits += 1;
-        if told {
-            self.told += 1;
+        if reported {
+            self.reported += 1;
             return;
         }
         self.most = self.most.max(moved);
@@ -236,11 +245,11 @@ impl Effects {
 
 impl fmt::Display for Effects {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { bits, nothing, told, within, beyond, most, panics } = self;
+        let Self { bits, nothing, reported, within, beyond, most, panics } = self;
         write!(
             f,
             "{bits} bits: {nothing} changed nothing, {within} moved yaw by at most the stated sigma, {beyond} by \
-             more, at most {most:.1e} rad in a second, {told} were reported, {panics} panics"
+             more, at most {most:.1e} rad in a second, {reported} were reported, {panics} panics"
         )
     }
 }

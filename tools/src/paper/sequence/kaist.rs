@@ -136,7 +136,7 @@ struct EncoderParameters {
     resolution: f64,
     /// Left and right, m.
     diameter: [f64; 2],
-    /// Between the wheels, m.
+    /// The distance between the wheels, m.
     base: f64,
 }
 

@@ -82,10 +82,8 @@ impl Estimates {
         for (method, padding) in
             [(Method::FOGNET, FogConfig::DEFAULT.padding), (Method::FOGNET_NOPAD, Padding::None)]
         {
-            let started = Instant::now();
             let config = FogConfig { padding, ..FogConfig::DEFAULT };
-            let drive = fog_replay::run(sequence, network, config, &mut tick);
-            let run_time = started.elapsed().as_secs_f64();
+            let (drive, run_time) = timed(|| fog_replay::run(sequence, network, config, &mut tick));
             let turns = drive.turns[self.start..].to_vec();
             self.methods.push(Estimate { method, turns, run_time });
         }
@@ -101,24 +99,28 @@ impl Estimates {
     ) {
         let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
-        let started = Instant::now();
         // The paper's network alone: no zero-rate updates behind it.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let drive = Replay::run(recording, &config, None, network, &mut tick);
-        let run_time = started.elapsed().as_secs_f64();
+        let (drive, alone_s) = timed(|| Replay::run(recording, &config, None, network, &mut tick));
         let wheels = WheelFrames::new(recording);
-        let looped = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick);
+        let (looped, looped_s) =
+            timed(|| Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, &mut tick));
         self.add(Method::RAW, || constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {
             Ok((drive, looped)) => {
                 let still = &gyro[..self.start];
                 self.add(Method::STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
-                for (method, rates) in [
-                    (Method::GYRONET, corrected(&drive, &gyro, |step| step.settled)),
-                    (Method::GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.vehicle.prompt.rate)),
+                for (method, run_time, rates) in [
+                    (Method::GYRONET, alone_s, corrected(&drive, &gyro, |step| step.settled)),
+                    (
+                        Method::GYRONET_ONLINE,
+                        alone_s,
+                        corrected(&drive, &gyro, |step| step.vehicle.prompt.rate),
+                    ),
                     // The last steps of the drive have not gone out yet.
                     (
                         Method::GYRONET_LOOP,
+                        looped_s,
                         corrected(&looped, &gyro, |step| {
                             step.navigation.map_or(step.settled, |sent| sent.rate)
                         }),
@@ -147,12 +149,17 @@ impl Estimates {
 
     /// Rates of all steps, rad/s.
     fn add(&mut self, method: Method, rates: impl FnOnce() -> Vec<f64>) {
-        let started = Instant::now();
-        let rates = rates();
-        let run_time = started.elapsed().as_secs_f64();
+        let (rates, run_time) = timed(rates);
         let turns = rates[self.start..].iter().map(|rate| rate * DT).collect();
         self.methods.push(Estimate { method, turns, run_time });
     }
+}
+
+/// Returns what some work gives, and how long it took, s.
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let started = Instant::now();
+    let result = work();
+    (result, started.elapsed().as_secs_f64())
 }
 
 /// One of the rates of each step; where the board got no sample, the gyro's value in between, less

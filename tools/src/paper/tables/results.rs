@@ -185,9 +185,9 @@ pub struct Results {
     pub simulated: bool,
     /// One entry for each sequence.
     pub sequences: Vec<SequenceErrors>,
-    /// Over all sequences, of the methods that all of them have.
+    /// The means over all sequences, of the methods that all of them have.
     pub mean: ByMethod,
-    /// Over the sequences of each data set's layout.
+    /// The means over the sequences of each data set's layout.
     pub mean_of_layout: BTreeMap<&'static str, ByMethod>,
     /// GyroNet's error in 1 s over that of static initialisation, of the means.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -114,6 +114,28 @@ fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
 }
 
 #[test]
+fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
+    let of = |name: &str| {
+        let sequence = Sequence { name: name.into(), ..exact() };
+        let estimates = estimates::run(&sequence, &mut Nothing, || {});
+        let (mut errors, _) = SequenceErrors::new(&sequence, &estimates);
+        let fognet = errors.methods["fog"];
+        errors.methods.insert(Method::FOGNET.key, fognet);
+        errors
+    };
+    let tables = table::tables(&Results::new(vec![of("urban15"), of("urban18")]));
+    let titled = |title: &str| tables.iter().find(|table| table.title.starts_with(title)).expect("a table");
+    let rivals = titled("Table IV:");
+    let names: Vec<&str> = rivals.rows.iter().map(|row| row.name.as_str()).collect();
+    assert_eq!(names, ["urban15", "average"]);
+    assert!(rivals.rows.iter().all(|row| row.figures.iter().all(Option::is_some)));
+    let recomputed = rivals.paper_rows.last().expect("the paper's rows");
+    assert_eq!(recomputed.figures[1], Some(9.0), "printed: 10");
+    assert_eq!(titled("Table V:").title, "Table V: average ATE on sequences recorded later, 1 sequences, m");
+    assert!(titled("Table V:").notes[0].contains("simulated"), "{:?}", titled("Table V:").notes);
+}
+
+#[test]
 fn json_and_tables_of_simulated_sequences() {
     let of = |name: &str, layout| {
         let sequence = sequence(name, layout, 60);
