@@ -5,6 +5,11 @@ use std::{env, fs, path::PathBuf};
 
 /// The part's memory regions.
 const REGIONS: &str = "src/bin/stm32f405/regions.x";
+/// Memory maps of the boards without the DSP extension, by the feature that chooses one.
+const SMALL: [(&str, &str); 2] = [
+    ("CARGO_FEATURE_MICROBIT", "src/bin/small_core/microbit.x"),
+    ("CARGO_FEATURE_LM3S6965EVB", "src/bin/small_core/lm3s6965evb.x"),
+];
 /// Limits of the image that is flashed.
 const SLOTS: &str = "src/bin/stm32f405/slots.x";
 
@@ -19,6 +24,14 @@ fn main() {
     }
     if has_dsp() {
         println!("cargo:rustc-cfg=gyronet_dsp");
+    }
+    for (feature, map) in SMALL {
+        println!("cargo:rerun-if-changed={map}");
+        if env::var_os(feature).is_some() && env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
+            let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+            fs::copy(map, out.join("regions.x")).expect("the board's map stands with the image");
+            println!("cargo:rustc-link-search={}", out.display());
+        }
     }
     // Not for the firmware of others that use the library: it has a memory map of its own.
     let image = env::var_os("CARGO_FEATURE_STM32F405").is_some();

@@ -147,6 +147,7 @@ pub mod mounting;
 pub mod nn;
 #[doc(hidden)]
 pub mod pipeline;
+mod root;
 
 pub use can::{DataFrame, queue::TransmitQueue};
 pub use coprocessor::{Clock, Config, Coprocessor, InputError, Observation, TimedFrame};

@@ -12,6 +12,7 @@
 //! | gate input | 18 bit, saturated | Q14, +-8 |
 //! | gate output | int16 | Q15 ([`activation`]) |
 //! | cell state `c` | int32 | Q20 |
+//! | weight of a linear layer | int32 | Q24 of output code over input code ([`linear`]) |
 //!
 //! # Two rows in one multiply
 //! The int8 weights of two gates of a unit share a 16-bit halfword: `256 * high + low`, with
@@ -30,6 +31,7 @@ pub mod activation;
 pub mod bilstm;
 pub mod dense;
 pub mod exp2;
+pub mod linear;
 pub mod lstm;
 pub mod reference;
 mod simd;

@@ -7,6 +7,7 @@ pub mod entrance;
 pub mod flash;
 pub mod golden;
 pub mod image;
+pub mod models;
 pub mod noise;
 pub mod packing;
 pub mod parallel;

@@ -31,11 +31,14 @@ mod firmware {
     use crate::meter::Meter;
     use crate::random_records;
     use crate::support::Numbers;
+    use crate::support::random_model;
     use core::hint::black_box;
     use cortex_m_semihosting::{debug, hprintln};
+    use gyronet::model::blob::Shape;
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::window::{FEATURES, Features, WINDOW};
     use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};
+    use gyronet::nn::Aligned;
     use gyronet::nn::dense::Dense;
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
     use gyronet::pipeline::{Pipeline, PipelineConfig};
@@ -76,7 +79,8 @@ mod firmware {
         };
         // Too large for the stack.
         let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return };
-        let mut network = GyroNet::with_state(blob, state);
+        sizes(meter, state);
+        let Ok(mut network) = GyroNet::with_state(blob, state) else { return };
         let mut numbers = Numbers::new(9);
         let mut window: [Features; WINDOW] = [[0; FEATURES]; WINDOW];
         // The same work for any input: ten random windows, zeros, the ends of the range.
@@ -110,6 +114,30 @@ mod firmware {
                 black_box(reference.estimate(black_box(&window)));
             }),
             None => hprintln!("FAILED: the checkpoint is not to be read"),
+        }
+    }
+
+    /// Counts a window of models with a linear part and fewer units, or none, and of the paper's, without a linear part.
+    fn sizes(meter: &mut Meter, state: &mut GyroNetState) {
+        macro_rules! model {
+            ($units:literal) => {{
+                const SHAPE: Shape = Shape { units: $units, linear: true };
+                static FILE: Aligned<[u8; SHAPE.file_len(0)]> = Aligned(random_model::file(SHAPE, 19));
+                (concat!("units_", $units, "/window"), FILE.0.as_slice())
+            }};
+        }
+        // The flash has no room for a second one of the paper's size.
+        let paper = ("units_60/window", weights::DEFAULT.0.as_slice());
+        let models = [model!(0), model!(8), model!(16), model!(32), paper];
+        let window = random_model::window(&mut Numbers::new(19), 0);
+        for (name, file) in models {
+            let network = Blob::new_checked(file).and_then(|blob| GyroNet::with_state(blob, &mut *state));
+            match network {
+                Ok(mut network) => meter.run(name, || {
+                    black_box(network.estimate(black_box(&window)));
+                }),
+                Err(error) => hprintln!("FAILED: {}", error),
+            }
         }
     }
 

@@ -1,55 +1,95 @@
 //! This module checks GyroNet's weight file before use, and reads it in place.
 //!
-//! The header of `model::file`, then:
+//! A file holds a linear part, two layers of Bi-LSTMs, or both ([`Shape`]). The header of `model::file`, then:
 //!
 //! | offset | type | field |
 //! |---|---|---|
-//! | 76 | P bytes | provenance, UTF-8 JSON |
-//! | 76 + P | | four directions: layer 1 forward, backward, layer 2 forward, backward |
-//! | ... | i16 x 2H, i32, i32 | gyro error: weights, bias, multiplier to a rate code |
-//! | ... | i16 x 2H, i32, i32 | log2 of its scale: weights, bias, multiplier to Q16 |
+//! | 80 | P bytes | provenance, UTF-8 JSON |
+//! | 80 + P | i32 x 60 x 10 | the linear part, if there is one: a row for each sample's output ([`Blob::linear`]) |
+//! | ... | | four directions, if there are units: layer 1 forward, backward, layer 2 forward, backward |
+//! | ... | i16 x 2H, i32, i32 | with them, gyro error: weights, bias, multiplier to a rate code |
+//! | ... | i16 x 2H, i32, i32 | with them, log2 of its scale: weights, bias, multiplier to Q16 |
 //! | ... | u32 | [`Blob::scale_unit`] |
 
 pub use super::file::{BlobError, CRC, GYRONET, MAGIC, Normalisation, Topology, VERSION};
 
 use super::file::{Header, Reader, check_dense, check_rows, dense_len, header_len, layers_len};
 use crate::model::window::{FEATURES, WINDOW};
-use crate::nn::{bilstm::Layer, dense::Dense};
+use crate::nn::{bilstm::Layer, dense::Dense, linear::Linear};
 
-/// Units of GyroNet a direction (section III-B of the paper).
+/// Units of the paper's GyroNet a direction (section III-B), and the most that a file may have.
 pub const HIDDEN: usize = 60;
+/// Inputs of the linear part: all features of a window, sample by sample, oldest first.
+pub const LINEAR_INPUTS: usize = WINDOW * FEATURES;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(FEATURES);
-/// The content that the header must have.
-pub const TOPOLOGY: Topology = [GYRONET, WINDOW as u16, FEATURES as u16, HIDDEN as u16, 2];
+
+/// The parts of a window model and their sizes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Shape {
+    /// Units of the Bi-LSTMs a direction, up to [`HIDDEN`] in steps of 4; with 0 there are none.
+    pub units: u16,
+    /// Whether there is a linear part.
+    pub linear: bool,
+}
+
+impl Shape {
+    /// The shape in the paper.
+    pub const PAPER: Self = Self { units: HIDDEN as u16, linear: false };
+    /// The largest shape.
+    pub const LARGEST: Self = Self { units: HIDDEN as u16, linear: true };
+
+    /// Returns the content that the header must have.
+    #[must_use]
+    pub const fn topology(self) -> Topology {
+        let outputs = if self.linear { WINDOW as u16 } else { 0 };
+        [GYRONET, WINDOW as u16, FEATURES as u16, self.units, 2, outputs]
+    }
+
+    /// Returns the number of bytes of a file with `provenance` bytes of padded text.
+    #[must_use]
+    pub const fn file_len(self, provenance: usize) -> usize {
+        let linear = if self.linear { 4 * WINDOW * LINEAR_INPUTS } else { 0 };
+        let units = self.units as usize;
+        let network = if units > 0 { layers_len(units, FEATURES) + 2 * dense_len(2 * units) } else { 0 };
+        HEADER_LEN + provenance + linear + network + 4 + 4
+    }
+
+    /// Reads a topology; `None` where it has none of the sizes, or no part at all.
+    fn read(found: Topology) -> Option<Self> {
+        let [_, _, _, units, _, outputs] = found;
+        let shape = Self { units, linear: outputs > 0 };
+        let sized = units.is_multiple_of(4) && units <= Self::LARGEST.units && (units > 0 || shape.linear);
+        (sized && shape.topology() == found).then_some(shape)
+    }
+}
 
 /// A weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct Blob<'w> {
     /// The provenance of the weights: JSON.
     pub provenance: &'w str,
+    /// The parts that there are.
+    pub shape: Shape,
     /// One for each feature.
     pub normalisation: [Normalisation; FEATURES],
-    /// Network inputs are clamped to +- this, Q10.
+    /// Inputs of the Bi-LSTMs are clamped to +- this, Q10.
     pub input_clamp: i16,
+    /// The part of the gyro error that is linear in the features: from their codes to rate codes.
+    pub linear: Option<Linear<'w>>,
     /// The two Bi-LSTM layers.
-    pub layers: [Layer<'w>; 2],
-    /// Row of the output layer that gives a step's gyro error, as a rate code.
+    pub layers: Option<[Layer<'w>; 2]>,
+    /// Row of the output layer that gives a step's gyro error, as a rate code; empty without layers.
     pub gyro_error: Dense<'w>,
-    /// Row whose sum over the steps is log2 of the scale over [`Blob::scale_unit`], in Q16.
+    /// Row whose sum over the steps is log2 of the scale over [`Blob::scale_unit`], in Q16; empty without layers.
     pub log_scale: Dense<'w>,
-    /// The scale whose log is zero, as a rate code.
+    /// The scale whose log is zero, as a rate code; without layers, the scale of every window.
     pub scale_unit: u32,
     /// The file's own checksum: the name of this set of weights.
     pub crc: u32,
     /// The bytes that it is of.
     pub content: &'w [u8],
-}
-
-/// Returns the number of bytes of a GyroNet file with `provenance` bytes of padded text.
-#[must_use]
-pub const fn file_len(provenance: usize) -> usize {
-    HEADER_LEN + provenance + layers_len(HIDDEN, FEATURES) + 2 * dense_len(2 * HIDDEN) + 4 + 4
 }
 
 impl<'w> Blob<'w> {
@@ -58,22 +98,34 @@ impl<'w> Blob<'w> {
     /// # Errors
     /// [`BlobError`], which names the first thing that is wrong.
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
-        let mut reader = Reader::new(bytes, file_len(0));
-        let Header { input_clamp, normalisation, provenance_len, crc } =
-            Header::read(&mut reader, TOPOLOGY, file_len)?;
+        let smallest = Shape { units: 4, linear: false };
+        let mut reader = Reader::new(bytes, smallest.file_len(0));
+        let (largest, file_len) = (Shape::LARGEST.topology(), |shape: &Shape, len| shape.file_len(len));
+        let Header { shape, input_clamp, normalisation, provenance_len, crc } =
+            Header::read(&mut reader, largest, Shape::read, file_len)?;
         let provenance = reader.provenance(provenance_len)?;
-        let layers = reader.layers(HIDDEN, FEATURES)?;
-        let (gyro_error, log_scale) = (reader.dense(2 * HIDDEN)?, reader.dense(2 * HIDDEN)?);
+        let units = usize::from(shape.units);
+        let linear = match shape.linear {
+            true => Some(reader.linear(WINDOW, LINEAR_INPUTS)?),
+            false => None,
+        };
+        let (mut layers, mut gyro_error, mut log_scale) = (None, Dense::EMPTY, Dense::EMPTY);
+        if units > 0 {
+            let layers = layers.insert(reader.layers(units, FEATURES)?);
+            (gyro_error, log_scale) = (reader.dense(2 * units)?, reader.dense(2 * units)?);
+            check_rows(layers, input_clamp.into(), 0)?;
+            check_dense(&gyro_error)?;
+            check_dense(&log_scale)?;
+        }
         let scale_unit = reader.i32()? as u32;
-        check_rows(&layers, input_clamp.into(), 0)?;
-        check_dense(&gyro_error)?;
-        check_dense(&log_scale)?;
         // The header has been read: the checksum is there.
         let content = bytes.get(..bytes.len().saturating_sub(4)).unwrap_or_default();
         Ok(Self {
             provenance,
+            shape,
             normalisation,
             input_clamp,
+            linear,
             layers,
             gyro_error,
             log_scale,

@@ -5,13 +5,14 @@
 //! | offset | type | field |
 //! |---|---|---|
 //! | 0 | 4 bytes | magic `GYRN` |
-//! | 4 | u16 | format version, 2 |
+//! | 4 | u16 | format version, 3 |
 //! | 6 | u16 | network, 1 = GyroNet, 2 = FoGNet |
 //! | 8 | u32 | length of the whole file, checksum included |
 //! | 12 | u16 x 4 | window, inputs, hidden units a direction, layers |
-//! | 20 | u32 | length P of the provenance text, a multiple of 4 (padded with spaces) |
-//! | 24 | i32 | input clamp L, in normalised Q10 |
-//! | 28 | (i32, i32) x inputs | offset and multiplier of each input, see [`Normalisation`] |
+//! | 20 | u32 | outputs of the linear part, 0 = there is none |
+//! | 24 | u32 | length P of the provenance text, a multiple of 4 (padded with spaces) |
+//! | 28 | i32 | input clamp L, in normalised Q10 |
+//! | 32 | (i32, i32) x inputs | offset and multiplier of each input, see [`Normalisation`] |
 //! | | | what the network adds: [`super::blob`], [`super::fognet_blob`] |
 //! | end - 4 | u32 | CRC-32 (ISO-HDLC, as in zip and Ethernet) of everything before it |
 //!
@@ -19,12 +20,12 @@
 //! them out; a row of an output layer is its int16 weights, then bias and multiplier.
 
 use crate::nn::lstm::{DirectionWeights, ROW_LIMIT, row_bound};
-use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense};
+use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense, linear::Linear};
 
 /// First bytes of a weight file.
 pub const MAGIC: [u8; 4] = *b"GYRN";
 /// The format version that this code reads.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Network number of GyroNet.
 pub const GYRONET: u16 = 1;
 /// Network number of FoGNet.
@@ -35,8 +36,8 @@ pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 #[cfg(target_endian = "big")]
 compile_error!("weights are read in place as little-endian words");
 
-/// The shape that a file states: network number, window, inputs, hidden units, layers.
-pub type Topology = [u16; 5];
+/// The shape that a file states: network number, window, inputs, hidden units, layers, outputs of the linear part.
+pub type Topology = [u16; 6];
 
 /// The reason why a weight file is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -52,14 +53,15 @@ pub enum BlobError {
     Version(u16),
     /// The file holds another network, or one of another shape.
     #[error(
-        "weight file: network {} with window {}, {} inputs, {} units, {} layers is not {} ({}: {}, {}, {}, {})",
-        .found[0], .found[1], .found[2], .found[3], .found[4],
-        network_name(.expected), .expected[0], .expected[1], .expected[2], .expected[3], .expected[4]
+        "weight file: network {} with window {}, {} inputs, {} units, {} layers, {} linear outputs is not \
+         {} ({}: {}, {}, {}, {}, {}{})",
+        .found[0], .found[1], .found[2], .found[3], .found[4], .found[5], network_name(.expected),
+        .expected[0], .expected[1], .expected[2], .expected[3], .expected[4], .expected[5], smaller(.expected)
     )]
     Topology {
         /// The shape in the file.
         found: Topology,
-        /// The expected shape.
+        /// The expected shape; of GyroNet's the largest.
         expected: Topology,
     },
     /// Shorter or longer than its header and shape say.
@@ -97,11 +99,30 @@ pub enum BlobError {
         /// Unit.
         unit: u16,
     },
+    /// A row of the linear part could overflow its accumulator.
+    #[error("weight file: output {output} of the linear part could overflow its accumulator")]
+    LinearBound {
+        /// Output.
+        output: u16,
+    },
+    /// The network is larger than the memory that the caller has for one.
+    #[error("weight file: {found} units a direction, there is memory for {largest}")]
+    Units {
+        /// Units in the file.
+        found: u16,
+        /// The most units that there is memory for.
+        largest: u16,
+    },
 }
 
 /// Returns the name of the network that a topology belongs to.
 fn network_name([network, ..]: &Topology) -> &'static str {
     if *network == FOGNET { "FoGNet" } else { "GyroNet" }
+}
+
+/// Returns the sizes below the largest that a network may have, as words.
+fn smaller([network, ..]: &Topology) -> &'static str {
+    if *network == FOGNET { "" } else { ", or fewer units in steps of 4, or no linear outputs" }
 }
 
 /// The scaling of a feature to a network input: `(code - offset) * multiplier / 2^31`, rounded.
@@ -115,7 +136,7 @@ pub struct Normalisation {
 
 /// Returns the number of bytes before those that a network of so many inputs adds.
 pub(super) const fn header_len(inputs: usize) -> usize {
-    28 + 8 * inputs
+    32 + 8 * inputs
 }
 
 /// Returns the number of bytes of one direction.
@@ -134,20 +155,23 @@ pub(super) const fn dense_len(columns: usize) -> usize {
 }
 
 /// The header's fields, once they are known to fit the file.
-pub(super) struct Header<const INPUTS: usize> {
+pub(super) struct Header<const INPUTS: usize, S> {
+    /// The shape, as the network reads it.
+    pub shape: S,
     pub input_clamp: i16,
     pub normalisation: [Normalisation; INPUTS],
     pub provenance_len: usize,
     pub crc: u32,
 }
 
-impl<const INPUTS: usize> Header<INPUTS> {
-    /// Checks header and checksum of a file that should be of this topology, and so long for
-    /// that length of provenance.
+impl<const INPUTS: usize, S> Header<INPUTS, S> {
+    /// Checks header and checksum of a file that should be of the topology `expected`, or of another one that `shape`
+    /// takes, and so long for that shape and length of provenance.
     pub fn read(
         reader: &mut Reader<'_>,
-        topology: Topology,
-        file_len: fn(usize) -> usize,
+        expected: Topology,
+        shape: fn(Topology) -> Option<S>,
+        file_len: fn(&S, usize) -> usize,
     ) -> Result<Self, BlobError> {
         let bytes = reader.bytes;
         let magic: [u8; 4] = *reader.array()?;
@@ -163,14 +187,15 @@ impl<const INPUTS: usize> Header<INPUTS> {
         if length != bytes.len() {
             return Err(BlobError::Length { expected: length, found: bytes.len() });
         }
-        let found = [network, reader.u16()?, reader.u16()?, reader.u16()?, reader.u16()?];
-        if found != topology {
-            return Err(BlobError::Topology { found, expected: topology });
-        }
+        let [window, inputs, units, layers] = [reader.u16()?, reader.u16()?, reader.u16()?, reader.u16()?];
+        // More outputs than a u16 holds are as wrong as the most that it holds.
+        let linear = u16::try_from(reader.i32()? as u32).unwrap_or(u16::MAX);
+        let found = [network, window, inputs, units, layers, linear];
+        let shape = shape(found).ok_or(BlobError::Topology { found, expected })?;
         let provenance_len = reader.i32()? as u32 as usize;
         let fits = provenance_len.is_multiple_of(4) && provenance_len < length;
-        if !fits || file_len(provenance_len) != length {
-            let expected = if fits { file_len(provenance_len) } else { file_len(0) };
+        let expected = file_len(&shape, if fits { provenance_len } else { 0 });
+        if !fits || expected != length {
             return Err(BlobError::Length { expected, found: length });
         }
         let (content, stored) = bytes.split_at(length - 4);
@@ -185,7 +210,7 @@ impl<const INPUTS: usize> Header<INPUTS> {
         for n in &mut normalisation {
             *n = Normalisation { offset: reader.i32()?, multiplier: reader.i32()? };
         }
-        Ok(Self { input_clamp, normalisation, provenance_len, crc: stored })
+        Ok(Self { shape, input_clamp, normalisation, provenance_len, crc: stored })
     }
 }
 
@@ -269,6 +294,12 @@ impl<'w> Reader<'w> {
         let input = self.slice(DirectionWeights::input_words(units, inputs))?;
         let recurrent = self.slice(DirectionWeights::recurrent_words(units))?;
         DirectionWeights::new(units, inputs, input, recurrent).ok_or(BlobError::Misaligned)
+    }
+
+    /// Takes the rows of a linear part.
+    pub fn linear(&mut self, outputs: usize, inputs: usize) -> Result<Linear<'w>, BlobError> {
+        let overflow = |output| BlobError::LinearBound { output: output as u16 };
+        Linear::new(inputs, self.slice(outputs * inputs)?).map_err(overflow)
     }
 
     /// Takes a row of an output layer.

@@ -4,10 +4,10 @@
 //!
 //! | offset | type | field |
 //! |---|---|---|
-//! | 100 | i32 x 60 | [`FogBlob::gains`] |
-//! | 340 | i32, i32 | lower and upper half of [`FogBlob::offset`] |
-//! | 348 | P bytes | provenance, UTF-8 JSON |
-//! | 348 + P | | LSTM1's four directions, of 10 inputs: the tenth is not used |
+//! | 104 | i32 x 60 | [`FogBlob::gains`] |
+//! | 344 | i32, i32 | lower and upper half of [`FogBlob::offset`] |
+//! | 352 | P bytes | provenance, UTF-8 JSON |
+//! | 352 + P | | LSTM1's four directions, of 10 inputs: the tenth is not used |
 //! | ... | i16 x 180, i32, i32 | FC1: weights, bias, multiplier to a normalised Q10 |
 //! | ... | | LSTM2's four directions, of 2 inputs |
 //! | ... | i16 x 120, i32, i32 | FC2 times FC4: weights, bias, multiplier |
@@ -32,7 +32,7 @@ pub const CORRECTION_SHIFT: u32 = 16;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8;
 /// The content that the header must have.
-pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2];
+pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2, 1];
 
 /// A weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
@@ -78,8 +78,9 @@ impl<'w> FogBlob<'w> {
     /// [`BlobError`], which names the first thing that is wrong.
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
         let mut reader = Reader::new(bytes, file_len(0));
-        let Header { input_clamp, normalisation, provenance_len, crc } =
-            Header::read(&mut reader, TOPOLOGY, file_len)?;
+        let shape = |found| (found == TOPOLOGY).then_some(());
+        let Header { shape: (), input_clamp, normalisation, provenance_len, crc } =
+            Header::read(&mut reader, TOPOLOGY, shape, |(), provenance| file_len(provenance))?;
         let gains = reader.slice(STEPS)?;
         let (low, high) = (reader.i32()? as u32, reader.i32()?);
         let offset = Angle(i64::from(high) << 32 | i64::from(low));

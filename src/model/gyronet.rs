@@ -1,31 +1,42 @@
 //! This module is GyroNet in integers: it takes ten samples and returns the yaw gyro's error at each of them, and
 //! how far off that may be.
+//!
+//! The error is the sum of a linear part, computed from the features' codes without rounding them, and of what two
+//! layers of Bi-LSTMs give; a weight file has either or both, the Bi-LSTMs in any size up to the paper's.
 
-use super::blob::{Blob, HIDDEN};
+use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::bilstm::{self, Direction, Pass, Run};
 use crate::nn::lstm::{DirectionWeights, Scratch};
-use crate::nn::{dense::Dense, exp2::times_exp2};
+use crate::nn::{dense::Dense, exp2::times_exp2, linear::Linear};
 use crate::units::AngularRate;
 use core::borrow::BorrowMut;
 
-/// Words of the hidden state of one direction.
-const HIDDEN_WORDS: usize = HIDDEN / 2;
-
 /// Words of the recurrent weights of one direction.
-const RECURRENT_WORDS: usize = DirectionWeights::recurrent_words(HIDDEN);
+#[must_use]
+pub const fn recurrent_words(units: usize) -> usize {
+    DirectionWeights::recurrent_words(units)
+}
 
-/// Working memory of one window.
+/// Working memory of one window, for networks of up to `U` units a direction: `W` is half of them, `R` their
+/// [`recurrent_words`]. An image that runs no network of the paper's size can do with less than the default; one that
+/// runs a linear part alone with `GyroNetState<0, 0, 0>`.
 #[derive(Debug, Clone)]
-pub struct GyroNetState {
+pub struct GyroNetState<
+    const U: usize = HIDDEN,
+    const W: usize = { HIDDEN / 2 },
+    const R: usize = { recurrent_words(HIDDEN) },
+> {
     input: [u32; WINDOW * FEATURES / 2],
-    layer1: [u32; WINDOW * HIDDEN],
+    layer1: [[u32; U]; WINDOW],
     /// The projections of all steps of a direction, so that each weight of its input is read once a window.
-    scratch: Scratch<HIDDEN, HIDDEN_WORDS, { WINDOW / 2 }>,
+    scratch: Scratch<U, W, { WINDOW / 2 }>,
     /// The recurrent weights of the direction at work, which each step reads.
-    recurrent: [u32; RECURRENT_WORDS],
+    recurrent: [u32; R],
+    /// What the linear part makes of the window.
+    linear: [i32; WINDOW],
     /// The biases of the gyro error's row, then of the log scale's row.
     sums: [[i32; 2]; WINDOW],
     clamped_inputs: u16,
@@ -34,25 +45,35 @@ pub struct GyroNetState {
     under_way: bool,
 }
 
-impl GyroNetState {
+impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
     /// A fresh state; a window leaves nothing in it for the next one. All of it is zero, so that it needs no place
     /// in flash.
-    pub const ZERO: Self = Self {
-        input: [0; _],
-        layer1: [0; _],
-        scratch: Scratch::ZERO,
-        recurrent: [0; _],
-        sums: [[0; _]; _],
-        clamped_inputs: 0,
-        run: Run::new(),
-        under_way: false,
+    pub const ZERO: Self = {
+        assert!(U.is_multiple_of(4) && U <= HIDDEN && R == recurrent_words(U), "no network has these sizes");
+        Self {
+            input: [0; _],
+            layer1: [[0; U]; _],
+            scratch: Scratch::ZERO,
+            recurrent: [0; R],
+            linear: [0; _],
+            sums: [[0; _]; _],
+            clamped_inputs: 0,
+            run: Run::new(),
+            under_way: false,
+        }
     };
 }
 
 /// The integer network: weights in place, state owned or (`S` a reference) the caller's, where it is too
 /// large to be moved about on a small stack.
 #[derive(Debug, Clone)]
-pub struct GyroNet<'w, S = GyroNetState> {
+pub struct GyroNet<
+    'w,
+    S = GyroNetState,
+    const U: usize = HIDDEN,
+    const W: usize = { HIDDEN / 2 },
+    const R: usize = { recurrent_words(HIDDEN) },
+> {
     blob: Blob<'w>,
     state: S,
 }
@@ -61,17 +82,27 @@ impl<'w> GyroNet<'w> {
     /// Makes a network over checked weights.
     #[must_use]
     pub fn new(blob: Blob<'w>) -> Self {
-        Self::with_state(blob, GyroNetState::ZERO)
+        // The memory is that of the largest network.
+        Self { blob, state: GyroNetState::ZERO }
     }
 }
 
-impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
+impl<'w, S, const U: usize, const W: usize, const R: usize> GyroNet<'w, S, U, W, R>
+where
+    S: BorrowMut<GyroNetState<U, W, R>>,
+{
     /// Makes a network over checked weights, in a state of the caller's. A window that it was working on is
     /// dropped.
-    #[must_use]
-    pub fn with_state(blob: Blob<'w>, mut state: S) -> Self {
+    ///
+    /// # Errors
+    /// [`BlobError::Units`]: the state is too small for this network.
+    pub fn with_state(blob: Blob<'w>, mut state: S) -> Result<Self, BlobError> {
+        let found = blob.shape.units;
+        if usize::from(found) > U {
+            return Err(BlobError::Units { found, largest: U as u16 });
+        }
         state.borrow_mut().under_way = false;
-        Self { blob, state }
+        Ok(Self { blob, state })
     }
 
     /// Returns the weights that it runs on.
@@ -80,13 +111,17 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
         &self.blob
     }
 
-    /// Loads a window; [`GyroNet::advance`] then runs it piece by piece. One that was under way
-    /// is dropped.
+    /// Loads a window and runs the linear part on it; [`GyroNet::advance`] then runs the Bi-LSTMs piece by piece. One
+    /// that was under way is dropped.
     pub fn start(&mut self, window: &[Features; WINDOW]) {
-        let clamped_inputs = self.load(window);
-        let state = self.state.borrow_mut();
-        state.clamped_inputs = clamped_inputs;
-        state.sums = [[self.blob.gyro_error.bias, self.blob.log_scale.bias]; WINDOW];
+        let Self { blob, state } = self;
+        let state = state.borrow_mut();
+        state.clamped_inputs = load(blob, window, &mut state.input);
+        state.linear = [0; _];
+        for (output, row) in state.linear.iter_mut().zip(blob.linear.iter().flat_map(Linear::rows)) {
+            *output = Linear::output(row, window.as_flattened());
+        }
+        state.sums = [[blob.gyro_error.bias, blob.log_scale.bias]; WINDOW];
         state.run = Run::new();
         state.under_way = true;
     }
@@ -95,24 +130,31 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
     /// with the last one, `None` before that and when none is under way.
     pub fn advance(&mut self) -> Option<Estimate> {
         let Self { blob, state } = self;
-        let GyroNetState { input, layer1, scratch, recurrent, sums, clamped_inputs, run, under_way } =
+        let GyroNetState { input, layer1, scratch, recurrent, linear, sums, clamped_inputs, run, under_way } =
             state.borrow_mut();
         if !*under_way {
             return None;
         }
-        let more = run.advance(&blob.layers, input, layer1, scratch, recurrent, |way, step, hidden| {
-            let Some(sums) = sums.get_mut(step) else { return };
-            for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
-                let (forward, backward) = row.weights.split_at_checked(HIDDEN).unwrap_or_default();
-                let weights = if way == Direction::Forward { forward } else { backward };
-                *sum = sum.wrapping_add(Dense::partial(weights, hidden));
+        if let Some(layers) = &blob.layers {
+            let units = layers[0].forward.units();
+            let layer1 = layer1.as_flattened_mut().get_mut(..WINDOW * units).unwrap_or_default();
+            let more = run.advance(layers, input, layer1, scratch, recurrent, |way, step, hidden| {
+                let Some(sums) = sums.get_mut(step) else { return };
+                for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
+                    let (forward, backward) = row.weights.split_at_checked(units).unwrap_or_default();
+                    let weights = if way == Direction::Forward { forward } else { backward };
+                    *sum = sum.wrapping_add(Dense::partial(weights, hidden));
+                }
+            });
+            if more {
+                return None;
             }
-        });
-        if more {
-            return None;
         }
         *under_way = false;
-        let corrections = sums.map(|[error, _]| AngularRate(blob.gyro_error.scale(error)));
+        let corrections = core::array::from_fn(|step| {
+            let ([error, _], linear) = (sums[step], linear[step]);
+            AngularRate(blob.gyro_error.scale(error).saturating_add(linear))
+        });
         let log_scale =
             sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
         let scale = AngularRate(times_exp2(blob.scale_unit, log_scale)).clamp(SCALE_MIN, SCALE_MAX);
@@ -123,50 +165,67 @@ impl<'w, S: BorrowMut<GyroNetState>> GyroNet<'w, S> {
     /// needs just its first step for that, which saves a third of the work; the result is the last of
     /// [`WindowNetwork::estimate`]'s, bit for bit.
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
-        let clamped_inputs = self.load(window);
-        let Self { blob: Blob { layers: [first, second], gyro_error: dense, .. }, state } = self;
+        let Self { blob, state } = self;
         let GyroNetState { input, layer1, scratch, recurrent, .. } = state.borrow_mut();
-        for (direction, way, offset) in
-            [(&first.forward, Direction::Forward, 0), (&first.backward, Direction::Backward, HIDDEN)]
-        {
-            Pass::new(way).finish(direction, input, scratch, recurrent, |step, hidden| {
-                bilstm::store(layer1, step, offset, 2 * HIDDEN, HIDDEN, hidden);
+        let clamped_inputs = load(blob, window, input);
+        let newest = blob.linear.and_then(|linear| linear.rows().last());
+        let linear = newest.map_or(0, |row| Linear::output(row, window.as_flattened()));
+        let mut sum = blob.gyro_error.bias;
+        if let Some([first, second]) = &blob.layers {
+            let units = first.forward.units();
+            let layer1 = layer1.as_flattened_mut().get_mut(..WINDOW * units).unwrap_or_default();
+            for (direction, way, offset) in
+                [(&first.forward, Direction::Forward, 0), (&first.backward, Direction::Backward, units)]
+            {
+                Pass::new(way).finish(direction, input, scratch, recurrent, |step, hidden| {
+                    bilstm::store(layer1, step, offset, 2 * units, units, hidden);
+                });
+            }
+            let (forward, backward) = blob.gyro_error.weights.split_at_checked(units).unwrap_or_default();
+            let mut add = |weights, step, hidden: &[u32]| {
+                if step == WINDOW - 1 {
+                    sum = sum.wrapping_add(Dense::partial(weights, hidden));
+                }
+            };
+            Pass::new(Direction::Forward).finish(
+                &second.forward,
+                layer1,
+                scratch,
+                recurrent,
+                |step, hidden| {
+                    add(forward, step, hidden);
+                },
+            );
+            Pass::first(Direction::Backward, &second.backward, layer1, scratch, |step, hidden| {
+                add(backward, step, hidden);
             });
         }
-        let (forward, backward) = dense.weights.split_at_checked(HIDDEN).unwrap_or_default();
-        let mut sum = dense.bias;
-        let mut add = |weights, step, hidden: &[u32]| {
-            if step == WINDOW - 1 {
-                sum = sum.wrapping_add(Dense::partial(weights, hidden));
-            }
-        };
-        Pass::new(Direction::Forward)
-            .finish(&second.forward, layer1, scratch, recurrent, |step, hidden| add(forward, step, hidden));
-        Pass::first(Direction::Backward, &second.backward, layer1, scratch, |step, hidden| {
-            add(backward, step, hidden);
-        });
-        (AngularRate(dense.scale(sum)), clamped_inputs)
-    }
-
-    /// Normalises the window into the first layer's input; counts what had to be clamped.
-    fn load(&mut self, window: &[Features; WINDOW]) -> u16 {
-        let clamp = i32::from(self.blob.input_clamp);
-        let input = &mut self.state.borrow_mut().input;
-        let mut clamped = 0;
-        for (step, features) in window.iter().enumerate() {
-            let codes = features.iter().copied();
-            let normalisation = &self.blob.normalisation;
-            clamped += load_step::<FEATURES, FEATURES>(input, step, codes, normalisation, clamp);
-        }
-        clamped
+        (AngularRate(blob.gyro_error.scale(sum).saturating_add(linear)), clamped_inputs)
     }
 }
 
-impl<S: BorrowMut<GyroNetState>> WindowNetwork for GyroNet<'_, S> {
+/// Normalises the window into the first layer's input, if there is one; counts what had to be clamped.
+fn load(blob: &Blob<'_>, window: &[Features; WINDOW], input: &mut [u32]) -> u16 {
+    if blob.layers.is_none() {
+        return 0;
+    }
+    let clamp = i32::from(blob.input_clamp);
+    let mut clamped = 0;
+    for (step, features) in window.iter().enumerate() {
+        let codes = features.iter().copied();
+        clamped += load_step::<FEATURES, FEATURES>(input, step, codes, &blob.normalisation, clamp);
+    }
+    clamped
+}
+
+impl<S, const U: usize, const W: usize, const R: usize> WindowNetwork for GyroNet<'_, S, U, W, R>
+where
+    S: BorrowMut<GyroNetState<U, W, R>>,
+{
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
         self.start(window);
         loop {
-            // A run takes four pieces, whatever the window holds.
+            // A run takes four pieces at most, whatever the window holds.
             if let Some(estimate) = self.advance() {
                 return estimate;
             }

@@ -1,6 +1,6 @@
-//! This module is GyroNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
+//! This module is GyroNet in f32, from the tensors of training: the definition that the integer network approximates.
 
-use super::blob::HIDDEN;
+use super::blob::{HIDDEN, LINEAR_INPUTS};
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::reference::{LstmWeights, dense, lstm};
@@ -13,8 +13,17 @@ pub struct GyroNetF32<'w> {
     pub input_mean: [f32; FEATURES],
     /// Standard deviation of each feature.
     pub input_std: [f32; FEATURES],
-    /// rad/s per unit of the last layer.
+    /// rad/s per unit of the last layer; without Bi-LSTMs the scale of every window.
     pub output_scale: f32,
+    /// (N, N F): gyro error of each sample by all features of the window, if there is a linear part.
+    pub linear: Option<&'w [f32]>,
+    /// The Bi-LSTMs, if there are any.
+    pub network: Option<NetworkF32<'w>>,
+}
+
+/// The tensors of the Bi-LSTMs and of the layer on top of them.
+#[derive(Debug, Clone, Copy)]
+pub struct NetworkF32<'w> {
     /// Layer 1: forward, backward.
     pub lstm1: [LstmWeights<'w>; 2],
     /// Layer 2: forward, backward.
@@ -25,11 +34,13 @@ pub struct GyroNetF32<'w> {
     pub fc_bias: [f32; 2],
 }
 
-/// Every layer's output for one window.
+/// Every layer's output for one window; those of fewer units than the paper's have zeros behind them.
 #[derive(Debug, Clone)]
 pub struct LayerOutputs {
     /// Features less mean, over standard deviation.
     pub normalised: [[f32; FEATURES]; WINDOW],
+    /// What the linear part gives of the gyro error, rad/s.
+    pub linear: [f32; WINDOW],
     /// Hidden states of layer 1, forward then backward.
     pub layer1: [[f32; 2 * HIDDEN]; WINDOW],
     /// Hidden states of layer 2.
@@ -46,19 +57,37 @@ impl GyroNetF32<'_> {
     pub fn layers(&self, window: &[[f32; FEATURES]; WINDOW]) -> LayerOutputs {
         let normalised = window
             .map(|features| core::array::from_fn(|k| (features[k] - self.input_mean[k]) / self.input_std[k]));
-        let mut layer1 = [[0.0; 2 * HIDDEN]; WINDOW];
-        let mut layer2 = [[0.0; 2 * HIDDEN]; WINDOW];
+        let linear = core::array::from_fn(|step| {
+            let row = self.linear.map(|weights| &weights[step * LINEAR_INPUTS..(step + 1) * LINEAR_INPUTS]);
+            row.map_or(0.0, |row| dense(row, 0.0, window.as_flattened()))
+        });
+        let (layer1, layer2) = ([[0.0; 2 * HIDDEN]; WINDOW], [[0.0; 2 * HIDDEN]; WINDOW]);
+        let mut outputs =
+            LayerOutputs { normalised, linear, layer1, layer2, gyro_error: linear, log_scale: 0.0 };
+        if let Some(network) = &self.network {
+            network.run(self.output_scale, &mut outputs);
+        }
+        outputs
+    }
+}
+
+impl NetworkF32<'_> {
+    /// Fills in the layers' outputs, and adds the last one to the gyro error.
+    fn run(&self, output_scale: f32, outputs: &mut LayerOutputs) {
+        let LayerOutputs { normalised, layer1, layer2, gyro_error, log_scale, .. } = outputs;
+        let units = self.lstm1[0].units();
         for (way, backward) in [false, true].into_iter().enumerate() {
-            lstm::<FEATURES, HIDDEN, _>(&self.lstm1[way], &normalised, backward, &mut layer1, way * HIDDEN);
+            lstm::<FEATURES, HIDDEN, _>(&self.lstm1[way], normalised, backward, layer1, way * units);
         }
         for (way, backward) in [false, true].into_iter().enumerate() {
-            lstm::<_, HIDDEN, _>(&self.lstm2[way], &layer1, backward, &mut layer2, way * HIDDEN);
+            lstm::<_, HIDDEN, _>(&self.lstm2[way], layer1, backward, layer2, way * units);
         }
-        let (error_weight, log_weight) = self.fc_weight.split_at(2 * HIDDEN);
+        let (error_weight, log_weight) = self.fc_weight.split_at(2 * units);
         let [error_bias, log_bias] = self.fc_bias;
-        let gyro_error = layer2.map(|h| dense(error_weight, error_bias, &h) * self.output_scale);
-        let log_scale = layer2.iter().map(|h| dense(log_weight, log_bias, h)).sum::<f32>() / WINDOW as f32;
-        LayerOutputs { normalised, layer1, layer2, gyro_error, log_scale }
+        for (error, h) in gyro_error.iter_mut().zip(&*layer2) {
+            *error += dense(error_weight, error_bias, h) * output_scale;
+        }
+        *log_scale = layer2.iter().map(|h| dense(log_weight, log_bias, h)).sum::<f32>() / WINDOW as f32;
     }
 }
 

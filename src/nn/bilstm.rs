@@ -57,8 +57,8 @@ impl Pass {
     ) -> bool {
         let words = direction.inputs();
         let pairs = input.len().checked_div(words).unwrap_or(0);
-        // Weights of another size than the caller's have no step; a checked blob has its own.
-        if self.done >= pairs || direction.units() != U {
+        // Weights that the caller's arrays do not hold have no step; a checked blob has none.
+        if self.done >= pairs || !direction.fits(U) {
             return false;
         }
         let direction = &direction.through(room, self.done == 0);
@@ -137,9 +137,14 @@ pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
 /// Writes a step's hidden state (`units` of it) into a sequence of `columns` values a step,
 /// from column `offset` on: the next layer's input.
 pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, units: usize, hidden: &[u32]) {
-    let words = sequence.iter_mut().skip(word_index(step, offset, columns)).step_by(2);
-    for (to, from) in words.zip(hidden.iter().take(units / 2)) {
-        *to = *from;
+    // The first step of the pair, then the second one, of each word.
+    let pairs =
+        sequence.get_mut(word_index(step & !1, offset, columns)..).unwrap_or_default().as_chunks_mut().0;
+    let words = pairs.iter_mut().zip(hidden.iter().take(units / 2));
+    if step.is_multiple_of(2) {
+        words.for_each(|([first, _], word)| *first = *word);
+    } else {
+        words.for_each(|([_, second], word)| *second = *word);
     }
 }
 
@@ -161,7 +166,7 @@ impl Run {
 
     /// Runs the next piece; returns whether there are more.
     ///
-    /// `input` is the first layer's sequence, `between` takes the second one's; `room` is as in
+    /// `input` is the first layer's sequence, `between` takes the second one's, of exactly its length; `room` is as in
     /// [`Pass::advance`]. `emit` gets layer 2's hidden states: which way, step, state.
     pub fn advance<const U: usize, const W: usize, const P: usize>(
         &mut self,
@@ -172,15 +177,16 @@ impl Run {
         room: &mut [u32],
         mut emit: impl FnMut(Direction, usize, &[u32; W]),
     ) -> bool {
+        let units = layers[0].forward.units();
         let (way, offset) =
-            if self.stage.is_multiple_of(2) { (Direction::Forward, 0) } else { (Direction::Backward, U) };
+            if self.stage.is_multiple_of(2) { (Direction::Forward, 0) } else { (Direction::Backward, units) };
         let [first, second] = layers.each_ref().map(|layer| match way {
             Direction::Forward => &layer.forward,
             Direction::Backward => &layer.backward,
         });
         let more = match self.stage {
             0 | 1 => self.pass.advance(first, input, scratch, room, |step, hidden| {
-                store(between, step, offset, 2 * U, U, hidden);
+                store(between, step, offset, 2 * units, units, hidden);
             }),
             2 | 3 => {
                 self.pass.advance(second, between, scratch, room, |step, hidden| emit(way, step, hidden))

@@ -12,6 +12,8 @@ pub struct Dense<'w> {
 }
 
 impl Dense<'_> {
+    /// A row without inputs: its output is zero.
+    pub const EMPTY: Self = Self { weights: &[], bias: 0, multiplier: 0 };
     /// Fraction bits of the multiplier.
     pub const SHIFT: u32 = 24;
 

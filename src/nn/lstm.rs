@@ -75,6 +75,13 @@ impl<'w> DirectionWeights<'w> {
         self.units
     }
 
+    /// Returns whether arrays of `room` units hold the units: all of them, or fewer in whole groups of four, as the
+    /// hidden state is read.
+    #[must_use]
+    pub const fn fits(&self, room: usize) -> bool {
+        self.units == room || self.units < room && self.units.is_multiple_of(4)
+    }
+
     /// Returns the number of input columns.
     #[must_use]
     pub const fn inputs(&self) -> usize {
@@ -94,7 +101,7 @@ impl<'w> DirectionWeights<'w> {
     }
 
     /// Returns the same direction with its recurrent records in `room`, where it copies them if `load`, else an
-    /// earlier call has. Where they do not fit exactly, they are read in place.
+    /// earlier call has. Where they do not fit, they are read in place.
     ///
     /// A step reads every record once. Memory without wait states pays for the copy in two or three steps.
     #[must_use]
@@ -102,9 +109,7 @@ impl<'w> DirectionWeights<'w> {
     where
         'w: 'a,
     {
-        if room.len() != self.recurrent.len() {
-            return *self;
-        }
+        let Some(room) = room.get_mut(..self.recurrent.len()) else { return *self };
         if load {
             simd::copy(self.recurrent, room);
         }
@@ -123,8 +128,9 @@ impl<'w> DirectionWeights<'w> {
     }
 }
 
-/// State and scratch of one direction with `U` units, in `W` words of hidden state, with room for the
-/// projections of `P` pairs of steps.
+/// State and scratch of one direction with up to `U` units, in `W` words of hidden state, with room for the
+/// projections of `P` pairs of steps. A direction of fewer units, a multiple of four, takes the first places of each
+/// array.
 #[derive(Debug, Clone)]
 pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     /// Cell state, Q20.
@@ -151,14 +157,14 @@ impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
 /// `x`: the inputs of all pairs, the two steps of a pair word by word in turn, as many words a pair as the
 /// direction has inputs.
 ///
-/// Does nothing when `x` or `U` does not fit the direction: a defect of the caller, which debug builds
-/// stop at.
+/// Does nothing when `x` does not fit the direction, or `U` does not hold its units: a defect of the caller, which
+/// debug builds stop at.
 pub fn project<const U: usize>(
     direction: &DirectionWeights<'_>,
     x: &[u32],
     projection: &mut [Projection<U>],
 ) {
-    let fits = x.len() == direction.inputs * projection.len() && U == direction.units;
+    let fits = x.len() == direction.inputs * projection.len() && direction.fits(U);
     debug_assert!(fits);
     if fits {
         simd::project(direction, x, projection);
@@ -170,7 +176,7 @@ pub fn project<const U: usize>(
 /// `projection` belongs to this step. `previous` is the hidden state before it; `None` for the
 /// zero state that a sequence starts from.
 ///
-/// Does nothing when `U` or `W` does not fit the direction, as [`project`].
+/// Does nothing when `U` or `W` does not hold the direction's units, as [`project`].
 pub fn step<const U: usize, const W: usize>(
     direction: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
@@ -178,7 +184,7 @@ pub fn step<const U: usize, const W: usize>(
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
-    let fits = U == direction.units && 2 * W == DirectionWeights::padded(U);
+    let fits = direction.fits(U) && 2 * W == DirectionWeights::padded(U);
     debug_assert!(fits);
     if fits {
         simd::step(direction, projection, previous, cell_state, hidden);

@@ -4,6 +4,8 @@
 //! `weight_ih` (4H, I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows
 //! each, and there are two bias vectors (4H).
 
+use super::GATES;
+
 /// One direction of an LSTM layer, PyTorch layout, row-major.
 #[derive(Debug, Clone, Copy)]
 pub struct LstmWeights<'w> {
@@ -17,8 +19,16 @@ pub struct LstmWeights<'w> {
     pub bias_hh: &'w [f32],
 }
 
+impl LstmWeights<'_> {
+    /// Returns the number of hidden units.
+    #[must_use]
+    pub const fn units(&self) -> usize {
+        self.bias_ih.len() / GATES
+    }
+}
+
 /// Runs one direction over `x` (T, I) from a zero state and writes `h` into columns
-/// `offset..offset + H` of `output` (T, W).
+/// `offset..offset + H` of `output` (T, W). Weights of fewer inputs and units take the first columns of each.
 ///
 /// # Panics
 /// When a slice is not of the stated shape.
@@ -29,16 +39,19 @@ pub fn lstm<const I: usize, const H: usize, const W: usize>(
     output: &mut [[f32; W]],
     offset: usize,
 ) {
+    let units = weights.units();
+    let inputs = weights.weight_ih.len() / (GATES * units).max(1);
     let mut h = [0.0; H];
     let mut s = [0.0; H];
     for n in 0..x.len() {
         let t = if backward { x.len() - 1 - n } else { n };
         let mut next = [0.0; H];
-        for u in 0..H {
+        for u in 0..units {
             let preactivation = |gate: usize| {
-                let row = gate * H + u;
-                let input = dense(&weights.weight_ih[row * I..(row + 1) * I], weights.bias_ih[row], &x[t]);
-                input + dense(&weights.weight_hh[row * H..(row + 1) * H], weights.bias_hh[row], &h)
+                let row = gate * units + u;
+                let (ih, hh) = (row * inputs..(row + 1) * inputs, row * units..(row + 1) * units);
+                let input = dense(&weights.weight_ih[ih], weights.bias_ih[row], &x[t]);
+                input + dense(&weights.weight_hh[hh], weights.bias_hh[row], &h)
             };
             let i = sigmoid(preactivation(0)); // Eq. 8
             let f = sigmoid(preactivation(1)); // Eq. 9
@@ -48,7 +61,7 @@ pub fn lstm<const I: usize, const H: usize, const W: usize>(
             next[u] = libm::tanhf(s[u]) * o; // Eq. 12
         }
         h = next;
-        output[t][offset..offset + H].copy_from_slice(&h);
+        output[t][offset..offset + units].copy_from_slice(&h[..units]);
     }
 }
 

@@ -14,6 +14,10 @@ pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
 /// The checkpoint that [`gyronet::model::weights::DEFAULT`] was made from.
 const CHECKPOINT: &[u8] = include_bytes!("../weights/gyronet.safetensors");
 
+/// The checkpoint that [`gyronet::model::weights::LINEAR_WINDOW`] was made from.
+#[cfg(test)]
+const LINEAR_CHECKPOINT: &[u8] = include_bytes!("../weights/linear_window.safetensors");
+
 /// The checkpoint that [`gyronet::model::weights::FOGNET`] was made from.
 const FOG_CHECKPOINT: &[u8] = include_bytes!("../weights/fognet.safetensors");
 
@@ -75,6 +79,9 @@ mod tests {
     fn weights_are_what_quantize_makes() {
         let (bytes, _) = crate::network::quantize::quantize(&checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::DEFAULT.0, "run: gyronet quantize");
+        let linear = Checkpoint::parse("linear_window.safetensors", LINEAR_CHECKPOINT).unwrap();
+        let (bytes, _) = crate::network::quantize::quantize(&linear).unwrap();
+        assert!(bytes == gyronet::model::weights::LINEAR_WINDOW.0, "run: gyronet quantize");
         let (bytes, _) = crate::network::quantize::fognet::quantize(&fog_checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::FOGNET.0, "run: gyronet quantize");
     }

@@ -1,5 +1,5 @@
-//! How good a yaw rate is: each of the [`methods`] on a drive with a reference, measured by [`metrics`] and
-//! [`trajectory_error`], tabulated by [`report`]; [`ablation`] switches parts of the compensation off.
+//! Each of the [`methods`] is run on a drive with a reference; [`metrics`] and [`trajectory_error`] measure its error,
+//! and [`report`] tabulates it. [`ablation`] switches parts of the compensation off.
 
 pub mod ablation;
 pub mod fir;

@@ -5,8 +5,8 @@
 //! suspension, [`vibration`] shakes the part, [`mems`] adds the part's own errors, [`csv`]
 //! writes the recording. [`layout`] writes whole sequences of a drive through a [`town`] as the
 //! data sets KAIST and NCLT have them, with a fibre-optic gyro ([`fog`]) and wheels
-//! ([`odometer`]); [`vehicles`] has every number with its source. The truth is what a perfect part at the same place would say were the
-//! car not shaking: vibration turns the car nowhere and counts as an error.
+//! ([`odometer`]); [`vehicles`] has every number with its source. The truth is what a perfect part at the same place
+//! would say were the car not shaking: vibration turns the car nowhere and counts as an error.
 //!
 //! What it is not: a model of one make of part or car. It shows that everything works, and
 //! how well static initialisation does on it; whether a network helps on a real car only a

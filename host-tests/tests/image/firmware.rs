@@ -58,7 +58,8 @@ fn compare(test: &str, elf: &Path, arguments: &[&str], bytes: &[u8]) {
         count = host.lines.len();
     };
     println!("{test}: {followed} sets because the host was busy");
-    // How soon silence is reported is held by `firmware_faults`, and by the virtual board, whose clock waits for the host.
+    // How soon silence is reported is held by `firmware_faults`, and by the virtual board, whose clock waits for the
+    // host.
     assert!(followed < SAMPLES / 10, "{followed}");
     // Behind them the board may have reported already that the bytes have ended.
     let lines = &lines[..expected.len()];

@@ -1,5 +1,4 @@
-//! What `gyronet demo` says of the image: the same bytes as the library's, and that it would tell
-//! if they were others.
+//! `gyronet demo` finds the image's bytes to be the library's, and reports a byte that differs.
 
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};

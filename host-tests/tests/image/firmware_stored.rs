@@ -52,8 +52,8 @@ struct Started {
 }
 
 impl Started {
-    /// Starts a board with this flash and checks that it sends what the one on the host sends; `None` where it cannot be
-    /// run.
+    /// Starts a board with this flash and checks that it sends what the one on the host sends; `None` where it cannot
+    /// be run.
     fn by(test: &str, stored: &Stored, host: impl Fn() -> replay::Board) -> Option<Self> {
         let scratch = env!("CARGO_TARGET_TMPDIR");
         let elf = image::coprocessor(test, scratch)?;

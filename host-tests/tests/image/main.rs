@@ -13,4 +13,5 @@ mod firmware_stored;
 mod image_size;
 mod monitor;
 mod python_clients;
+mod small_cores;
 mod target_counts;

@@ -1,10 +1,11 @@
 //! The weight file: whatever is wrong with one, it is refused with the right reason.
 
-use gyronet::model::blob::{BlobError, CRC, HEADER_LEN, HIDDEN, TOPOLOGY, file_len};
+use gyronet::model::blob::{BlobError, CRC, HEADER_LEN, HIDDEN, LINEAR_INPUTS, Shape};
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{Blob, fognet_blob, weights};
 use gyronet::nn::Aligned;
 use gyronet::nn::lstm::DirectionWeights;
+use gyronet_host_tests::models;
 use gyronet_host_tests::noise::Noise;
 
 /// A copy of the weights that come with the library, on a word boundary, with room behind.
@@ -43,7 +44,7 @@ impl File {
 }
 
 fn provenance_len() -> usize {
-    weights::DEFAULT.0.len() - file_len(0)
+    weights::DEFAULT.0.len() - Shape::PAPER.file_len(0)
 }
 
 /// Offset of the first record of a layer's direction (0 forward, 1 backward).
@@ -62,36 +63,47 @@ fn the_default_is_good_and_says_where_it_comes_from() {
     assert!(blob.provenance.starts_with('{') && blob.provenance.ends_with('}'), "{}", blob.provenance);
     assert!(blob.provenance.contains("checkpoint_sha256"));
     assert_eq!(blob.crc.to_le_bytes(), file.bytes()[file.len - 4..]);
-    assert_eq!(blob.layers[0].forward.units(), HIDDEN);
-    assert_eq!(blob.layers[1].backward.inputs(), 2 * HIDDEN);
+    let layers = blob.layers.expect("the paper's network");
+    assert_eq!((blob.shape, blob.linear.is_none()), (Shape::PAPER, true));
+    assert_eq!((layers[0].forward.units(), layers[1].backward.inputs()), (HIDDEN, 2 * HIDDEN));
     assert!(file.len <= 126 * 1024, "GyroNet's weights must not pass 126 KB: {} bytes", file.len);
 }
 
 #[test]
 fn each_header_field_is_checked() {
     let len = weights::DEFAULT.0.len();
-    let topology = |found| BlobError::Topology { found, expected: TOPOLOGY };
+    let topology = |found| BlobError::Topology { found, expected: Shape::LARGEST.topology() };
     let length = |expected, found| BlobError::Length { expected, found };
     let (window, features, hidden) = (WINDOW as u16, FEATURES as u16, HIDDEN as u16);
     let p = provenance_len();
+    let file_len = |p| Shape::PAPER.file_len(p);
+    let smaller = Shape { units: 56, linear: false };
     for (at, bytes, error) in [
         (0, &b"GYRX"[..], BlobError::Magic(*b"GYRX")),
         (4, &[1, 0], BlobError::Version(1)),
-        (4, &[3, 0], BlobError::Version(3)),
+        (4, &[2, 0], BlobError::Version(2)),
+        (4, &[4, 0], BlobError::Version(4)),
         (4, &[0, 1], BlobError::Version(256)),
-        (6, &[2, 0], topology([2, window, features, hidden, 2])),
+        (6, &[2, 0], topology([2, window, features, hidden, 2, 0])),
         (8, &(len as u32 + 4).to_le_bytes(), length(len + 4, len)),
         (8, &[0xFF; 4], length(u32::MAX as usize, len)),
-        (12, &[60, 0], topology([1, 60, features, hidden, 2])),
-        (14, &[9, 0], topology([1, window, 9, hidden, 2])),
-        (16, &[90, 0], topology([1, window, features, 90, 2])),
-        (18, &[1, 0], topology([1, window, features, hidden, 1])),
-        (20, &(p as u32 + 4).to_le_bytes(), length(file_len(p + 4), len)),
-        (20, &(p as u32 + 1).to_le_bytes(), length(file_len(0), len)),
-        (20, &0xFFFF_FFFCu32.to_le_bytes(), length(file_len(0), len)),
-        (24, &0i32.to_le_bytes(), BlobError::Scale),
-        (24, &(-1i32).to_le_bytes(), BlobError::Scale),
-        (24, &32_768i32.to_le_bytes(), BlobError::Scale),
+        (12, &[60, 0], topology([1, 60, features, hidden, 2, 0])),
+        (14, &[9, 0], topology([1, window, 9, hidden, 2, 0])),
+        (16, &[90, 0], topology([1, window, features, 90, 2, 0])),
+        (16, &[64, 0], topology([1, window, features, 64, 2, 0])),
+        (16, &[58, 0], topology([1, window, features, 58, 2, 0])),
+        (16, &[0, 0], topology([1, window, features, 0, 2, 0])),
+        (16, &[56, 0], length(smaller.file_len(p), len)),
+        (18, &[1, 0], topology([1, window, features, hidden, 1, 0])),
+        (20, &[9, 0], topology([1, window, features, hidden, 2, 9])),
+        (20, &[10, 0, 1, 0], topology([1, window, features, hidden, 2, u16::MAX])),
+        (20, &[10, 0, 0, 0], length(Shape::LARGEST.file_len(p), len)),
+        (24, &(p as u32 + 4).to_le_bytes(), length(file_len(p + 4), len)),
+        (24, &(p as u32 + 1).to_le_bytes(), length(file_len(0), len)),
+        (24, &0xFFFF_FFFCu32.to_le_bytes(), length(file_len(0), len)),
+        (28, &0i32.to_le_bytes(), BlobError::Scale),
+        (28, &(-1i32).to_le_bytes(), BlobError::Scale),
+        (28, &32_768i32.to_le_bytes(), BlobError::Scale),
         (HEADER_LEN, &[0xFF], BlobError::Provenance),
     ] {
         assert_eq!(File::with(at, bytes).error(), error, "{bytes:02x?} at {at}");
@@ -155,11 +167,38 @@ fn rows_that_could_overflow_are_refused() {
 
 #[test]
 fn an_output_that_could_overflow_is_refused() {
-    let unit = file_len(provenance_len()) - 8;
+    let unit = Shape::PAPER.file_len(provenance_len()) - 8;
     for row in [unit - 4 * HIDDEN - 8, unit - 2 * (4 * HIDDEN + 8)] {
         assert_eq!(File::with(row + 4 * HIDDEN, &i32::MAX.to_le_bytes()).error(), BlobError::Scale);
         assert_eq!(File::with(row, &[0xFF, 0x7F].repeat(2 * HIDDEN)).error(), BlobError::Scale);
     }
+}
+
+#[test]
+fn a_linear_part_that_could_overflow_is_refused() {
+    const SHAPE: Shape = Shape { units: 8, linear: true };
+    let mut file = models::file::<{ SHAPE.file_len(0) }>(SHAPE, 3);
+    let end = file.len() - 4;
+    let mut check = |edit: &dyn Fn(&mut [u8])| {
+        edit(&mut file);
+        let crc = CRC.checksum(&file[..end]);
+        file[end..].copy_from_slice(&crc.to_le_bytes());
+        Blob::new_checked(&Aligned(file).0).map(|blob| blob.shape)
+    };
+    assert_eq!(check(&|_| {}), Ok(SHAPE));
+    // Two weights of -2^31 in the last row are as much as a row may have, with the others zero but for one LSB less.
+    let row = HEADER_LEN + 4 * (WINDOW - 1) * LINEAR_INPUTS;
+    let set = |file: &mut [u8], at: usize, weight: i32| {
+        file[row + 4 * at..row + 4 * at + 4].copy_from_slice(&weight.to_le_bytes());
+    };
+    let largest = |file: &mut [u8]| {
+        file[row..row + 4 * LINEAR_INPUTS].fill(0);
+        set(file, 0, i32::MIN);
+        set(file, 59, i32::MAX);
+    };
+    assert_eq!(check(&largest), Ok(SHAPE));
+    assert_eq!(check(&|file| set(file, 30, 1)), Err(BlobError::LinearBound { output: 9 }));
+    assert_eq!(check(&|file| set(file, 30, -1)), Err(BlobError::LinearBound { output: 9 }));
 }
 
 #[test]
@@ -174,8 +213,9 @@ fn every_flipped_bit_is_noticed() {
         let expected = match bit / 8 {
             0..4 => matches!(error, BlobError::Magic(_)),
             4..6 => matches!(error, BlobError::Version(_)),
-            8..12 | 20..24 => matches!(error, BlobError::Length { .. }),
-            6..20 => matches!(error, BlobError::Topology { .. }),
+            8..12 | 24..28 => matches!(error, BlobError::Length { .. }),
+            // Some sizes are another network's.
+            6..24 => matches!(error, BlobError::Topology { .. } | BlobError::Length { .. }),
             _ => matches!(error, BlobError::Crc { computed, stored } if computed != stored),
         };
         assert!(expected, "bit {bit}: {error}");
@@ -188,7 +228,7 @@ fn every_flipped_bit_is_noticed() {
 fn refusals_say_why() {
     for (error, text) in [
         (BlobError::Magic(*b"ELF!"), "this is none, it begins with [45, 4c, 46, 21], not [47, 59, 52, 4e]"),
-        (BlobError::Version(7), "format version 7, this reads 2"),
+        (BlobError::Version(2), "format version 2, this reads 3"),
         (BlobError::Length { expected: 10, found: 9 }, "9 bytes, should be 10"),
         (BlobError::Misaligned, "not on a 4-byte boundary"),
         (BlobError::Crc { computed: 1, stored: 0xABCD }, "checksum is 00000001, the file says 0000abcd"),
@@ -199,9 +239,12 @@ fn refusals_say_why() {
             "layer 1, direction 0, unit 59 could overflow its accumulator",
         ),
         (
-            BlobError::Topology { found: fognet_blob::TOPOLOGY, expected: TOPOLOGY },
-            "network 2 with window 60, 9 inputs, 90 units, 2 layers is not GyroNet (1: 10, 6, 60, 2)",
+            BlobError::Topology { found: fognet_blob::TOPOLOGY, expected: Shape::LARGEST.topology() },
+            "network 2 with window 60, 9 inputs, 90 units, 2 layers, 1 linear outputs is not GyroNet \
+             (1: 10, 6, 60, 2, 10, or fewer units in steps of 4, or no linear outputs)",
         ),
+        (BlobError::LinearBound { output: 9 }, "output 9 of the linear part could overflow its accumulator"),
+        (BlobError::Units { found: 60, largest: 16 }, "60 units a direction, there is memory for 16"),
     ] {
         assert_eq!(error.to_string(), format!("weight file: {text}"));
     }

@@ -44,12 +44,13 @@ fn the_default_is_good_and_says_where_it_comes_from() {
 #[test]
 fn each_network_refuses_the_others_file() {
     let error = Blob::new_checked(&weights::FOGNET.0).expect_err("it is FoGNet's");
-    assert_eq!(error, BlobError::Topology { found: TOPOLOGY, expected: blob::TOPOLOGY });
+    assert_eq!(error, BlobError::Topology { found: TOPOLOGY, expected: blob::Shape::LARGEST.topology() });
     let error = FogBlob::new_checked(&weights::DEFAULT.0).expect_err("it is GyroNet's");
-    assert_eq!(error, BlobError::Topology { found: blob::TOPOLOGY, expected: TOPOLOGY });
+    assert_eq!(error, BlobError::Topology { found: blob::Shape::PAPER.topology(), expected: TOPOLOGY });
     assert_eq!(
         error.to_string(),
-        "weight file: network 1 with window 10, 6 inputs, 60 units, 2 layers is not FoGNet (2: 60, 9, 90, 2)"
+        "weight file: network 1 with window 10, 6 inputs, 60 units, 2 layers, 0 linear outputs is not FoGNet \
+         (2: 60, 9, 90, 2, 1)"
     );
 }
 
@@ -85,8 +86,8 @@ fn rows_that_could_overflow_are_refused() {
         assert_eq!(with(row, &[0xFF, 0x7F].repeat(columns)), BlobError::Scale);
         assert_eq!(with(row + 2 * columns, &i32::MAX.to_le_bytes()), BlobError::Scale);
     }
-    assert_eq!(with(24, &0i32.to_le_bytes()), BlobError::Scale);
-    assert_eq!(HEADER_LEN, 28 + 8 * INPUTS + 4 * 60 + 8);
+    assert_eq!(with(28, &0i32.to_le_bytes()), BlobError::Scale);
+    assert_eq!(HEADER_LEN, 32 + 8 * INPUTS + 4 * 60 + 8);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! A safetensors file is a length (u64), a JSON header and the tensors. The header is searched
 //! rather than parsed: this is our own file, and a bench.
 
-use gyronet::model::gyronet_f32::GyroNetF32;
+use gyronet::model::gyronet_f32::{GyroNetF32, NetworkF32};
 use gyronet::nn::Aligned;
 use gyronet::nn::reference::LstmWeights;
 
@@ -50,9 +50,12 @@ pub fn network() -> Option<GyroNetF32<'static>> {
         input_mean: tensor("\"input_mean\"")?.try_into().ok()?,
         input_std: tensor("\"input_std\"")?.try_into().ok()?,
         output_scale: *tensor("\"output_scale\"")?.first()?,
-        lstm1: [direction!("1", "")?, direction!("1", "_reverse")?],
-        lstm2: [direction!("2", "")?, direction!("2", "_reverse")?],
-        fc_weight: tensor("\"fc.weight\"")?,
-        fc_bias: tensor("\"fc.bias\"")?.try_into().ok()?,
+        linear: None,
+        network: Some(NetworkF32 {
+            lstm1: [direction!("1", "")?, direction!("1", "_reverse")?],
+            lstm2: [direction!("2", "")?, direction!("2", "_reverse")?],
+            fc_weight: tensor("\"fc.weight\"")?,
+            fc_bias: tensor("\"fc.bias\"")?.try_into().ok()?,
+        }),
     })
 }

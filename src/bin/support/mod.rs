@@ -1,6 +1,8 @@
 //! What the self-test and the bench share: reproducible numbers and weights of any size.
 
 mod numbers;
+#[allow(dead_code, reason = "the self-test has no models of its own")]
+pub mod random_model;
 
 pub use numbers::Numbers;
 

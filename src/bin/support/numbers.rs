@@ -5,10 +5,12 @@
 pub struct Numbers(u32);
 
 impl Numbers {
+    /// Begins with a seed, not zero.
     pub const fn new(seed: u32) -> Self {
         Self(seed)
     }
 
+    /// Returns the next number.
     pub const fn next(&mut self) -> u32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 17;

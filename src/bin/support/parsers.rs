@@ -1,5 +1,5 @@
-//! What a sensor's bytes cost: a frame of each kind, byte by byte as the output task takes them
-//! out of their queue, through the parser that the pipeline is given. Each parser has taken a frame
+//! The parsers' cost is counted with a frame of each kind, byte by byte as the output task takes them
+//! out of their queue. Each parser has taken a frame
 //! before, so that its clock and its counter run.
 
 use crate::meter::Meter;

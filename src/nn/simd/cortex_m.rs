@@ -135,7 +135,7 @@ pub(in crate::nn) fn project<const U: usize>(
 ) {
     let inputs = direction.inputs();
     // The caller has made sure of all lengths.
-    if U == 0 || projection.is_empty() || x.len() != inputs * projection.len() || U != direction.units() {
+    if projection.is_empty() || x.len() != inputs * projection.len() || direction.units() > U {
         return;
     }
     // A record is read for each pair of steps: from a second one on, its copy is the quicker one to read.
@@ -147,7 +147,7 @@ pub(in crate::nn) fn project<const U: usize>(
         x: x.as_ptr().wrapping_sub(1),
         x_end: x.as_ptr_range().end.wrapping_sub(1),
         projection: first,
-        projection_end: first.wrapping_add(U),
+        projection_end: first.wrapping_add(direction.units()),
         record: copy,
         record_bytes: size_of::<Accumulators>() + 4 * inputs,
         entry: skipped * PROJECT_BYTES,
@@ -157,7 +157,7 @@ pub(in crate::nn) fn project<const U: usize>(
     };
     // SAFETY: `Direction` guarantees units x (4 + inputs) readable words, at least one pair of inputs
     // and at most as many as `record` has words for; `x` has `inputs` words for each pair of steps, and
-    // `projection` two times `U` = `units` records. The kernel reads and writes just these, and
+    // `projection` two times `U` records, at least `units`. The kernel reads and writes just these, and
     // nothing else is aliased by the `&mut`.
     unsafe { project_kernel(&call, direction.input().as_ptr()) }
 }
@@ -170,11 +170,12 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
     hidden: &mut [u32; W],
 ) {
     let hidden = hidden.as_mut_ptr().cast::<u16>();
-    let quads = W / 2;
+    let columns = DirectionWeights::padded(direction.units());
+    let quads = columns / 4;
     let skipped = entry(quads, STEP_UNROLL);
     let (start, entry, to_weights) = match previous {
         Some(previous) => (previous.as_ptr(), skipped * STEP_BYTES, -((16 * skipped) as isize)),
-        None => (core::ptr::null(), NO_PREVIOUS, (8 * W) as isize),
+        None => (core::ptr::null(), NO_PREVIOUS, (4 * columns) as isize),
     };
     let call = StepCall {
         previous: start.wrapping_sub(2 * skipped + 1),
@@ -189,9 +190,9 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
         sigmoid: SIGMOID[SIGMOID.len() / 2..].as_ptr(),
         tanh: TANH[TANH.len() / 2..].as_ptr(),
     };
-    // SAFETY: `Direction` guarantees units x (2 W + 2) readable words; `lstm::step` has checked
-    // that `U` = `units` and that `W` words are `units` halfwords, rounded up to four. `previous`
-    // has `W` words, an even number, or is not read. Table indices come out of SSAT to 18 bits
+    // SAFETY: `Direction` guarantees units x (columns + 2) readable words; `lstm::step` has checked
+    // that `units` is at most `U`, and that `W` words are at least `units` halfwords, rounded up to four.
+    // `previous` has as many words, an even number, or is not read. Table indices come out of SSAT to 18 bits
     // and stay inside both tables. Nothing else is read or written.
     unsafe { step_kernel(&call, direction.recurrent().as_ptr()) }
 }

@@ -106,10 +106,11 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
 ) {
     let projection = projection.as_chunks::<2>().0;
     let cell_state = cell_state.as_chunks_mut::<2>().0;
-    let pairs = direction.recurrent().chunks_exact(2 * (2 * W + 2));
+    let columns = DirectionWeights::padded(direction.units());
+    let pairs = direction.recurrent().chunks_exact(2 * (columns + 2));
     for (((pair, start), cell_state), hidden) in pairs.zip(projection).zip(cell_state).zip(hidden) {
-        let (a, b) = pair.split_at(2 * W + 2);
-        let ((a, a_multipliers), (b, b_multipliers)) = (a.split_at(2 * W), b.split_at(2 * W));
+        let (a, b) = pair.split_at(columns + 2);
+        let ((a, a_multipliers), (b, b_multipliers)) = (a.split_at(columns), b.split_at(columns));
         let mut acc = *start;
         if let Some(previous) = previous {
             let mut sums = [[Sums::ZERO]; 2];

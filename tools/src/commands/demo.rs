@@ -2,7 +2,8 @@
 
 use super::{Common, WriteError, paint, print_json, progress, replay, weights};
 use gyronet::can::config::Config;
-use gyronet::model::GyroNet;
+use gyronet::model::weights::LINEAR_WINDOW;
+use gyronet::model::{Blob, GyroNet};
 use gyronet_tools::bundled;
 use gyronet_tools::demo::Demo;
 use gyronet_tools::demo::board::{Agreement, BoardError, Difference, Figures, Outcome};
@@ -57,7 +58,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     };
     let bar = progress::bar(common, methods::RUNS * recording.rows.len(), recording.name());
     let mut integer = GyroNet::new(weights.blob()?);
-    let rates = Rates::new(&recording, &mut checkpoint.network(), &mut integer, || bar.inc(1));
+    let mut linear = GyroNet::new(Blob::new_checked(&LINEAR_WINDOW.0)?);
+    let rates = Rates::new(&recording, &mut checkpoint.network(), &mut integer, &mut linear, || bar.inc(1));
     bar.finish_and_clear();
     let rates = rates?;
     let errors = match DriveErrors::new(&recording, &rates) {

@@ -1,7 +1,8 @@
 //! `gyronet evaluate`: yaw errors of each method on recorded drives.
 
 use super::{Common, paint, print_json, progress, weights};
-use gyronet::model::GyroNet;
+use gyronet::model::weights::LINEAR_WINDOW;
+use gyronet::model::{Blob, GyroNet};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::methods::{self, Rates};
@@ -14,7 +15,8 @@ use std::path::PathBuf;
 /// The methods are the raw gyro, static initialisation, a low-pass filter, and GyroNet in f32 and in integers. For
 /// each drive, and as a mean, the command prints the mean error of the yaw change over 1 s (rad), its ratio to that
 /// of static initialisation, and the error of the yaw at the end (rad). The network rows are settled estimates after
-/// static initialisation. The last two rows are the rates that the board sends: with the sample (Bosch TX1, J1939
+/// static initialisation; the linear rows are the same with the linear window that comes with the library, and the
+/// rates that the board would send with it. The last two rows are the rates that the board sends: with the sample (Bosch TX1, J1939
 /// VDC2), and in its own yaw messages some samples later. The wheels of a drive replace the vehicle's bus.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
@@ -48,11 +50,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let checkpoint = args.networks.checkpoint()?;
     let weights = args.networks.weights()?;
     let mut integer = GyroNet::new(weights.blob()?);
+    let mut linear = GyroNet::new(Blob::new_checked(&LINEAR_WINDOW.0)?);
     let mut drives = Vec::new();
     for file in &args.files {
         let recording = Recording::read(file)?;
         let bar = progress::bar(common, methods::RUNS * recording.rows.len(), recording.name());
-        let rates = Rates::new(&recording, &mut checkpoint.network(), &mut integer, || bar.inc(1));
+        let rates =
+            Rates::new(&recording, &mut checkpoint.network(), &mut integer, &mut linear, || bar.inc(1));
         bar.finish_and_clear();
         drives.push(DriveErrors::new(&recording, &rates?)?);
     }

@@ -123,7 +123,7 @@ impl Outcome {
     /// repository is missing.
     #[must_use]
     pub fn missing() -> Option<Self> {
-        let why = match (emulator::available(), bench::target_installed()) {
+        let why = match (emulator::available(), bench::target_installed(bench::TARGET)) {
             (Err(error), _) => format!("wants QEMU: {error}"),
             (_, Err(why)) => why,
             (Ok(()), Ok(())) => return None,

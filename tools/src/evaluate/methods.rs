@@ -56,6 +56,12 @@ impl Method {
     pub const GYRONET_F32: Self = mems("gyronet_f32", "overlap f32");
     /// The same in integers.
     pub const GYRONET_INT: Self = mems("gyronet_int", "overlap integer");
+    /// The linear window ([`gyronet::model::weights::LINEAR_WINDOW`]) in the place of GyroNet, the same way.
+    pub const LINEAR: Self = mems("linear", "linear window");
+    /// The linear window: the rate that the board would send at once.
+    pub const LINEAR_PROMPT: Self = mems("linear_prompt", "linear, sent at once");
+    /// The linear window: the rate that the board would send for navigation.
+    pub const LINEAR_NAVIGATION: Self = mems("linear_default", "linear, for navigation");
     /// The rate that the board sends at once: Bosch TX1, VDC2.
     pub const PROMPT: Self = mems("prompt", "sent at once");
     /// The rate that the board sends in its own yaw messages, some samples later.
@@ -82,7 +88,7 @@ impl Method {
     pub const FOGNET_NOPAD: Self = fog("fognet_nopad", "FoGNet, no padding");
 
     /// The methods of one drive, in the order of its table.
-    pub const ON_A_DRIVE: [Self; 9] = [
+    pub const ON_A_DRIVE: [Self; 12] = [
         Self::RAW,
         Self::STATIC,
         Self::FIR,
@@ -90,6 +96,9 @@ impl Method {
         Self::MIDDLE,
         Self::GYRONET_F32,
         Self::GYRONET_INT,
+        Self::LINEAR,
+        Self::LINEAR_PROMPT,
+        Self::LINEAR_NAVIGATION,
         Self::PROMPT,
         Self::NAVIGATION,
     ];
@@ -166,7 +175,7 @@ pub struct Rates {
 }
 
 /// Number of times that [`Rates::new`] goes through a recording.
-pub const RUNS: usize = 4;
+pub const RUNS: usize = 5;
 
 impl Rates {
     /// Runs every method. All networks go through the very same pipeline. `tick` is called
@@ -178,6 +187,7 @@ impl Rates {
         recording: &Recording,
         float: &mut impl WindowNetwork,
         integer: &mut impl WindowNetwork,
+        linear: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
     ) -> Result<Self, ReplayError> {
         let start = Instant::now();
@@ -191,6 +201,8 @@ impl Rates {
         let run_time = start.elapsed();
         let float =
             Replay::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), float, &mut tick)?;
+        let linear =
+            Replay::run(recording, &PipelineConfig::DEFAULT, WheelFrames::new(recording), linear, &mut tick)?;
         let newest = Replay::run(
             recording,
             &with_mode(Mode::Newest),
@@ -212,6 +224,11 @@ impl Rates {
         let raw: Vec<f64> = drive.steps.iter().map(|step| gyro(step.row)).collect();
         let filtered = fir::filter(&fir::Design::PAPER.taps(), &raw);
         let settled = |drive: &Replay| drive.settled().map(|rate| rate.rad_per_sec()).collect();
+        let prompt = |drive: &Replay| {
+            drive.steps[drive.compared()].iter().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect()
+        };
+        let navigation =
+            |drive: &Replay| drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect::<Vec<f64>>();
         let rates = PerMethod::new(|method| match method {
             Method::RAW => compared().map(|step| gyro(step.row)).collect(),
             Method::STATIC => compared().map(|step| gyro(step.row) - bias.rad_per_sec()).collect(),
@@ -220,9 +237,12 @@ impl Rates {
             Method::MIDDLE => settled(&middle),
             Method::GYRONET_F32 => settled(&float),
             Method::GYRONET_INT => settled(&drive),
-            Method::PROMPT => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
+            Method::LINEAR => settled(&linear),
+            Method::LINEAR_PROMPT => prompt(&linear),
+            Method::LINEAR_NAVIGATION => navigation(&linear),
+            Method::PROMPT => prompt(&drive),
             // Method::NAVIGATION, the last one.
-            _ => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
+            _ => navigation(&drive),
         });
         let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
         let seconds = compared().map(|step| (step.time.0 - first) as f64 * 1e-6).collect();

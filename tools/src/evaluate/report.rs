@@ -70,7 +70,7 @@ impl DriveErrors {
 pub struct Report {
     /// One for each drive.
     pub drives: Vec<DriveErrors>,
-    /// Over the drives, each counting the same; absent without drives.
+    /// The mean of the drives, each counting the same; absent without drives.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean: Option<PerMethod<YawError>>,
 }
@@ -162,7 +162,7 @@ mod tests {
     fn table_is_aligned() {
         let text = report(2).to_string();
         let widths: Vec<usize> = text.lines().filter(|line| line.starts_with("  ")).map(str::len).collect();
-        assert_eq!(widths.len(), 30);
+        assert_eq!(widths.len(), 39);
         assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
         assert!(text.contains("mean of 2 drives"));
         assert!(!report(1).to_string().contains("mean of"));

@@ -51,9 +51,9 @@ impl TrajectoryError {
 /// A turn about the origin, then a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
-    /// To the left, rad.
+    /// The turn to the left, rad.
     pub yaw: f64,
-    /// m.
+    /// The shift, m.
     pub shift: Point,
 }
 

@@ -2,24 +2,24 @@
 
 pub use super::tensors::CheckpointError;
 
-use super::tensors::{Shape, Tensors, bilstm, dense, tensor};
+use super::tensors::{Found, Shape, Tensors, bilstm, dense, tensor};
 use gyronet::fog::seconds::STEPS;
-use gyronet::model::blob::HIDDEN;
+use gyronet::model::blob::{self, HIDDEN, LINEAR_INPUTS};
 use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogNetF32;
-use gyronet::model::gyronet_f32::GyroNetF32;
-use gyronet::model::window::FEATURES;
+use gyronet::model::gyronet_f32::{GyroNetF32, NetworkF32};
+use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::nn::reference::LstmWeights;
 use std::marker::PhantomData;
 use std::path::Path;
 
 /// A network that has checkpoints.
 pub trait Network {
-    /// Returns the names and shapes of its tensors.
-    fn shapes() -> Vec<Shape>;
+    /// Returns the names and shapes of its tensors, as large as `found` says that those of the file are.
+    fn shapes(found: Found<'_>) -> Vec<Shape>;
 }
 
-/// GyroNet: two LSTMs one above the other, and a fully connected layer.
+/// GyroNet: a linear part, or two LSTMs one above the other and a fully connected layer, or both.
 #[derive(Debug, Clone)]
 pub struct GyroNet;
 
@@ -28,21 +28,30 @@ pub struct GyroNet;
 pub struct FogNet;
 
 impl Network for GyroNet {
-    fn shapes() -> Vec<Shape> {
+    fn shapes(found: Found<'_>) -> Vec<Shape> {
         let mut shapes = vec![
             tensor("input_mean", &[FEATURES]),
             tensor("input_std", &[FEATURES]),
             tensor("output_scale", &[1]),
         ];
-        shapes.extend(bilstm("lstm1", FEATURES, HIDDEN, 1));
-        shapes.extend(bilstm("lstm2", 2 * HIDDEN, HIDDEN, 1));
-        shapes.extend(dense("fc", 2 * HIDDEN, 2));
+        let linear = found(LINEAR).is_some();
+        if linear {
+            shapes.push(tensor(LINEAR, &[WINDOW, LINEAR_INPUTS]));
+        }
+        let units = match found("lstm1.weight_hh_l0") {
+            Some(shape) => shape.last().map_or(HIDDEN, |units| (*units).min(HIDDEN)),
+            None if linear => return shapes,
+            None => HIDDEN,
+        };
+        shapes.extend(bilstm("lstm1", FEATURES, units, 1));
+        shapes.extend(bilstm("lstm2", 2 * units, units, 1));
+        shapes.extend(dense("fc", 2 * units, 2));
         shapes
     }
 }
 
 impl Network for FogNet {
-    fn shapes() -> Vec<Shape> {
+    fn shapes(_found: Found<'_>) -> Vec<Shape> {
         let mut shapes = vec![
             tensor("input_mean", &[INPUTS]),
             tensor("input_std", &[INPUTS]),
@@ -71,7 +80,7 @@ impl<N: Network> Checkpoint<N> {
     /// # Errors
     /// [`CheckpointError`], which names the file and the tensor.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        Ok(Self { tensors: Tensors::read(path, &N::shapes())?, network: PhantomData })
+        Ok(Self { tensors: Tensors::read(path, N::shapes)?, network: PhantomData })
     }
 
     /// Parses bytes; messages call them `name`.
@@ -79,7 +88,7 @@ impl<N: Network> Checkpoint<N> {
     /// # Errors
     /// [`CheckpointError`] with that name.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, CheckpointError> {
-        Ok(Self { tensors: Tensors::parse(name, bytes, &N::shapes())?, network: PhantomData })
+        Ok(Self { tensors: Tensors::parse(name, bytes, N::shapes)?, network: PhantomData })
     }
 
     /// Returns all tensors.
@@ -93,7 +102,33 @@ impl<N: Network> Checkpoint<N> {
     }
 }
 
+/// The tensor of GyroNet's linear part.
+const LINEAR: &str = "linear.weight";
+
 impl Checkpoint<GyroNet> {
+    /// Returns the parts that there are.
+    #[must_use]
+    pub fn shape(&self) -> blob::Shape {
+        let units = self.bilstms().map_or(0, |network| network.lstm1[0].units());
+        blob::Shape { units: units as u16, linear: self.linear().is_some() }
+    }
+
+    /// Returns the weights of the linear part.
+    #[must_use]
+    pub fn linear(&self) -> Option<&[f32]> {
+        self.tensors.has(LINEAR).then(|| self.tensors.tensor(LINEAR))
+    }
+
+    /// Returns the Bi-LSTMs.
+    fn bilstms(&self) -> Option<NetworkF32<'_>> {
+        self.tensors.has("fc.weight").then(|| NetworkF32 {
+            lstm1: [self.direction(1, false), self.direction(1, true)],
+            lstm2: [self.direction(2, false), self.direction(2, true)],
+            fc_weight: self.tensors.tensor("fc.weight"),
+            fc_bias: self.features("fc.bias"),
+        })
+    }
+
     /// Returns the weights of layer 1 or 2, forward or backward.
     #[must_use]
     pub fn direction(&self, layer: usize, backward: bool) -> LstmWeights<'_> {
@@ -107,10 +142,8 @@ impl Checkpoint<GyroNet> {
             input_mean: self.features("input_mean"),
             input_std: self.features("input_std"),
             output_scale: self.tensors.tensor("output_scale")[0],
-            lstm1: [self.direction(1, false), self.direction(1, true)],
-            lstm2: [self.direction(2, false), self.direction(2, true)],
-            fc_weight: self.tensors.tensor("fc.weight"),
-            fc_bias: self.features("fc.bias"),
+            linear: self.linear(),
+            network: self.bilstms(),
         }
     }
 }

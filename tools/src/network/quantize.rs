@@ -10,9 +10,9 @@ mod rows;
 
 use crate::network::checkpoint::{Checkpoint, GyroNet};
 use crate::network::tensors::Tensors;
-use gyronet::model::blob::{self, Blob, HIDDEN, Topology};
-use gyronet::model::window::WINDOW;
-use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2};
+use gyronet::model::blob::{self, Blob, LINEAR_INPUTS, Shape, Topology};
+use gyronet::model::window::{FEATURES, WINDOW};
+use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2, linear::Linear};
 use gyronet::units::{AngularRate, SpecificForce};
 use serde_json::json;
 
@@ -73,25 +73,27 @@ pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), Q
     let mut report = Report::new();
     let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;
     let mut body = Vec::new();
-    for (layer, input_max) in [(1, clamp), (2, HIDDEN_MAX)] {
-        for backward in [false, true] {
-            rows::direction(
-                &mut body,
-                &checkpoint.direction(layer, backward),
-                layer,
-                input_max,
-                &mut report,
-            )?;
-        }
-    }
-    let tensors = checkpoint.tensors();
-    output(&mut body, tensors)?;
-    let provenance = provenance(tensors);
+    let (shape, tensors) = (checkpoint.shape(), checkpoint.tensors());
     let force = f64::from(SpecificForce::PER_METRE_PER_SEC2);
     let rate = f64::from(AngularRate::PER_RAD_PER_SEC);
-    let codes = [force, force, force, rate, rate, rate];
-    let lengths = (blob::file_len(provenance.len()), provenance.len());
-    let mut file = header(tensors, blob::TOPOLOGY, lengths, clamp, &codes)?;
+    let codes: [f64; FEATURES] = [force, force, force, rate, rate, rate];
+    if let Some(weights) = checkpoint.linear() {
+        linear(&mut body, weights, &codes.map(|codes| rate / codes))?;
+    }
+    if shape.units > 0 {
+        for (layer, input_max) in [(1, clamp), (2, HIDDEN_MAX)] {
+            for backward in [false, true] {
+                let weights = checkpoint.direction(layer, backward);
+                rows::direction(&mut body, &weights, layer, input_max, &mut report)?;
+            }
+        }
+        output(&mut body, tensors, shape)?;
+    }
+    let unit = f64::from(tensors.tensor("output_scale")[0]) * rate;
+    body.extend(fixed("output scale", unit)?.to_le_bytes());
+    let provenance = provenance(tensors);
+    let lengths = (shape.file_len(provenance.len()), provenance.len());
+    let mut file = header(tensors, shape.topology(), lengths, clamp, &codes)?;
     file.extend(provenance);
     file.extend(body);
     let words = seal(&mut file);
@@ -101,23 +103,40 @@ pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), Q
     Ok((file, report))
 }
 
+/// Writes the rows of the linear part; `units` of a feature make a rate code of a code of it. Rounded are the sums over
+/// the samples of each feature, from the oldest on: so a weight is off by an LSB at most, and what should add up to
+/// nothing for an input that does not change still does.
+fn linear(out: &mut Vec<u8>, weights: &[f32], units: &[f64; FEATURES]) -> Result<(), QuantizeError> {
+    for row in weights.chunks_exact(LINEAR_INPUTS) {
+        let mut sums = [(0.0, 0); FEATURES];
+        for sample in row.as_chunks::<FEATURES>().0 {
+            for (((exact, rounded), weight), unit) in sums.iter_mut().zip(sample).zip(units) {
+                *exact += f64::from(*weight) * unit * f64::from(1u32 << Linear::FRACTION_BITS);
+                let next = exact.round();
+                let step = fixed("weight of the linear part", next - f64::from(*rounded))?;
+                *rounded = fixed("sum of weights of the linear part", next)?;
+                out.extend(step.to_le_bytes());
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Writes both rows of the output layer.
-fn output(out: &mut Vec<u8>, tensors: &Tensors) -> Result<(), QuantizeError> {
-    let (error, log_scale) = tensors.tensor("fc.weight").split_at(2 * HIDDEN);
+fn output(out: &mut Vec<u8>, tensors: &Tensors, shape: Shape) -> Result<(), QuantizeError> {
+    let (error, log_scale) = tensors.tensor("fc.weight").split_at(2 * usize::from(shape.units));
     let bias = tensors.tensor("fc.bias");
     let unit = f64::from(tensors.tensor("output_scale")[0]) * f64::from(AngularRate::PER_RAD_PER_SEC);
     rows::dense(out, "gyro error", (error, bias[0]), (unit, Dense::SHIFT))?;
     // The sum over the window is the mean of the logs.
     let log2 = f64::from(1 << exp2::FRACTION_BITS) * std::f64::consts::LOG2_E / WINDOW as f64;
-    rows::dense(out, "log of the scale", (log_scale, bias[1]), (log2, Dense::SHIFT))?;
-    out.extend(fixed("output scale", unit)?.to_le_bytes());
-    Ok(())
+    rows::dense(out, "log of the scale", (log_scale, bias[1]), (log2, Dense::SHIFT))
 }
 
 /// The header that all networks have; `codes` of a feature make its unit.
 fn header(
     tensors: &Tensors,
-    [network, shape @ ..]: Topology,
+    [network, sizes @ .., linear]: Topology,
     (file_len, provenance_len): (usize, usize),
     clamp: i32,
     codes: &[f64],
@@ -126,7 +145,8 @@ fn header(
     out.extend(blob::VERSION.to_le_bytes());
     out.extend(network.to_le_bytes());
     out.extend((file_len as u32).to_le_bytes());
-    shape.iter().for_each(|number| out.extend(number.to_le_bytes()));
+    sizes.iter().for_each(|number| out.extend(number.to_le_bytes()));
+    out.extend(u32::from(linear).to_le_bytes());
     out.extend((provenance_len as u32).to_le_bytes());
     out.extend(clamp.to_le_bytes());
     let constants = tensors.tensor("input_mean").iter().zip(tensors.tensor("input_std"));

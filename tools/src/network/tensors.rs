@@ -60,6 +60,9 @@ pub enum CheckpointError {
 /// Name and shape of a tensor, as PyTorch has them.
 pub type Shape = (String, Vec<usize>);
 
+/// Returns the shape of a tensor of the file at hand, if it is there.
+pub type Found<'f> = &'f dyn Fn(&str) -> Option<Vec<usize>>;
+
 /// A vector, or a matrix by rows.
 pub(crate) fn tensor(name: &str, shape: &[usize]) -> Shape {
     (name.to_owned(), shape.to_vec())
@@ -108,27 +111,31 @@ impl Tensors {
         Ok(file.names().into_iter().map(ToString::to_string).collect())
     }
 
-    pub(crate) fn read(path: &Path, shapes: &[Shape]) -> Result<Self, CheckpointError> {
+    pub(crate) fn read(path: &Path, shapes: fn(Found<'_>) -> Vec<Shape>) -> Result<Self, CheckpointError> {
         let bytes =
             std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
         Self::parse(&path.display().to_string(), &bytes, shapes)
     }
 
-    pub(crate) fn parse(name: &str, bytes: &[u8], shapes: &[Shape]) -> Result<Self, CheckpointError> {
+    pub(crate) fn parse(
+        name: &str,
+        bytes: &[u8],
+        shapes: fn(Found<'_>) -> Vec<Shape>,
+    ) -> Result<Self, CheckpointError> {
         let format = |source| CheckpointError::Format { name: name.to_owned(), source };
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
         let file = SafeTensors::deserialize(bytes).map_err(format)?;
         let provenance =
             header.metadata().as_ref().and_then(|map| map.get("provenance")).cloned().unwrap_or_default();
         let mut tensors = BTreeMap::new();
-        for (tensor, shape) in shapes {
-            let (name, tensor) = (|| name.to_owned(), tensor.clone());
+        for (tensor, shape) in shapes(&|tensor| file.tensor(tensor).ok().map(|view| view.shape().to_vec())) {
+            let name = || name.to_owned();
             let view = file
                 .tensor(&tensor)
                 .map_err(|_| CheckpointError::Missing { name: name(), tensor: tensor.clone() })?;
             if view.dtype() != Dtype::F32 || view.shape() != shape {
                 let found = format!("{:?} {:?}", view.dtype(), view.shape());
-                return Err(CheckpointError::Shape { name: name(), tensor, found, expected: shape.clone() });
+                return Err(CheckpointError::Shape { name: name(), tensor, found, expected: shape });
             }
             let values: Vec<f32> =
                 view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
@@ -139,6 +146,11 @@ impl Tensors {
         }
         let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
         Ok(Self { tensors, provenance, sha256 })
+    }
+
+    /// Returns whether there is a tensor of this name.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.tensors.contains_key(name)
     }
 
     /// The values of a tensor, row-major.

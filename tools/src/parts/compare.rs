@@ -1,5 +1,5 @@
-//! What a part's rounding does to the corrected yaw: measured against the direct replay, and the
-//! bound that follows from the part's steps alone.
+//! A part's rounding changes the corrected yaw: the change is measured against the direct replay, and bounded from
+//! the part's steps alone.
 //!
 //! With readings rounded to steps of q, N samples of dt after static initialisation:
 //!

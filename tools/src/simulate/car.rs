@@ -19,7 +19,7 @@ pub(super) const GRAVITY: f64 = 9.80665;
 pub struct Config {
     /// Wheel radius, m: that of the recordings' car.
     pub wheel_radius: f64,
-    /// Between left and right wheels, m: a common passenger car.
+    /// Distance between left and right wheels, m: a common passenger car.
     pub track: f64,
     /// Noise of a wheel's rate, rad/s: standing wheels of the recordings show 0.005 to 0.02.
     pub wheel_noise: f64,

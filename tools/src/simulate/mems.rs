@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_without_errors_tells_the_truth() {
+    fn a_part_without_errors_reads_the_truth() {
         let nothing = Config {
             gyro_noise: 0.0,
             gyro_walk: 0.0,

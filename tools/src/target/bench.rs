@@ -136,13 +136,13 @@ pub fn target_folder() -> PathBuf {
 ///
 /// # Errors
 /// What is missing, as a sentence.
-pub fn target_installed() -> Result<(), String> {
+pub fn target_installed(target: &str) -> Result<(), String> {
     if !workspace().join("memory.x").is_file() {
         return Err("the repository that this program was built in is gone".into());
     }
     let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
     let output = Command::new(rustc)
-        .args(["--print", "target-libdir", "--target", TARGET])
+        .args(["--print", "target-libdir", "--target", target])
         .current_dir(workspace())
         .output()
         .map_err(|error| format!("rustc cannot be run: {error}"))?;
@@ -150,7 +150,7 @@ pub fn target_installed() -> Result<(), String> {
     if output.status.success() && Path::new(&folder).is_dir() {
         Ok(())
     } else {
-        Err(format!("the Rust target {TARGET} is not installed (rustup target add {TARGET})"))
+        Err(format!("the Rust target {target} is not installed (rustup target add {target})"))
     }
 }
 
@@ -159,23 +159,28 @@ pub fn target_installed() -> Result<(), String> {
 /// # Errors
 /// [`BenchError`] with the compiler's output.
 pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
-    build_for("netduino-plus-2", workspace, image, folder)
+    build_for(("netduino-plus-2", TARGET), workspace, image, folder)
 }
 
-/// Builds an image for a board, named by its feature.
+/// Builds an image for a board, named by its feature, and its target.
 ///
 /// # Errors
 /// [`BenchError`] with the compiler's output.
-pub fn build_for(board: &str, workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
+pub fn build_for(
+    (board, target): (&str, &str),
+    workspace: &Path,
+    image: &str,
+    folder: &Path,
+) -> Result<PathBuf, BenchError> {
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
     cargo.current_dir(workspace).args(["build", "--release", "--quiet", "-p", "gyronet", "--bin", image]);
     if FLASHED.contains(&image) {
         // As `cargo fw` and `cargo bringup` do.
         cargo.args(["--config", "profile.release.opt-level='s'"]);
     }
-    cargo.args(["--features", board, "--target", TARGET, "--target-dir"]).arg(folder);
+    cargo.args(["--features", board, "--target", target, "--target-dir"]).arg(folder);
     run(&mut cargo)?;
-    Ok(folder.join(TARGET).join("release").join(image))
+    Ok(folder.join(target).join("release").join(image))
 }
 
 /// Runs the bench image with the instruction counter, or without where it is not to be had.
@@ -228,8 +233,8 @@ pub fn plugin(workspace: &Path) -> Option<PathBuf> {
 /// Runs the bench image and pairs its lines with what was counted.
 fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
     let (stdout, stderr) = match plugin {
-        Some(plugin) => emulate(image, &["-plugin", &plugin.display().to_string()])?,
-        None => emulate(image, &["-icount", "shift=0"])?,
+        Some(plugin) => emulate(MACHINE, image, &["-plugin", &plugin.display().to_string()])?,
+        None => emulate(MACHINE, image, &["-icount", "shift=0"])?,
     };
     let mut regions = stderr.lines().filter(|line| line.starts_with("REGION"));
     let mut counts = Counts::default();
@@ -256,13 +261,13 @@ fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
     Ok(counts)
 }
 
-/// Runs an image that ends by itself; what it printed, and what the emulator did.
+/// Runs an image on a machine of the emulator's until it ends by itself; what it printed, and what the emulator did.
 ///
 /// # Errors
 /// [`BenchError`], also when the image reports a failure.
-pub fn emulate(image: &Path, arguments: &[&str]) -> Result<(String, String), BenchError> {
+pub fn emulate(machine: &str, image: &Path, arguments: &[&str]) -> Result<(String, String), BenchError> {
     let mut qemu = Command::new("qemu-system-arm");
-    qemu.args(["-machine", MACHINE, "-nographic", "-monitor", "none"]);
+    qemu.args(["-machine", machine, "-nographic", "-monitor", "none"]);
     qemu.args(["-serial", "none", "-semihosting-config", "enable=on,target=native"]);
     run(qemu.args(arguments).arg("-kernel").arg(image))
 }

@@ -1,4 +1,4 @@
-//! What every task and interrupt of the flashed image costs, counted while it runs in the
+//! The cost of every task and interrupt of the flashed image is counted while it runs in the
 //! emulator: one sample after the other goes in, with wheel speeds, questions on the service
 //! line and a host's commands beside it.
 

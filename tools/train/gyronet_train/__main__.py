@@ -115,7 +115,7 @@ def best_of_seeds(
 def with_scale(
     args: argparse.Namespace, drives: list[Drive], validation_drive: Drive
 ) -> tuple[GyroNet, dict]:
-    """The checkpoint's network, its scale fitted anew to the drives that it was trained on."""
+    """The checkpoint's network, its scale fitted again to the drives that it was trained on."""
     model, provenance = load_gyronet(args.scale_of)
     if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, validation_drive]}:
         raise ValueError(f"{args.scale_of}: trained or validated on other drives than these")

@@ -33,7 +33,14 @@ def load_gyronet(path: Path) -> tuple[GyroNet, dict]:
         tensors = {name: file.get_tensor(name) for name in file.keys()}
     if provenance["network"] != "gyronet":
         raise ValueError(f"{path}: holds a {provenance['network']}")
-    model = GyroNet(tensors["input_mean"], tensors["input_std"], tensors["output_scale"].item())
+    recurrent = tensors.get("lstm1.weight_hh_l0")
+    model = GyroNet(
+        tensors["input_mean"],
+        tensors["input_std"],
+        tensors["output_scale"].item(),
+        units=0 if recurrent is None else recurrent.shape[1],
+        linear=tensors.get("linear.weight"),
+    )
     model.load_state_dict(tensors)
     return model, provenance
 

@@ -1,4 +1,5 @@
-"""GyroNet of Zhao et al., section III-B: (N, 6) -> 2 x Bi-LSTM(60) -> FC 120->2 per step.
+"""GyroNet of Zhao et al., section III-B: (N, 6) -> 2 x Bi-LSTM(60) -> FC 120->2 per step; or fewer units, none,
+and a linear part of the whole window beside them (linear.py).
 
 The second output is the paper's future work, "learning uncertainty": the log of the scale of a
 Laplace error.
@@ -27,28 +28,43 @@ class GyroNet(nn.Module):
 
     steps = WINDOW
 
-    def __init__(self, input_mean: torch.Tensor, input_std: torch.Tensor, output_scale: float):
+    def __init__(
+        self,
+        input_mean: torch.Tensor,
+        input_std: torch.Tensor,
+        output_scale: float,
+        units: int = HIDDEN,
+        linear: torch.Tensor | None = None,
+    ):
+        """`units` a direction; `linear` (N, 6 N) holds the fixed weights of the linear part."""
         super().__init__()
         self.register_buffer("input_mean", input_mean.float())
         self.register_buffer("input_std", input_std.float())
         self.register_buffer("output_scale", torch.tensor([output_scale], dtype=torch.float32))
-        self.lstm1 = nn.LSTM(INPUTS, HIDDEN, batch_first=True, bidirectional=True)
-        self.lstm2 = nn.LSTM(2 * HIDDEN, HIDDEN, batch_first=True, bidirectional=True)
-        self.fc = nn.Linear(2 * HIDDEN, 2)
+        self.units = units
+        self.linear = None
+        if linear is not None:
+            self.linear = nn.Linear(linear.shape[1], linear.shape[0], bias=False)
+            self.linear.weight = nn.Parameter(linear.clone().float(), requires_grad=False)
+        if units > 0:
+            self.lstm1 = nn.LSTM(INPUTS, units, batch_first=True, bidirectional=True)
+            self.lstm2 = nn.LSTM(2 * units, units, batch_first=True, bidirectional=True)
+            self.fc = nn.Linear(2 * units, 2)
 
     def layers(self, x: torch.Tensor) -> dict[str, torch.Tensor]:
         """Every layer's output, by the names the golden tensors carry."""
         normalised = (x - self.input_mean) / self.input_std
-        layer1, _ = self.lstm1(normalised)
-        layer2, _ = self.lstm2(layer1)
-        gyro_error, log_scale = self.fc(layer2).unbind(-1)
-        return {
-            "normalised": normalised,
-            "layer1": layer1,
-            "layer2": layer2,
-            "gyro_error": gyro_error * self.output_scale,
-            "log_scale": log_scale.mean(1),
-        }
+        outputs = {"normalised": normalised}
+        gyro_error, log_scale = x.new_zeros(x.shape[:2]), x.new_zeros(x.shape[:2])
+        if self.units > 0:
+            outputs["layer1"], _ = self.lstm1(normalised)
+            outputs["layer2"], _ = self.lstm2(outputs["layer1"])
+            gyro_error, log_scale = self.fc(outputs["layer2"]).unbind(-1)
+        gyro_error = gyro_error * self.output_scale
+        if self.linear is not None:
+            outputs["linear"] = self.linear(x.flatten(1))
+            gyro_error = gyro_error + outputs["linear"]
+        return {**outputs, "gyro_error": gyro_error, "log_scale": log_scale.mean(1)}
 
     def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         outputs = self.layers(x)

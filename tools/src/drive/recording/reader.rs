@@ -53,8 +53,8 @@ impl Columns {
     }
 }
 
-/// Rows of a recording, each checked by itself and against the time of the one before. What
-/// takes the whole drive to tell, [`super::Recording`] checks.
+/// Rows of a recording, each checked by itself and against the time of the one before. [`super::Recording`]
+/// checks the drive as a whole.
 pub struct Reader<R> {
     path: String,
     columns: Columns,

@@ -32,7 +32,7 @@ impl Slow {
         Self { period: 1.0 / hz, next: 1.0 / hz, ticks: 0 }
     }
 
-    /// Over how many ticks its message averages that is due with this one, if one is.
+    /// Returns the number of ticks that the message that is now due averages over; `None` where none is due.
     fn due(&mut self, now: f64) -> Option<f64> {
         self.ticks += 1;
         if now < self.next {

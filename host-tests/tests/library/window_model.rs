@@ -1,0 +1,118 @@
+//! The window model in all its sizes: the paper's shape keeps its outputs to the bit, a smaller one gives the same in
+//! any memory that holds it, and the linear part is exact.
+
+use gyronet::model::blob::{LINEAR_INPUTS, Shape};
+use gyronet::model::gyronet::{GyroNetState, recurrent_words};
+use gyronet::model::window::{Features, WINDOW};
+use gyronet::model::{Blob, BlobError, GyroNet, SCALE_MIN, WindowNetwork, weights};
+use gyronet::nn::Aligned;
+use gyronet_host_tests::models;
+use gyronet_host_tests::noise::Noise;
+
+/// A CRC-32 over the estimates of 64 random windows, at all sizes of input.
+fn digest(network: &mut impl WindowNetwork) -> u32 {
+    let mut digest = gyronet::model::blob::CRC.digest();
+    let mut noise = Noise::new(19);
+    for round in 0..64 {
+        let size = [1 << 16, 1 << 22, 1 << 25, i64::from(i32::MAX)][round % 4];
+        let window: [Features; WINDOW] =
+            std::array::from_fn(|_| std::array::from_fn(|_| noise.int(-size, size) as i32));
+        let estimate = network.estimate(&window);
+        for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+            digest.update(&rate.0.to_le_bytes());
+        }
+        digest.update(&estimate.clamped_inputs.to_le_bytes());
+    }
+    digest.finalize()
+}
+
+/// The digest of the network that comes with the library, as the code for the paper's shape alone computed it.
+#[test]
+fn the_papers_shape_keeps_its_outputs() {
+    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights");
+    assert_eq!(digest(&mut GyroNet::new(blob)), 3_891_058_405);
+}
+
+/// A memory that is as large as a model of `U` units.
+type Memory<const U: usize, const W: usize, const R: usize> = GyroNetState<U, W, R>;
+
+/// Runs a random model in memory of its own size and in the largest one, whose arrays the paper's network used before:
+/// the same estimates, piece by piece and at once, and the newest one alone.
+fn check<const LEN: usize, const U: usize, const W: usize, const R: usize>(shape: Shape) {
+    let file = Aligned(models::file::<LEN>(shape, 4));
+    let blob = Blob::new_checked(&file.0).expect("a random model");
+    assert_eq!((blob.shape, usize::from(shape.units)), (shape, U));
+    let mut used: GyroNetState = GyroNetState::ZERO;
+    let paper = Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights");
+    digest(&mut GyroNet::with_state(paper, &mut used).expect("it is the largest"));
+    let mut large = GyroNet::with_state(blob, &mut used).expect("it is smaller");
+    let mut own = GyroNet::with_state(blob, Memory::<U, W, R>::ZERO).expect("it is of this size");
+    let mut different = 0;
+    for round in 0..40 {
+        let window = models::window(&mut models::Numbers::new(1 + round), round);
+        let estimate = own.estimate(&window);
+        assert_eq!(estimate, large.estimate(&window), "{shape:?}");
+        let newest = own.estimate_newest(&window);
+        assert_eq!(newest, (estimate.corrections[WINDOW - 1], estimate.clamped_inputs), "{shape:?}");
+        let linear = exact(&blob, &window);
+        different += u32::from(estimate.corrections.map(|rate| rate.0) != linear);
+        assert!(shape.units > 0 || estimate.clamped_inputs == 0);
+    }
+    assert_eq!(different > 0, shape.units > 0, "the linear part alone is exact; the Bi-LSTMs add to it");
+}
+
+/// What the linear part gives, in 128 bits.
+fn exact(blob: &Blob<'_>, window: &[Features; WINDOW]) -> [i32; WINDOW] {
+    let mut outputs = [0; WINDOW];
+    for (output, row) in outputs.iter_mut().zip(blob.linear.iter().flat_map(|linear| linear.rows())) {
+        assert_eq!(row.len(), LINEAR_INPUTS);
+        let products = row.iter().zip(window.as_flattened()).map(|(w, x)| i128::from(*w) * i128::from(*x));
+        let sum = (products.sum::<i128>() + (1 << 23)) >> 24;
+        *output = sum.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+    }
+    outputs
+}
+
+#[test]
+fn a_model_gives_the_same_in_any_memory_that_holds_it() {
+    macro_rules! each {
+        ($($units:literal $linear:literal),*) => {$({
+            const SHAPE: Shape = Shape { units: $units, linear: $linear };
+            const LEN: usize = SHAPE.file_len(0);
+            check::<LEN, $units, { $units / 2 }, { recurrent_words($units) }>(SHAPE);
+        })*};
+    }
+    each!(0 true, 4 true, 4 false, 8 true, 16 false, 32 true, 44 true, 60 true, 60 false);
+}
+
+#[test]
+fn a_model_that_the_memory_does_not_hold_is_refused() {
+    let paper = Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights");
+    let error = GyroNet::with_state(paper, Memory::<16, 8, { recurrent_words(16) }>::ZERO).map(|_| ());
+    assert_eq!(error, Err(BlobError::Units { found: 60, largest: 16 }));
+    assert_eq!(
+        GyroNet::with_state(paper, Memory::<0, 0, 0>::ZERO).map(|_| ()),
+        Err(BlobError::Units { found: 60, largest: 0 })
+    );
+}
+
+/// The largest weights and inputs that there are do not wrap, but saturate; a model without units has one scale.
+#[test]
+fn the_linear_part_saturates() {
+    const SHAPE: Shape = Shape { units: 0, linear: true };
+    let mut file = Aligned(models::file::<{ SHAPE.file_len(0) }>(SHAPE, 4));
+    let (header, end) = (gyronet::model::blob::HEADER_LEN, SHAPE.file_len(0) - 4);
+    for (at, weight) in file.0[header..end - 4].as_chunks_mut::<4>().0.iter_mut().enumerate() {
+        *weight = if at % LINEAR_INPUTS < 2 { i32::MAX } else { 0 }.to_le_bytes();
+    }
+    file.0[end - 4..end].fill(0);
+    let crc = gyronet::model::blob::CRC.checksum(&file.0[..end]).to_le_bytes();
+    file.0[end..].copy_from_slice(&crc);
+    let blob = Blob::new_checked(&file.0).expect("it is within its bound");
+    let mut network = GyroNet::with_state(blob, Memory::<0, 0, 0>::ZERO).expect("it has no units");
+    for (input, output) in [(i32::MAX, i32::MAX), (i32::MIN, i32::MIN), (0, 0)] {
+        let estimate = network.estimate(&[[input; 6]; WINDOW]);
+        assert_eq!(estimate.corrections.map(|rate| rate.0), [output; WINDOW]);
+        assert_eq!((estimate.scale, estimate.clamped_inputs), (SCALE_MIN, 0));
+    }
+}

@@ -1,0 +1,43 @@
+//! A linear layer computes every output from all inputs with int32 weights, exactly: nothing of an input is rounded.
+
+/// The weights of outputs over inputs, row by row, in place.
+#[derive(Debug, Clone, Copy)]
+pub struct Linear<'w> {
+    inputs: usize,
+    weights: &'w [i32],
+}
+
+impl<'w> Linear<'w> {
+    /// Fraction bits of a weight.
+    pub const FRACTION_BITS: u32 = 24;
+    /// The limit of the sum of a row's magnitudes: with it, no inputs overflow a sum of 64 bits.
+    pub const ROW_LIMIT: u64 = u32::MAX as u64;
+
+    /// Takes rows of `inputs` weights as they lie in a weight file.
+    ///
+    /// # Errors
+    /// The number of the first row that some inputs could overflow.
+    pub fn new(inputs: usize, weights: &'w [i32]) -> Result<Self, usize> {
+        let layer = Self { inputs, weights };
+        let magnitude = |row: &[i32]| row.iter().map(|weight| u64::from(weight.unsigned_abs())).sum::<u64>();
+        match layer.rows().position(|row| magnitude(row) > Self::ROW_LIMIT) {
+            Some(row) => Err(row),
+            None => Ok(layer),
+        }
+    }
+
+    /// Returns the rows, one for each output.
+    pub fn rows(&self) -> impl Iterator<Item = &'w [i32]> {
+        self.weights.chunks_exact(self.inputs.max(1))
+    }
+
+    /// Returns a row's output, rounded to nearest and saturated.
+    #[must_use]
+    pub fn output(row: &[i32], inputs: &[i32]) -> i32 {
+        let start = 1 << (Self::FRACTION_BITS - 1);
+        // At most (2^32 - 1) 2^31 and the half in magnitude, which 2^63 is more than.
+        let products = row.iter().zip(inputs).map(|(weight, input)| i64::from(*weight) * i64::from(*input));
+        let sum = products.fold(start, i64::wrapping_add) >> Self::FRACTION_BITS;
+        sum.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+    }
+}

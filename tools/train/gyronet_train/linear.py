@@ -1,0 +1,214 @@
+"""python -m gyronet_train.linear DATA --out FOLDER: fit the linear part of a window model to a folder of drives.
+
+The linear part is a filter of eleven taps around a sample: what it takes off the yaw gyro is the unit's
+mounting (roll and pitch rate), its gain, and what the reference does not see of its noise (differences of
+neighbouring gyro and accelerometer samples). A difference of neighbours adds nothing for an input that does
+not change, so the accelerometer's level and a constant error have no part in it (`PARTS`).
+
+The fit is by absolute errors of the yaw change over any second, the number that the tools print. Each drive
+is predicted by the filter of the others: the report has mean and standard deviation of those ratios to static
+initialisation, part by part. What is written is fitted to all drives. Needs numpy and safetensors alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+from pathlib import Path
+
+import numpy as np
+from safetensors.numpy import save_file
+
+from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, load_drive, mean_1s_error, windows
+
+HOP = 5
+REACH = 5
+FEATURES = 6
+ROLL, PITCH, YAW = 3, 4, 5
+TAPS = 2 * REACH + 1
+RIDGE = 1e-6
+ITERATIONS = 30
+SMALLEST_ERROR = 1e-6  # rad: where an absolute error counts as a squared one
+STEP = 5  # samples between the seconds that are fitted
+GYRO_GRID, FORCE_GRID = 2.0**-22, 2.0**-28  # steps of weights whose sums float32 holds exactly
+
+
+def level(feature: int) -> np.ndarray:
+    """A filter (TAPS, FEATURES) that takes the sample itself."""
+    taps = np.zeros((1, TAPS, FEATURES))
+    taps[0, REACH, feature] = 1.0
+    return taps
+
+
+def differences(feature: int) -> np.ndarray:
+    """The filters that take the difference of two neighbours."""
+    taps = np.zeros((TAPS - 1, TAPS, FEATURES))
+    for k in range(TAPS - 1):
+        taps[k, k, feature], taps[k, k + 1, feature] = -1.0, 1.0
+    return taps
+
+
+PARTS = {
+    "mounting": np.concatenate([level(ROLL), level(PITCH)]),
+    "low pass": differences(YAW),
+    "accelerometer": np.concatenate([differences(axis) for axis in range(3)]),
+    "gain": level(YAW),
+}
+
+
+def seconds(series: np.ndarray) -> np.ndarray:
+    """Sums over each second that begins STEP samples after another: (T, ...) -> (S, ...), times the period."""
+    total = np.concatenate([np.zeros_like(series[:1]), np.cumsum(series, axis=0)])
+    return (total[RATE_HZ:] - total[:-RATE_HZ])[::STEP] / RATE_HZ
+
+
+def neighbours(drive: Drive) -> np.ndarray:
+    """Each sample with REACH on both sides, the ends repeated: (T, TAPS, FEATURES)."""
+    padded = np.pad(drive.features.astype(np.float64), ((REACH, REACH), (0, 0)), mode="edge")
+    return windows(padded, TAPS)
+
+
+def sums(drive: Drive, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of each second: what every filter of the basis makes of it, and the gyro's error."""
+    inputs = np.tensordot(neighbours(drive), basis, axes=([1, 2], [1, 2]))
+    return seconds(inputs[STATIC_SAMPLES:]), seconds(drive.gyro_error[STATIC_SAMPLES:].astype(np.float64))
+
+
+def fit(drives: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray) -> np.ndarray:
+    """The filter of the basis (TAPS, FEATURES) with the least absolute errors on the sums of some drives."""
+    inputs, errors = (np.concatenate(part) for part in zip(*drives))
+    size = np.sqrt((inputs**2).mean(axis=0))
+    inputs = inputs / size
+    weight = np.ones(len(errors))
+    for _ in range(ITERATIONS):
+        weighted = inputs * weight[:, None] / weight.sum()
+        normal = weighted.T @ inputs + RIDGE * np.eye(len(size))
+        solution = np.linalg.solve(normal, weighted.T @ errors)
+        weight = 1 / np.maximum(abs(errors - inputs @ solution), SMALLEST_ERROR)
+    return np.tensordot(solution / size, basis, axes=1)
+
+
+def on_grid(taps: np.ndarray) -> np.ndarray:
+    """Rounds the running sums of each feature's taps, so that what adds up to zero still does, exactly."""
+    grid = np.array([FORCE_GRID] * 3 + [GYRO_GRID] * 3)
+    running = np.round(np.cumsum(taps, axis=-2) / grid) * grid
+    return np.diff(running, axis=-2, prepend=0.0)
+
+
+def rows(taps: np.ndarray) -> np.ndarray:
+    """The outputs of a window (WINDOW, WINDOW, FEATURES) whose overlap is the filter.
+
+    A sample is estimated at place k of one window and at place k + HOP of the one before; the mean of both is the
+    filter's output. A tap that only one of them sees has twice its weight there. What that adds to or takes from
+    the sum of its taps is made up for by those that both see, so that each row alone has the filter's sum.
+    """
+    outputs = np.zeros((WINDOW, WINDOW, FEATURES))
+    for k in range(HOP):
+        ahead, behind = np.zeros_like(taps), np.zeros_like(taps)
+        shared = slice(REACH - k, REACH - k + WINDOW - HOP)
+        ahead[shared.stop :] = 2 * taps[shared.stop :]
+        behind[: shared.start] = 2 * taps[: shared.start]
+        missing = taps.sum(axis=0) - ahead.sum(axis=0) - taps[shared].sum(axis=0)
+        ahead[shared] = taps[shared] + missing / (WINDOW - HOP)
+        behind[shared] = taps[shared] - missing / (WINDOW - HOP)
+        # The window's first sample is k before this one.
+        place(outputs[k], ahead, k)
+        place(outputs[k + HOP], behind, k + HOP)
+    return on_grid(outputs)
+
+
+def place(row: np.ndarray, taps: np.ndarray, k: int) -> None:
+    """Writes the taps around sample k into a window's row (WINDOW, FEATURES)."""
+    for tap in range(TAPS):
+        if 0 <= k + tap - REACH < WINDOW:
+            row[k + tap - REACH] = taps[tap]
+
+
+def corrections(outputs: np.ndarray, drive: Drive) -> np.ndarray:
+    """Outputs (W, WINDOW) of the windows HOP apart."""
+    return np.tensordot(windows(drive.features)[::HOP].astype(np.float64), outputs, axes=([1, 2], [1, 2]))
+
+
+def rate_error(outputs: np.ndarray, drive: Drive) -> np.ndarray:
+    """The error (T,) of the rate that the overlap's mean corrects."""
+    total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
+    estimates = corrections(outputs, drive)
+    for k in range(WINDOW):
+        samples = np.arange(len(estimates)) * HOP + k
+        total[samples] += estimates[:, k]
+        count[samples] += 1
+    return drive.gyro_error - total / np.maximum(count, 1)
+
+
+def ratio(outputs: np.ndarray, drive: Drive) -> float:
+    """The 1 s error over static initialisation's."""
+    return mean_1s_error(rate_error(outputs, drive)) / mean_1s_error(drive.gyro_error)
+
+
+def leave_one_out(drives: list[Drive], basis: np.ndarray) -> list[float]:
+    """The ratio of each drive, by the filter of the others."""
+    made = [sums(drive, basis) for drive in drives]
+    others = (made[:k] + made[k + 1 :] for k in range(len(drives)))
+    return [ratio(rows(fit(rest, basis)), drive) for rest, drive in zip(others, drives)]
+
+
+def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:
+    """The mean |error| of the mean of a window's corrected rates, rad/s, after the static phase."""
+    from_static = slice(STATIC_SAMPLES // HOP, None)
+    errors = [
+        (windows(d.gyro_error)[::HOP] - corrections(outputs, d)).mean(axis=1)[from_static] for d in drives
+    ]
+    return float(abs(np.concatenate(errors)).mean())
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="gyronet_train.linear", description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of trialNN_100hz.csv drives")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors file")
+    parser.add_argument("--stem", default="linear_window", help="name of the file")
+    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
+    return parser.parse_args()
+
+
+def main() -> None:
+    args = arguments()
+    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in args.train]
+    print("1 s error over static initialisation's, each drive by the filter of the others: mean, standard deviation")
+    report = {}
+    for count in range(1, len(PARTS) + 1):
+        names = " + ".join(list(PARTS)[:count])
+        basis = np.concatenate(list(PARTS.values())[:count])
+        ratios = leave_one_out(drives, basis)
+        report[names] = [round(float(np.mean(ratios)), 4), round(float(np.std(ratios, ddof=1)), 4)]
+        each = " ".join(f"{ratio:.3f}" for ratio in ratios)
+        print(f"  {names}, {len(basis)} numbers: {report[names][0]:.3f} {report[names][1]:.3f} ({each})")
+    basis = np.concatenate(list(PARTS.values()))
+    taps = fit([sums(drive, basis) for drive in drives], basis)
+    outputs = rows(taps)
+    roll, pitch, gain = taps.sum(axis=0)[[ROLL, PITCH, YAW]]
+    print(f"mounting {roll:+.5f} of roll rate, {pitch:+.5f} of pitch rate; gain {gain:+.5f}")
+    features = np.concatenate([drive.features for drive in drives])
+    tensors = {
+        "input_mean": features.mean(axis=0),
+        "input_std": features.std(axis=0),
+        "output_scale": np.array([window_error(outputs, drives)]),
+        "linear.weight": outputs.reshape(WINDOW, WINDOW * FEATURES),
+    }
+    provenance = {
+        "network": "gyronet",
+        "parts": "linear",
+        "train": [drive.name for drive in drives],
+        "sha256": {drive.name: drive.sha256 for drive in drives},
+        "leave_one_out_to_static": report,
+        "date": datetime.date.today().isoformat(),
+    }
+    args.out.mkdir(parents=True, exist_ok=True)
+    path = args.out / f"{args.stem}.safetensors"
+    metadata = {"provenance": json.dumps(provenance, sort_keys=True)}
+    save_file({name: np.ascontiguousarray(t, np.float32) for name, t in tensors.items()}, path, metadata)
+    print(path)
+
+
+if __name__ == "__main__":
+    main()
