@@ -50,7 +50,7 @@ mod firmware {
         };
         let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return false };
         coprocessor.configure(&Config::DEFAULT);
-        let mut network = GyroNet::with_state(weights, state);
+        let Ok(mut network) = GyroNet::with_state(weights, state) else { return false };
         let mut imu = Serial::new(Port::default(), Mti::new());
         let (mut queue, mut can) = (TransmitQueue::new(), Bus::default());
         for sample in 0..SAMPLES {

@@ -24,6 +24,8 @@ const FOG: usize = 3;
 pub const USARTS: usize = qemu::SERVICE;
 /// The gyro sends so many messages in 10 ms.
 const MESSAGES: usize = 10;
+/// The gyro's resolution, rad.
+const STEP: f64 = 4e-8;
 /// A sample of the MTi makes so many frames.
 const SET: usize = 6;
 /// TX1 begins like this when the sensor is silent: no rate, failed.
@@ -65,9 +67,9 @@ impl Step {
 /// Returns each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
 #[must_use]
 pub fn reading(number: usize, row: &Row) -> f32 {
-    // No gyro says the same for long.
-    let noise = if number.is_multiple_of(2) { 1e-8 } else { -1e-8 };
-    (row.reference * 0.01 / MESSAGES as f64 + noise) as f32
+    // No gyro says the same for long: a reading is never the one before.
+    let noise = if number.is_multiple_of(2) { STEP / 4.0 } else { -STEP / 4.0 };
+    ((row.reference * 0.01 / MESSAGES as f64 / STEP).round() * STEP + noise) as f32
 }
 
 /// Returns the bytes that the gyro sends in the 10 ms that end with a row. It begins with the message that ends with

@@ -212,7 +212,7 @@ impl Board {
 
     /// Takes a wheel frame.
     pub fn wheel(&mut self, frame: &DataFrame) {
-        // What is wrong with one, the wheels' silence tells.
+        // A wrong one shows as the wheels' silence.
         let _ = self.coprocessor.can(frame, self.now);
     }
 
@@ -222,6 +222,8 @@ impl Board {
             self.dsp1760.receive(*byte);
             while let Some(sample) = self.dsp1760.next_sample() {
                 if let Ok(sample) = sample {
+                    // Silence may fall before this sample or behind it.
+                    self.follow();
                     // What has no place in time is counted.
                     let _ = self.coprocessor.fog(sample, self.now);
                     self.follow();

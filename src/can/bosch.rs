@@ -87,7 +87,7 @@ pub enum Tx1Error {
     /// The checksum does not fit.
     #[error("TX1 checksum is {received:02x}, should be {computed:02x}")]
     Crc {
-        /// Over bytes 0 to 6.
+        /// The checksum of bytes 0 to 6.
         computed: u8,
         /// Byte 7.
         received: u8,

@@ -40,7 +40,7 @@ pub enum Fault {
     /// The CRC does not fit: damaged, or not the data that were meant (identifier).
     #[error("E2E: CRC is {received:x}, should be {computed:x}")]
     Crc {
-        /// Over what was received.
+        /// The CRC of the received data.
         computed: u16,
         /// The value as received.
         received: u16,

@@ -4,7 +4,7 @@
 //! The bytes do not say whether rotations are increments or rates, radians or degrees: that is
 //! [`Dsp1760Config`]. Format A and C carry no time, only a sequence number; their time is the
 //! number of messages, lost ones included, times the period. A loss of 128 messages or more is
-//! not seen in a number that wraps at 128; format B tells it, or the arrival times do
+//! not seen in a number that wraps at 128; the time stamps of format B show it, or the arrival times do
 //! ([`crate::align`]).
 
 mod clock;

@@ -108,7 +108,7 @@ fn level(force: [SpecificForce; 3], mounting: &Mounting) -> Result<Level, Calibr
     let rotation = mounting.rotation().unwrap_or(Rotation::IDENTITY);
     let [x, y, z] = rotation.force(force).map(|axis| axis.0 as f32);
     let roll_deg = libm::atan2f(y, z).to_degrees();
-    let pitch_deg = libm::atan2f(-x, libm::hypotf(y, z)).to_degrees();
+    let pitch_deg = libm::atan2f(-x, crate::root::sqrt(y * y + z * z)).to_degrees();
     let worst = libm::fabsf(roll_deg).max(libm::fabsf(pitch_deg));
     if worst > MAX_TILT_DEG {
         Err(CalibrationFault::Tilted(worst))

@@ -166,7 +166,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Answers a request.
     fn handle(&mut self, request: &Request, counters: &AllCounters) -> Reply {
-        if let Some(reply) = self.tell(request, counters) {
+        if let Some(reply) = self.reply(request, counters) {
             return reply;
         }
         match (self.act(request), self.uploading) {
@@ -180,7 +180,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Answers a question.
     #[inline(never)]
-    fn tell(&self, request: &Request, counters: &AllCounters) -> Option<Reply> {
+    fn reply(&self, request: &Request, counters: &AllCounters) -> Option<Reply> {
         Some(match request {
             Request::Info => Reply::Info(self.info()),
             Request::GetConfiguration => Reply::Configuration {

@@ -1,4 +1,4 @@
-//! What a board says is printed as sentences, with the cause in them.
+//! A board's answers are printed as sentences, with the cause in them.
 
 use gyronet::health::Status;
 use gyronet::service::calibrate::CalibrationFault;

@@ -1,7 +1,8 @@
 //! Weight files of both networks, as the checks of an upload see them.
 
 use super::{Seed, byte, take};
-use gyronet::model::blob::{Blob, CRC, HEADER_LEN};
+use crate::models;
+use gyronet::model::blob::{Blob, CRC, HEADER_LEN, Shape};
 use gyronet::model::fognet_blob::FogBlob;
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{GyroNet, WindowNetwork, weights};
@@ -35,10 +36,17 @@ fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
     Some(words)
 }
 
-/// Takes bytes as a file, or as changes of the built-in one. What is accepted runs at the limits of its
-/// inputs without an overflow (which panics where these checks run).
+/// A small model with a linear part.
+const SMALL: Shape = Shape { units: 8, linear: true };
+static SMALL_FILE: [u8; SMALL.file_len(0)] = models::file(SMALL, 5);
+
+/// Takes bytes as a file, or as changes of the built-in one or of a small one, as the first byte says. What is
+/// accepted runs at the limits of its inputs without an overflow (which panics where these checks run).
 pub fn gyronet(data: &[u8]) {
-    let file = &weights::DEFAULT.0;
+    let file: &[u8] = match data {
+        [first, ..] if first & 2 > 0 => &SMALL_FILE,
+        _ => &weights::DEFAULT.0,
+    };
     match patched(data, file) {
         None => {
             let content = &data[data.len().min(1)..];
@@ -81,9 +89,11 @@ pub fn seeds() -> Vec<Seed> {
     vec![
         ("header", [&[0][..], header].concat()),
         ("untouched", vec![1]),
-        ("clamp", one(24, &[0xFF, 0x7F, 0, 0])),
+        ("clamp", one(28, &[0xFF, 0x7F, 0, 0])),
         ("topology", one(12, &[11, 0])),
         ("weights", [one(2_000, &[0x7F; 8]), change(40_000, &[0x80; 8])].concat()),
-        ("provenance", one(80, &[0xFF, 0xFE])),
+        ("provenance", one(84, &[0xFF, 0xFE])),
+        ("small", [&[3][..], &change(2_000, &[0x7F; 8]), &change(4_000, &[0x80; 8])].concat()),
+        ("linear", [&[3][..], &change(HEADER_LEN, &[0xFF, 0xFF, 0xFF, 0x7F, 0, 0, 0, 0x80])].concat()),
     ]
 }

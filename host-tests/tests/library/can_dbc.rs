@@ -13,13 +13,12 @@ use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
-const DBC: &str = include_str!("../../../tools/gyronet.dbc");
 const ALL: Settings = Settings { vdc2: Some(Vdc2Settings { source: 0x80 }), ..Settings::DEFAULT };
 
-fn dbc() -> Dbc {
-    Dbc::try_from(DBC).expect("a DBC file")
-}
+static DBC: LazyLock<Dbc> =
+    LazyLock::new(|| Dbc::try_from(include_str!("../../../tools/gyronet.dbc")).expect("a DBC file"));
 
 fn message_id(id: Id) -> MessageId {
     match id {
@@ -28,9 +27,9 @@ fn message_id(id: Id) -> MessageId {
     }
 }
 
-fn message(dbc: &Dbc, id: Id) -> &Message {
+fn message(id: Id) -> &'static Message {
     let id = message_id(id);
-    dbc.messages.iter().find(|message| message.id == id).expect("a message of the file")
+    DBC.messages.iter().find(|message| message.id == id).expect("a message of the file")
 }
 
 fn number(value: NumericValue) -> f64 {
@@ -51,8 +50,8 @@ fn raw(signal: &Signal, data: &[u8]) -> i64 {
 }
 
 /// Returns every signal of a frame by its name, raw and physical.
-fn decode(dbc: &Dbc, frame: &DataFrame) -> BTreeMap<String, (i64, f64)> {
-    let signals = &message(dbc, frame.id()).signals;
+fn decode(frame: &DataFrame) -> BTreeMap<String, (i64, f64)> {
+    let signals = &message(frame.id()).signals;
     let decoded = signals.iter().map(|signal| {
         let raw = raw(signal, frame.data());
         (signal.name.clone(), (raw, raw as f64 * signal.factor + signal.offset))
@@ -66,24 +65,23 @@ fn encoder() -> CanEncoder {
 
 #[test]
 fn the_file_has_every_message_with_its_cycle_time() {
-    let dbc = dbc();
     let config = Config::new(ALL).expect("checked");
     let fog =
         FOG_IDS.map(|id| Periodic { id: Id::Standard(StandardId::new(id).expect("11 bits")), period_ms: 10 });
     let sent: Vec<Periodic> = config.messages().iter().copied().chain(fog).collect();
-    assert_eq!(dbc.messages.len(), sent.len());
+    assert_eq!(DBC.messages.len(), sent.len());
     for sent in sent {
-        let message = message(&dbc, sent.id);
+        let message = message(sent.id);
         assert_eq!(message.size, 8);
-        let cycle = dbc.message_attribute(message.id, "GenMsgCycleTime");
+        let cycle = DBC.message_attribute(message.id, "GenMsgCycleTime");
         assert_eq!(cycle, Some(&AttributeValue::Uint(sent.period_ms.into())), "{}", message.name);
-        assert!(dbc.message_comment(message.id).is_some(), "{}", message.name);
+        assert!(DBC.message_comment(message.id).is_some(), "{}", message.name);
     }
 }
 
 #[test]
 fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
-    for message in &dbc().messages {
+    for message in &DBC.messages {
         let mut taken = 0u64;
         for signal in &message.signals {
             let bits = ((1u64 << signal.size) - 1) << signal.start_bit;
@@ -106,9 +104,8 @@ fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
 
 #[test]
 fn value_tables_are_our_enumerations() {
-    let dbc = dbc();
     let table = |id: u16, name: &str| -> Vec<(i64, String)> {
-        let table = dbc.value_descriptions_for_signal(MessageId::Standard(id), name).expect("a table");
+        let table = DBC.value_descriptions_for_signal(MessageId::Standard(id), name).expect("a table");
         table.iter().map(|value| (value.id, value.description.to_lowercase())).collect()
     };
     let named = |code: u8, name: &str| (i64::from(code), name.to_owned());
@@ -139,7 +136,6 @@ fn value_tables_are_our_enumerations() {
 
 #[test]
 fn each_fault_has_its_bit() {
-    let dbc = dbc();
     for (name, fault) in [
         ("Fault_Gap", Faults::GAP),
         ("Fault_Clipped", Faults::CLIPPED),
@@ -152,7 +148,7 @@ fn each_fault_has_its_bit() {
     ] {
         let data = AngleMessage { yaw: 0, faults: fault }.emit();
         let id = embedded_can::StandardId::new(0x1A1).expect("11 bits");
-        let decoded = decode(&dbc, &DataFrame::new(id, &data).expect("eight bytes"));
+        let decoded = decode(&DataFrame::new(id, &data).expect("eight bytes"));
         let set: Vec<_> =
             decoded.iter().filter(|(name, (raw, _))| name.starts_with("Fault_") && *raw == 1).collect();
         assert_eq!(set.len(), 1);
@@ -214,14 +210,8 @@ fn close(a: f64, b: f64, tolerance: f64) {
 }
 
 /// One message of the Bosch set against the file and against the sample it was made from.
-fn compare_bosch(
-    dbc: &Dbc,
-    frame: &DataFrame,
-    names: [&str; 6],
-    due: (AngularRate, SpecificForce),
-    tick: u32,
-) {
-    let decoded = decode(dbc, frame);
+fn compare_bosch(frame: &DataFrame, names: [&str; 6], due: (AngularRate, SpecificForce), tick: u32) {
+    let decoded = decode(frame);
     let message = bosch::Message::parse(frame.data()).expect("checksum");
     let [rate, rate_status, force, force_status, counter, crc] = names.map(|name| decoded[name]);
     assert_eq!(rate.0, i64::from(message.rate));
@@ -242,11 +232,10 @@ fn compare_bosch(
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// What the file makes of every frame is what the codecs make of it, and what was put in.
+    /// The file decodes every frame to what the codecs decode, and to what was put in.
     #[test]
     fn frames_mean_what_the_file_says(samples in proptest::collection::vec(any_sample(), 1..4)) {
-        let dbc = dbc();
-        let mut encoder = encoder();
+            let mut encoder = encoder();
         for sample in &samples {
             let frames = encoder.encode(sample);
             let [tx1, tx2, tx3, rate, angle, detail, vdc2] = frames.as_slice() else {
@@ -255,24 +244,24 @@ proptest! {
             let [forward, left, up] = sample.specific_force;
             let negated = AngularRate(-sample.roll_rate.0);
             let names = ["YawRate", "YawRate_STAT", "AY", "AY_STAT", "MSG_CNT_TX1", "CRC_TX1"];
-            compare_bosch(&dbc, tx1, names, (sample.prompt.rate, left), sample.tick);
+            compare_bosch(tx1, names, (sample.prompt.rate, left), sample.tick);
             let names = ["RollRate", "RollRate_STAT", "AX", "AX_STAT", "MSG_CNT_TX2", "CRC_TX2"];
-            compare_bosch(&dbc, tx2, names, (negated, forward), sample.tick);
+            compare_bosch(tx2, names, (negated, forward), sample.tick);
             let names = ["PitchRate", "PitchRate_STAT", "AZ", "AZ_STAT", "MSG_CNT_TX3", "CRC_TX3"];
-            compare_bosch(&dbc, tx3, names, (sample.pitch_rate, up), sample.tick);
+            compare_bosch(tx3, names, (sample.pitch_rate, up), sample.tick);
             if let Some(CentiCelsius(centi)) = sample.temperature && (-5000..=15_000).contains(&centi) {
-                close(decode(&dbc, tx1)["TEMP"].1, f64::from(centi) / 100.0, 0.51);
+                close(decode(tx1)["TEMP"].1, f64::from(centi) / 100.0, 0.51);
             }
 
             for (frame, name) in [(rate, "Rate"), (angle, "Angle"), (detail, "Detail")] {
-                let decoded = decode(&dbc, frame);
+                let decoded = decode(frame);
                 let [crc, counter, samples, ..] = frame.data() else { continue };
                 prop_assert_eq!(decoded[&format!("{name}_CRC")].0, i64::from(*crc));
                 prop_assert_eq!(decoded[&format!("{name}_Counter")].0, i64::from(*counter));
                 prop_assert_eq!(decoded[&format!("{name}_SampleCounter")].0, i64::from(*samples));
             }
 
-            let decoded = decode(&dbc, rate);
+            let decoded = decode(rate);
             let message = RateMessage::parse(rate.data()).expect("a rate message");
             prop_assert_eq!(decoded["Rate"].0, i64::from(message.rate));
             prop_assert_eq!(decoded["Source"].0, sample.navigation.source as i64);
@@ -282,12 +271,12 @@ proptest! {
                 close(sent, sample.navigation.rate.rad_per_sec().to_degrees(), 1.1e-6);
             }
 
-            let decoded = decode(&dbc, angle);
+            let decoded = decode(angle);
             let message = AngleMessage::parse(angle.data()).expect("an angle message");
             prop_assert_eq!(decoded["Yaw"].0, i64::from(message.yaw));
             close(decoded["Yaw"].1, message.deg(), 1e-12);
 
-            let decoded = decode(&dbc, detail);
+            let decoded = decode(detail);
             let message = DetailMessage::parse(detail.data()).expect("a detail message");
             prop_assert_eq!(decoded["Correction"].0, i64::from(message.correction));
             prop_assert_eq!(decoded["ExpectedError"].0, i64::from(message.sigma));
@@ -304,7 +293,7 @@ proptest! {
                 close(decoded["Latency"].1, f64::from(us) / 1000.0, 0.5);
             }
 
-            let decoded = decode(&dbc, vdc2);
+            let decoded = decode(vdc2);
             let message = Vdc2::parse(vdc2.data()).expect("eight bytes");
             prop_assert_eq!(decoded["YawRate_VDC2"].0, i64::from(message.yaw_rate));
             prop_assert_eq!(decoded["SteerWhlAngle"].0, 0xFFFF);

@@ -186,7 +186,8 @@ fn a_bounded_carry_is_spread_and_not_lost() {
     }
 }
 
-/// A window may change the estimate of a sample whose rate has gone out as zero: then what standing took off it changes.
+/// A window may change the estimate of a sample whose rate has gone out as zero: then what standing took off it
+/// changes.
 #[test]
 fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
     const ALL: u32 = 400;

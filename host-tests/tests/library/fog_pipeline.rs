@@ -99,8 +99,8 @@ fn a_gyro_that_says_the_same_is_stuck() {
     assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
 }
 
-/// On the grid equal increments have unequal sums, because one that straddles two steps is split and rounded: a clock
-/// that is off must not hide that they are equal.
+/// Equal increments have unequal sums on the grid, because one that straddles two steps is split and rounded: a
+/// clock that is off must not hide that they are equal.
 #[test]
 fn a_stuck_gyro_is_found_while_its_clock_drifts() {
     for ppm in [-20_000_i64, -137, 0, 137, 20_000] {
@@ -170,7 +170,8 @@ fn nothing_is_sent_of_a_gyro_that_was_never_heard() {
     assert!(run(&mut fog, 1..101, |_| false).is_empty());
 }
 
-/// An increment that straddles two steps is in both: the one that holds the end of the last equal increment is stuck, too.
+/// An increment that straddles two steps is in both: the one that holds the end of the last equal increment is stuck,
+/// too.
 #[test]
 fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
     let mut fog = FogPipeline::new(FogConfig::DEFAULT, true);

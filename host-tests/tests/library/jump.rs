@@ -129,7 +129,7 @@ fn a_refused_reading_is_not_what_the_next_one_is_held_against() {
     assert_believed(&drive.off_by(2, RATE_LIMIT), "one limit off");
 }
 
-/// After 50 ms without a sample the last reading says nothing of the next.
+/// The last reading says nothing of the next one after 50 ms without a sample.
 #[test]
 fn across_a_gap_any_reading_is_believed() {
     for (missing, refused) in [(4, true), (5, false)] {

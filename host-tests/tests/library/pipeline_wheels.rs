@@ -1,5 +1,4 @@
-//! What wheel speeds do in the pipeline: no static initialisation while they turn, and a fault
-//! when they fall silent.
+//! The pipeline does not initialise while the wheels turn, and reports a fault when they fall silent.
 
 use embedded_can::{Frame, StandardId};
 use gyronet::bias::StaticError;

@@ -159,7 +159,7 @@ const LAYOUT_1: &[u8] = &[
     245, 61, 88, 202, 178, 61, 2, 5, 7, 208, 238, 217, 6, 160, 210, 130, 67, 154, 250, 157, 2,
 ];
 
-/// What is stored stays stored when the firmware is replaced.
+/// Stored records stay when the firmware is replaced.
 #[test]
 fn an_older_layout_is_read() {
     let flash = Flash::default();

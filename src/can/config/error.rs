@@ -32,7 +32,7 @@ pub enum ConfigError {
     /// A J1939 node cannot have this address.
     #[error("{0} is no J1939 source address")]
     SourceAddress(u8),
-    /// Over 80 % of the bus.
+    /// The messages take over 80 % of the bus.
     #[error("the messages are {}.{} % of the bus", .per_mille / 10, .per_mille % 10)]
     Overload {
         /// Bus load at worst, 1/1000.

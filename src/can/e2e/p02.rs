@@ -8,7 +8,7 @@ use super::header::ShortHeader;
 const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_AUTOSAR);
 /// The counter takes all values of the nibble.
 pub(super) const COUNTERS: u16 = 16;
-/// With the identifier this is at most 127 bits, the order of the polynomial.
+/// The longest message: with the identifier it has at most 127 bits, the order of the polynomial.
 const MAX_LEN: usize = 14;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 

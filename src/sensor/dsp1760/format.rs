@@ -7,7 +7,7 @@ pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Format {
-    /// Without time stamp.
+    /// The message has no time stamp.
     A,
     /// The message has a time stamp.
     B,

@@ -77,7 +77,7 @@ impl ResetValues {
         self.values.get(&(module.clone(), register.to_owned())).copied()
     }
 
-    /// Tells whether an instance or a module has this name.
+    /// Returns whether an instance or a module has this name.
     pub fn knows(&self, peripheral: &str) -> bool {
         self.modules.contains_key(peripheral)
     }

@@ -1,0 +1,89 @@
+//! A calibration runs at standstill, and its result is stored when that is asked for.
+
+use super::{Board, ask, sample, set, start};
+use gyronet::health::Status;
+use gyronet::sample::Standstill;
+use gyronet::service::calibrate::{CalibrationFault, State, Task};
+use gyronet::service::frame::{MAX_FRAME, emit};
+use gyronet::service::message::{Calibrate, Origin, Refusal};
+use gyronet::service::{Reply, Request};
+use gyronet::store::{Configuration, Mounting};
+use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet_host_tests::flash::F405;
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// Runs a calibration to its end.
+fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> State {
+    assert_eq!(ask(board, &Request::Calibrate(Calibrate::Start(task))), Reply::Done);
+    for k in 0..301u64 {
+        let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
+        board.observe(Some(&sample(k, force, rate)), k as u32, Status::Ready, Standstill::Still);
+    }
+    match ask(board, &Request::GetCalibration) {
+        Reply::Calibration { state, .. } => state,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn calibration_is_found_and_kept() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    let store = Request::Calibrate(Calibrate::Store);
+    assert_eq!(ask(&mut board, &store), Reply::Refused(Refusal::NothingFound));
+    let level = [0.0, 0.0, 9.81];
+    assert_eq!(
+        calibrate(&mut board, Task::Static, level, 0.3),
+        State::Failed(Task::Static, CalibrationFault::Moving(0))
+    );
+    assert_eq!(ask(&mut board, &store), Reply::Refused(Refusal::NothingFound));
+    assert_eq!(calibrate(&mut board, Task::Static, level, 0.001), State::Found(Task::Static));
+    assert_eq!(ask(&mut board, &store), Reply::Done);
+    // Rolled by 30 deg: gravity shows on y.
+    let tilted = [0.0, 9.81 * 0.5, 9.81 * 0.866_025_4];
+    assert_eq!(calibrate(&mut board, Task::Mounting, tilted, 0.001), State::Found(Task::Mounting));
+    assert_eq!(ask(&mut board, &store), Reply::Done);
+    assert_eq!(
+        calibrate(&mut board, Task::Mounting, [9.81, 0.0, 0.0], 0.001),
+        State::Failed(Task::Mounting, CalibrationFault::Tilted(90.0))
+    );
+    let board = start(&flash);
+    let calibration = board.calibration();
+    let level = calibration.level.expect("it was stored");
+    assert!((level.roll_deg - 30.0).abs() < 1e-3 && level.pitch_deg.abs() < 1e-3, "{level:?}");
+    let bias = calibration.gyro_bias.expect("it was stored");
+    assert!(bias.iter().all(|rate| (rate.rad_per_sec() - 0.01).abs() < 1e-5), "{bias:?}");
+}
+
+#[test]
+fn configured_rotation_comes_first() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mounting = Mounting { roll_deg: 180.0, pitch_deg: 0.0, yaw_deg: 90.0 };
+    ask(&mut start(&flash), &set(Configuration { mounting, ..Configuration::DEFAULT }));
+    let mut board = start(&flash);
+    // Upside down and turned: gravity shows as -z, and the small force along the sensor's -x is
+    // the vehicle's -y.
+    let state = calibrate(&mut board, Task::Mounting, [-0.5, 0.0, -9.8], 0.001);
+    assert_eq!(state, State::Found(Task::Mounting));
+    let level = board.calibration().level.expect("it was found");
+    assert!((level.roll_deg + 2.9206).abs() < 1e-3 && level.pitch_deg.abs() < 1e-3, "{level:?}");
+}
+
+#[test]
+fn calibration_fits_its_frame() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    let mut calibration = gyronet::store::Calibration::default();
+    for k in 0..8 {
+        calibration.add_bias([AngularRate(-(1 << 27)); 3], Some(CentiCelsius(k * 1000 - 4000)));
+    }
+    let reply = Reply::Calibration {
+        version: 1,
+        origin: Origin::Stored,
+        state: State::Failed(Task::Mounting, CalibrationFault::Tilted(90.0)),
+        calibration,
+    };
+    assert!(emit(255, &reply).is_some_and(|frame| frame.len() <= MAX_FRAME));
+    assert!(matches!(ask(&mut board, &Request::Counters), Reply::Counters(_)));
+}

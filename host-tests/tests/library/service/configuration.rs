@@ -1,0 +1,147 @@
+//! The configuration is stored whole, at standstill alone, and refused where it is wrong.
+
+use super::{Board, DRIVES, IDENTITY, ask, bare, info, sample, set, start};
+use gyronet::can::config::{ConfigError, Settings};
+use gyronet::health::Status;
+use gyronet::sample::Standstill;
+use gyronet::service::event::EventKind;
+use gyronet::service::message::{Calibrate, FlashState, Origin, Refusal};
+use gyronet::service::{Reply, Request};
+use gyronet::store::layout;
+use gyronet::store::slots::{SlotError, WeightSource};
+use gyronet::store::{Configuration, Field, FieldError, FogPart, ImuPart, Mounting, StoreError};
+use gyronet_host_tests::flash::{F405, MappedRegion, Region};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::rc::Rc;
+
+#[test]
+fn configuration_is_kept_whole() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
+    let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
+    assert_eq!(ask(&mut board, &set(wanted)), Reply::Done);
+    let mut board = start(&flash);
+    assert_eq!(
+        ask(&mut board, &Request::GetConfiguration),
+        Reply::Configuration { version: 2, origin: Origin::Stored, configuration: wanted }
+    );
+    assert_eq!(*board.configuration(), wanted);
+    // Refused, and named, and the old one stays.
+    let wild = Configuration { mounting: Mounting { pitch_deg: 91.0, ..Mounting::default() }, ..wanted };
+    match ask(&mut board, &set(wild)) {
+        Reply::Refused(Refusal::Store(StoreError::Field(FieldError::Range { field, value, .. }))) => {
+            assert_eq!((field, value), (Field::MountingPitchDeg, 91.0));
+        }
+        other => panic!("{other:?}"),
+    }
+    let refused = |error| Reply::Refused(Refusal::Store(StoreError::Field(error)));
+    let other_part = Configuration { imu: ImuPart::Adis16465, ..wanted };
+    assert_eq!(ask(&mut board, &set(other_part)), refused(FieldError::PartNotInImage));
+    let can = Settings { bits_per_second: 250_000, ..wanted.can };
+    assert_eq!(
+        ask(&mut board, &set(Configuration { can, ..wanted })),
+        refused(FieldError::BitRateNotInImage(250_000))
+    );
+    let twice = Configuration { fog_ids: [0x1A0, 0x1A5, 0x1A6], ..wanted };
+    let duplicate = FieldError::Can(ConfigError::DuplicateIdentifier(0x1A0));
+    assert_eq!(ask(&mut board, &set(twice)), refused(duplicate));
+    let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
+    assert_eq!(ask(&mut board, &set(with_fog)), refused(FieldError::PartNotInImage));
+    let request = Request::SetConfiguration { version: 9, configuration: wanted };
+    assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 2 }));
+    assert_eq!(*start(&flash).configuration(), wanted);
+}
+
+#[test]
+fn damaged_record_is_noted() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Reply::Done);
+    flash.borrow_mut().damage(layout::STORE.start as usize + 20, 4);
+    let mut board = start(&flash);
+    assert_eq!(info(&mut board).flash, FlashState::Damaged);
+    assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
+    assert!(board.stored_damaged() && board.configuration_lost());
+    let Reply::Log(page) = ask(&mut board, &Request::Log { after: 0 }) else { panic!("no log") };
+    assert!(page.events.iter().any(|event| event.kind == EventKind::RecordsDamaged));
+    // Until it is stored again.
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Reply::Done);
+    let board = start(&flash);
+    assert!(!board.stored_damaged() && !board.configuration_lost());
+}
+
+/// The flash is mapped but has no controller, as in the emulator.
+#[test]
+fn what_is_stored_is_read_without_a_controller() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
+    assert_eq!(ask(&mut start(&flash), &set(wanted)), Reply::Done);
+    let mut board = Board::new(&DRIVES);
+    let records = Region::new(&flash, layout::STORE);
+    board.begin(Some(records), Some(MappedRegion::new(&flash)), false, IDENTITY);
+    assert_eq!(*board.configuration(), wanted);
+    let about = info(&mut board);
+    assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
+    let before = flash.borrow().operations();
+    let no_flash = Reply::Refused(Refusal::Store(StoreError::NoFlash));
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), no_flash);
+    let no_slot = Reply::Refused(Refusal::Slot(SlotError::NoFlash));
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
+    assert_eq!(flash.borrow().operations(), before);
+}
+
+#[test]
+fn nothing_is_stored_without_flash() {
+    let mut board = bare();
+    let about = info(&mut board);
+    assert_eq!((about.flash, about.weights), (FlashState::Absent, WeightSource::BuiltIn));
+    assert_eq!(about.identity, IDENTITY);
+    let no_flash = Reply::Refused(Refusal::Store(StoreError::NoFlash));
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), no_flash);
+    let no_slot = Reply::Refused(Refusal::Slot(SlotError::NoFlash));
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
+    assert_eq!(ask(&mut board, &Request::WeightsVerify), no_slot);
+    assert_eq!(
+        ask(&mut board, &Request::WeightsActivate),
+        Reply::Refused(Refusal::Slot(SlotError::NotBegun))
+    );
+}
+
+/// Returns whether a configuration can be stored after so many samples.
+fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standstill) -> bool {
+    for k in samples {
+        let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
+        board.observe(Some(&sample(k, [0.0, 0.0, 9.81], rate)), k as u32, Status::Ready, wheels);
+    }
+    match ask(board, &set(Configuration::DEFAULT)) {
+        Reply::Done => true,
+        Reply::Refused(Refusal::Moving) => false,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn flash_is_written_at_standstill_alone() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    assert!(storable(&mut board, 0..0, 0.0, Standstill::Unknown), "no rate is valid yet");
+    assert!(!storable(&mut board, 0..1, 0.0, Standstill::Moving));
+    assert!(storable(&mut board, 1..2, 0.5, Standstill::Still), "the wheels prove it");
+    assert!(!storable(&mut board, 2..202, 0.001, Standstill::Unknown), "quiet for two seconds");
+    assert!(storable(&mut board, 202..402, 0.001, Standstill::Unknown), "quiet for more than three");
+    assert!(!storable(&mut board, 402..602, 0.3, Standstill::Unknown), "a gyro that moves");
+    board.observe(None, 700, Status::Silent, Standstill::Unknown);
+    assert!(storable(&mut board, 0..0, 0.0, Standstill::Unknown), "a bench without a sensor");
+    board.observe(None, 701, Status::Silent, Standstill::Moving);
+    for request in [
+        Request::WeightsBegin { length: 64 },
+        Request::WeightsBlock { offset: 0, bytes: heapless::Vec::new() },
+        Request::WeightsActivate,
+        Request::Calibrate(Calibrate::Store),
+        Request::Restart,
+    ] {
+        assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Moving), "{request:?}");
+    }
+}

@@ -1,0 +1,47 @@
+//! The log keeps the latest events and counts those that it has dropped.
+
+use super::{Board, IDENTITY, ask, bare, info, sample};
+use gyronet::health::Status;
+use gyronet::sample::Standstill;
+use gyronet::service::event::{EventKind, ResetCause, SensorFault};
+use gyronet::service::{Reply, Request};
+
+#[test]
+fn sensor_that_does_not_answer_is_noted_once() {
+    let mut board = bare();
+    let absent = SensorFault::Identity(0xFF);
+    for result in [Err(absent), Err(absent), Err(SensorFault::Reset), Err(absent), Ok(()), Ok(())] {
+        board.sensor(result);
+        assert_eq!(info(&mut board).sensor, result.err());
+    }
+    let Reply::Log(page) = ask(&mut board, &Request::Log { after: 2 }) else { panic!("no log") };
+    let kinds: Vec<EventKind> = page.events.iter().map(|event| event.kind).collect();
+    let failed = [Some(absent), Some(SensorFault::Reset), Some(absent), None, None];
+    assert_eq!(kinds, failed.map(EventKind::Sensor));
+}
+
+#[test]
+fn the_log_is_bounded_and_reports_what_is_lost() {
+    let mut board = bare();
+    let page = |board: &mut Board, after| match ask(board, &Request::Log { after }) {
+        Reply::Log(page) => page,
+        other => panic!("{other:?}"),
+    };
+    let first = page(&mut board, 0);
+    let kinds: Vec<EventKind> = first.events.iter().map(|event| event.kind).collect();
+    let crash = IDENTITY.crash.expect("there is one");
+    assert_eq!(kinds, [EventKind::Started(ResetCause::Software), EventKind::Crashed(crash)]);
+    for k in 0..100 {
+        let status = if k % 2 == 0 { Status::Ready } else { Status::Degraded };
+        board.observe(Some(&sample(k, [0.0, 0.0, 9.8], 0.0)), k as u32, status, Standstill::Still);
+    }
+    let (mut after, mut events, mut lost) = (2, 0, 0);
+    loop {
+        let page = page(&mut board, after);
+        lost += page.lost;
+        events += page.events.len() as u32;
+        let Some(last) = page.events.last() else { break };
+        after = last.number;
+    }
+    assert_eq!((events, lost, after), (32, 68, 102));
+}
