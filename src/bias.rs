@@ -7,7 +7,7 @@
 //! tighter than those of the start. `earth` keeps the rotation of the Earth from being taken
 //! off twice.
 
-mod earth;
+pub(crate) mod earth;
 mod quiet;
 mod spread;
 mod static_init;

@@ -11,6 +11,7 @@ pub mod encoder;
 pub mod fog_encoder;
 mod frame;
 pub mod j1939;
+pub mod latitude;
 #[doc(hidden)]
 pub mod load;
 #[doc(hidden)]

@@ -24,11 +24,12 @@ mod timeline;
 
 pub use config::{Clock, Config, InputError, StorageFaults};
 
-use crate::bias::StaticError;
+use crate::bias::{Latitude, StaticError};
 use crate::can::DataFrame;
 use crate::can::config::MAX_MESSAGES;
 use crate::can::encoder::CanEncoder;
 use crate::can::fog_encoder::FogEncoder;
+use crate::can::latitude::LatitudeReceiver;
 use crate::can::wheel::WheelReceiver;
 use crate::compensate::Settled;
 use crate::estimate::{VehicleSample, YawEstimate};
@@ -95,6 +96,7 @@ pub struct Coprocessor {
     /// The newest report of the wheels.
     known_wheels: Option<WheelSample>,
     fog: FogPipeline,
+    latitude: Option<LatitudeReceiver>,
     /// The newest rate of the fibre-optic gyro.
     fog_estimate: Option<YawEstimate>,
     encoder: CanEncoder,
@@ -124,6 +126,7 @@ impl Coprocessor {
             wheels: CONFIG.wheels,
             known_wheels: None,
             fog: FogPipeline::new(CONFIG.fog, CONFIG.has_fognet),
+            latitude: None,
             fog_estimate: None,
             encoder: CanEncoder::START,
             fog_encoder: FogEncoder::new(CONFIG.fog_ids),
@@ -153,6 +156,7 @@ impl Coprocessor {
         self.pipeline.configure(config.pipeline);
         self.wheels = config.wheels;
         self.fog.configure(config.fog, config.has_fognet);
+        self.latitude = config.latitude;
         if config.fog_expected {
             self.fog.expect(Micros(0));
         }
@@ -207,11 +211,13 @@ impl Coprocessor {
         count(&mut self.counters.fog_errors, 1);
     }
 
-    /// Takes a frame that has come over the bus at `now`. Frames that carry no wheel speed are passed over.
+    /// Takes a frame that has come over the bus at `now`. Frames that carry no wheel speed and no latitude are passed
+    /// over.
     ///
     /// # Errors
     /// [`InputError::Wheels`] when a wheel frame is damaged or says that a speed is not valid,
-    /// [`InputError::ClockWentBack`]; it is counted. The wheels then fall silent by and by, which is reported.
+    /// [`InputError::Latitude`], [`InputError::ClockWentBack`]; it is counted. The wheels then fall silent by and by,
+    /// which is reported; the latitude in use stays.
     pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         let time = self.time();
@@ -220,7 +226,27 @@ impl Coprocessor {
                 count(&mut self.counters.wheel_errors, 1);
                 Err(InputError::Wheels(error))
             }
-            Some(Ok(_)) | None => Ok(()),
+            Some(Ok(_)) | None => self.take_latitude(frame, time),
+        }
+    }
+
+    fn take_latitude(&mut self, frame: &DataFrame, time: Micros) -> Result<(), InputError> {
+        let Some(receiver) = &mut self.latitude else { return Ok(()) };
+        let received = receiver.decode(frame, time);
+        self.fog.contest_latitude(receiver.is_contested());
+        match received.transpose() {
+            Ok(received) => {
+                if let Some((received, latitude)) =
+                    received.and_then(|received| Some((received, Latitude::from_degrees(received.degrees)?)))
+                {
+                    self.fog.set_latitude(latitude, received.moved);
+                }
+                Ok(())
+            }
+            Err(error) => {
+                count(&mut self.counters.latitude_errors, 1);
+                Err(InputError::Latitude(error))
+            }
         }
     }
 

@@ -1,4 +1,7 @@
-//! This module computes corrected turns from FoGNet's estimates, frame by frame.
+//! This module corrects the turns of a fibre-optic gyro, frame by frame: by the Earth's rate and the gyro's bias
+//! (`lane`), or by FoGNet's estimates where a configuration asks for them.
+//!
+//! # FoGNet
 //!
 //! A window covers a minute, and there is a new one every second, so 60 windows cover each
 //! second. The estimate of the newest window is used in the second after next: whoever has time
@@ -19,13 +22,21 @@
 //! Taking differences of overlapping windows instead (what the newest window has and the one
 //! before it had not) makes 60 interleaved sums of single estimates, each with its own error.
 
+mod lane;
+mod part;
 mod pipeline;
 mod rate;
+mod rest;
 pub mod seconds;
+mod trial;
 
+pub use lane::{Lane, Tilt};
+pub use part::FogErrors;
 pub use pipeline::{FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
 pub use rate::{IncrementRate, PseudoFog};
+pub use rest::{RestOutcome, RestReading};
 
+use crate::bias::Latitude;
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
 use crate::units::Angle;
 use seconds::{FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow};
@@ -33,9 +44,33 @@ use seconds::{FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, 
 /// Frames that a window's correction is spread over.
 const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;
 
-/// The limits within which FoGNet is used.
+/// The use of FoGNet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum FogNetUse {
+    /// FoGNet does not run.
+    #[default]
+    Off,
+    /// FoGNet runs on weights that were trained on simulated drives. The rate is degraded at best, and FoGNet is dropped
+    /// where standstills show no gain by it.
+    Simulated,
+}
+
+/// The correction of a fibre-optic gyro, and the limits within which FoGNet is used.
 #[derive(Debug, Clone, Copy)]
 pub struct FogConfig {
+    /// The errors of the gyro.
+    pub errors: FogErrors,
+    /// The latitude; `None` where it is not known, or comes over the bus.
+    pub latitude: Option<Latitude>,
+    /// The tilt of the gyro's axis.
+    pub tilt: Tilt,
+    /// The rate of shaking that a mean over a second still holds, 1 sigma, rad/s: of the standing and of the moving
+    /// vehicle. It is no turn of the vehicle, and sums up to nothing.
+    pub shake: [f32; 2],
+    /// The use of FoGNet.
+    pub fognet: FogNetUse,
     /// The filling of a window before a minute is over.
     pub padding: Padding,
     /// A larger correction of a window is not believed.
@@ -43,9 +78,18 @@ pub struct FogConfig {
 }
 
 impl FogConfig {
-    /// A fibre-optic gyro on a car: 0.02 rad a minute is four times what Earth's rate can add to
-    /// it, and leaves room for 0.1 % of scale error over two full turns.
-    pub const DEFAULT: Self = Self { padding: Padding::Repeat, max_correction: Angle(351_843_720_888) };
+    /// A level DSP-1760 on a car, without a latitude and without FoGNet. The shaking is that of the simulated car on its
+    /// training drives. A correction by FoGNet of 0.02 rad a minute is
+    /// four times what Earth's rate can add to it, and leaves room for 0.1 % of scale error over two full turns.
+    pub const DEFAULT: Self = Self {
+        errors: FogErrors::DSP1760,
+        latitude: None,
+        tilt: Tilt::NONE,
+        shake: [6e-5, 1.7e-4],
+        fognet: FogNetUse::Off,
+        padding: Padding::Repeat,
+        max_correction: Angle(351_843_720_888),
+    };
 }
 
 /// A window's estimate was not believed.

@@ -69,6 +69,8 @@ pub enum Source {
     GyroNet = 2,
     /// The fibre-optic gyro, corrected by FoGNet.
     FogNet = 3,
+    /// The fibre-optic gyro less the Earth's rate at the latitude and its bias.
+    EarthRate = 4,
 }
 
 /// The quality of a rate.
@@ -271,6 +273,8 @@ pub struct InputCounters {
     pub fog_errors: u32,
     /// Wheel frames that were damaged, or said that a speed is not valid.
     pub wheel_errors: u32,
+    /// Frames whose latitude was not valid, not possible, or not where the vehicle was.
+    pub latitude_errors: u32,
     /// Inputs with a time before the newest one.
     pub clock_back: u32,
     /// Estimates that no window waited for.
@@ -289,6 +293,7 @@ impl InputCounters {
         imu_errors: 0,
         fog_errors: 0,
         wheel_errors: 0,
+        latitude_errors: 0,
         clock_back: 0,
         unclaimed_estimates: 0,
         replaced_windows: 0,

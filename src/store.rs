@@ -20,7 +20,7 @@ mod record;
 pub mod slots;
 
 pub use calibration::{BiasPoint, Calibration, Level};
-pub use configuration::{Configuration, FogPart, ImuPart, Mounting};
+pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};
 pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use record::{Record, Store};
 pub use slots::{Accepted, Slot};

@@ -198,10 +198,14 @@ pub fn counters(device: &mut Device<Line>) -> AllCounters {
     }
 }
 
-/// Returns the host's board after these steps.
+/// Returns the host's board of a configuration after these steps.
+///
+/// # Panics
+/// When the library's own weights are refused.
 #[must_use]
-pub fn on_host(steps: &[Step]) -> replay::Board {
-    let mut host = replay::Board::new();
+pub fn on_host(configuration: &Configuration, steps: &[Step]) -> replay::Board {
+    let weights = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+    let mut host = replay::Board::configured(configuration, weights);
     for input in steps.iter().cloned().flat_map(Step::inputs) {
         input.push(&mut host);
     }

@@ -6,10 +6,10 @@
 //! [`ZeroPoint`] is made from either, together with [`EarthRate`], and gives out one reading to
 //! be taken off: whichever way it was made, the Earth is in it once or left alone.
 
-use crate::units::AngularRate;
+use crate::units::{Angle, AngularRate, RATE_HZ};
 
 /// Rotation of the Earth against the stars, rad/s (WGS 84).
-const EARTH_RATE: f32 = 7.292_115e-5;
+pub(crate) const EARTH_RATE: f32 = 7.292_115e-5;
 
 /// A geographic latitude, as what the Earth turns by there: the sine is worked out once, not deep
 /// in the sample path.
@@ -17,6 +17,7 @@ const EARTH_RATE: f32 = 7.292_115e-5;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Latitude {
     vertical_rate: AngularRate,
+    step_turn: Angle,
 }
 
 impl Latitude {
@@ -28,13 +29,22 @@ impl Latitude {
         }
         let rate = EARTH_RATE * libm::sinf(degrees.to_radians());
         // 7e-5 rad/s at most.
-        Some(Self { vertical_rate: AngularRate(libm::roundf(rate * AngularRate::PER_RAD_PER_SEC) as i32) })
+        let vertical_rate = AngularRate(libm::roundf(rate * AngularRate::PER_RAD_PER_SEC) as i32);
+        let step_turn = Angle(libm::roundf(rate / RATE_HZ as f32 * Angle::PER_RAD) as i64);
+        Some(Self { vertical_rate, step_turn })
     }
 
     /// Returns the Earth's rate about the upward vertical.
     #[must_use]
     pub const fn vertical_rate(self) -> AngularRate {
         self.vertical_rate
+    }
+
+    /// Returns the angle that the Earth turns by about the upward vertical in a step of the grid. It is finer than the
+    /// rate: 1e-6 deg/h.
+    #[must_use]
+    pub const fn step_turn(self) -> Angle {
+        self.step_turn
     }
 }
 

@@ -2,6 +2,7 @@
 
 /// Order of a value's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ByteOrder {
     /// Little-endian (DBC `@1`): the start bit is the lowest bit.

@@ -87,6 +87,7 @@ impl RateMessage {
             1 => Source::Static,
             2 => Source::GyroNet,
             3 => Source::FogNet,
+            4 => Source::EarthRate,
             unknown => return Err(YawError::Source(unknown)),
         };
         let quality = match judgement >> 3 & 3 {

@@ -4,6 +4,7 @@ use crate::align::AlignError;
 use crate::align::clock::ClockError;
 use crate::align::clock_ratio::ClockRatioConfig;
 use crate::can;
+use crate::can::latitude::{LatitudeError, LatitudeReceiver};
 use crate::can::wheel::{WheelError, WheelReceiver};
 use crate::can::yaw::FOG_IDS;
 use crate::fog::FogConfig;
@@ -44,6 +45,8 @@ pub struct Config {
     pub wheels: Option<WheelReceiver>,
     /// The way from the fibre-optic gyro's samples to its rate.
     pub fog: FogConfig,
+    /// The receiver of the vehicle's latitude, for the Earth's rate; `None` where none is sent.
+    pub latitude: Option<LatitudeReceiver>,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
     /// A fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
@@ -51,7 +54,7 @@ pub struct Config {
     pub fog_expected: bool,
     /// The caller runs GyroNet. Without it no window is due, and the messages report damaged data.
     pub has_gyronet: bool,
-    /// The caller runs FoGNet; without it, likewise.
+    /// The caller runs FoGNet, should [`FogConfig::fognet`] ask for it; without it, likewise.
     pub has_fognet: bool,
     /// The clock that `now` comes from.
     pub clock: Clock,
@@ -69,6 +72,7 @@ impl Config {
         can: can::config::Config::DEFAULT,
         wheels: None,
         fog: FogConfig::DEFAULT,
+        latitude: None,
         fog_ids: FOG_IDS,
         fog_expected: false,
         has_gyronet: true,
@@ -105,6 +109,9 @@ pub enum InputError {
     /// A wheel frame is damaged, or says that a speed is not valid.
     #[error("wheel speeds: {0}")]
     Wheels(#[source] WheelError),
+    /// A latitude is damaged, not possible or not where the vehicle was.
+    #[error("{0}")]
+    Latitude(#[source] LatitudeError),
     /// No window waits for this estimate.
     #[error("no window waits for estimate {end}")]
     NoWindow {

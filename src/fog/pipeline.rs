@@ -2,13 +2,20 @@
 //!
 //! The gyro's increments are summed on the grid of the time that the caller gives ([`Streams`]). The newest
 //! readings of inertial sensor and wheels stand for those of the step: they are a step or two old, which is
-//! nothing to their means over a second. FoGNet runs beside that, as GyroNet does: [`FogPipeline::window`]
-//! is the window that is due, whoever has time runs it, [`FogPipeline::deliver`] takes the estimate.
+//! nothing to their means over a second. FoGNet, where it is asked for, runs beside that, as GyroNet does:
+//! [`FogPipeline::window`] is the window that is due, whoever has time runs it, [`FogPipeline::deliver`] takes the
+//! estimate.
 //!
 //! | state | rate | source | quality | faults |
 //! |---|---|---|---|---|
-//! | an estimate is in use | less the correction | FoGNet | good | |
-//! | none yet, late, rejected, no weights, no wheels | as it is | raw | degraded | LATE, IMPLAUSIBLE, STORED, WHEELS |
+//! | latitude and wheels are known | less Earth's rate and bias | Earth rate | good | |
+//! | wheels are silent, or stand while the gyro turns | the same | Earth rate | degraded | WHEELS |
+//! | the latitude on the bus contradicts the one in use | the same | Earth rate | degraded | IMPLAUSIBLE |
+//! | no latitude is known, the vehicle has stood still | less the reading at standstill | static | degraded | |
+//! | no latitude is known, and no standstill yet | as it is | raw | degraded | |
+//! | FoGNet is asked for, and an estimate is in use | less the correction | FoGNet | degraded | |
+//! | standstills show no gain by FoGNet: it is dropped until the next start | as without FoGNet | | | |
+//! | FoGNet's estimate is late, rejected, or there are no weights | as without FoGNet | | degraded | LATE, IMPLAUSIBLE, STORED |
 //! | increments are missing in the step, or none have come yet ([`FogPipeline::expect`]) | not available | raw | unusable | GAP |
 //! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
 //!
@@ -16,14 +23,16 @@
 //! steps is split, and the rounding of that makes sums differ that come from equal increments.
 
 use super::seconds::{FogFrame, SecondsWindow};
-use super::{FogConfig, FogCorrector, FogOutput, IncrementRate};
+use super::trial::Trial;
+use super::{FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, Lane, RestOutcome};
 use crate::align::clock::ClockError;
 use crate::align::streams::{Fitted, Streams};
+use crate::bias::Latitude;
 use crate::estimate::YawEstimate;
 use crate::health::{Faults, Quality, Source, Status, count};
 use crate::model::fognet::FogEstimate;
 use crate::model::window::Features;
-use crate::sample::{FogSample, PERIOD_US, WheelSample};
+use crate::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
 use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};
 
 /// Increments in a row, equal to the one before, after which the gyro is stuck, if they last [`STUCK_US`]. A
@@ -55,19 +64,46 @@ pub struct FogCounters {
     pub implausible: u32,
     /// Windows that ended before their time: a gap, or too little of the other sensors.
     pub broken: u32,
+    /// Steps without a known latitude: the Earth's rate is not taken off.
+    pub no_latitude: u32,
+    /// Seconds of standing still that the bias was updated with.
+    pub zero_rate_updates: u32,
+    /// Seconds in which the gyro contradicted that the vehicle stands.
+    pub contradicted: u32,
+    /// Times that FoGNet was dropped, because standstills showed no gain by it: once a start at most.
+    pub dropped: u32,
 }
 
 impl FogCounters {
     /// No event.
-    pub const NONE: Self =
-        Self { samples: 0, misplaced: 0, gaps: 0, stuck: 0, windows: 0, late: 0, implausible: 0, broken: 0 };
+    pub const NONE: Self = Self {
+        samples: 0,
+        misplaced: 0,
+        gaps: 0,
+        stuck: 0,
+        windows: 0,
+        late: 0,
+        implausible: 0,
+        broken: 0,
+        no_latitude: 0,
+        zero_rate_updates: 0,
+        contradicted: 0,
+        dropped: 0,
+    };
 }
 
 /// The way from a fibre-optic gyro's samples to its corrected rate.
 #[derive(Debug, Clone)]
 pub struct FogPipeline {
     streams: Streams,
+    lane: Lane,
+    /// The latitude on the bus contradicts the one in use.
+    latitude_contested: bool,
+    shake: [f32; 2],
     corrector: FogCorrector,
+    trial: Trial,
+    /// Off, too, once FoGNet has been dropped.
+    fognet: FogNetUse,
     has_network: bool,
     rate: IncrementRate,
     correction: IncrementRate,
@@ -89,7 +125,12 @@ impl FogPipeline {
     pub const fn new(config: FogConfig, has_network: bool) -> Self {
         Self {
             streams: Streams::new(Fitted { imu: false, fog: true }),
+            lane: Lane::new(config.errors, config.tilt),
+            latitude_contested: false,
+            shake: config.shake,
             corrector: FogCorrector::new(config),
+            trial: Trial::START,
+            fognet: config.fognet,
             has_network,
             rate: IncrementRate::START,
             correction: IncrementRate::START,
@@ -105,8 +146,23 @@ impl FogPipeline {
 
     /// Sets the configuration, before the first sample.
     pub fn configure(&mut self, config: FogConfig, has_network: bool) {
+        self.lane = Lane::new(config.errors, config.tilt);
+        self.lane.set_latitude(config.latitude, false);
+        self.shake = config.shake;
         self.corrector.configure(config);
+        self.fognet = config.fognet;
         self.has_network = has_network;
+    }
+
+    /// Takes the latitude. A vehicle that has `moved` there takes the gyro's bias along; else the one before was wrong,
+    /// or there was none.
+    pub fn set_latitude(&mut self, latitude: Latitude, moved: bool) {
+        self.lane.set_latitude(Some(latitude), moved);
+    }
+
+    /// Notes whether the latitude on the bus contradicts the one in use.
+    pub fn contest_latitude(&mut self, contested: bool) {
+        self.latitude_contested = contested;
     }
 
     /// Expects a gyro whether it is heard or not: messages are sent from `now` on, and its silence is reported.
@@ -147,40 +203,79 @@ impl FogPipeline {
         let turn = turn.filter(|_| u64::from(step.fog.covered) == PERIOD_US);
         let stuck = turn.is_none() && self.stuck_in_step;
         self.stuck_in_step = self.repeats.are_stuck();
+        let standstill = wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill);
+        let (kept, outcome) = self.lane.correct(turn, standstill);
+        self.count_rest(outcome);
         let wheels = wheels.and_then(rear);
-        let output = self.corrector.correct(&FogFrame { turn, inertial, wheels });
-        self.note(&output);
+        let uses_network = self.fognet != FogNetUse::Off;
+        // FoGNet was trained on the gyro as it is.
+        let by_network = uses_network.then(|| {
+            let output = self.corrector.correct(&FogFrame { turn, inertial, wheels });
+            self.note(&output);
+            output.turn.filter(|_| output.corrected)
+        });
+        let by_network = by_network.flatten();
+        let both = kept.zip(by_network).map(|(kept, by_network)| [kept, by_network]);
+        if self.trial.observe(both, standstill) {
+            self.drop_fognet();
+        }
+        count(&mut self.counters.gaps, u32::from(turn.is_none()));
         let latency_us = u32::try_from(now.0.saturating_sub(step.time.0)).ok();
+        let contradicted = self.lane.rest().is_contradicted();
+        let has_latitude = self.lane.latitude().is_some();
+        count(&mut self.counters.no_latitude, u32::from(!has_latitude));
         let faults = self
             .estimate_faults
             .with(Faults::STUCK.when(stuck))
             .with(Faults::GAP.when(turn.is_none() && !stuck))
-            .with(Faults::WHEELS.when(wheels.is_none()))
-            .with(Faults::STORED.when(!self.has_network));
-        let (status, source, quality) = match (output.turn, output.corrected) {
+            .with(Faults::WHEELS.when(wheels.is_none() || contradicted))
+            .with(Faults::IMPLAUSIBLE.when(self.latitude_contested))
+            .with(Faults::STORED.when(uses_network && !self.has_network));
+        let (status, source, quality) = match (turn, by_network) {
             (None, _) if stuck => (Status::Stuck, Source::Raw, Quality::Unusable),
             (None, _) => (Status::Silent, Source::Raw, Quality::Unusable),
-            (Some(_), true) => (Status::Ready, Source::FogNet, Quality::Good),
-            (Some(_), false) => (Status::Degraded, Source::Raw, Quality::Degraded),
+            (Some(_), Some(_)) => (Status::Degraded, Source::FogNet, Quality::Degraded),
+            (Some(_), None) if has_latitude && faults == Faults::NONE => {
+                (Status::Ready, Source::EarthRate, Quality::Good)
+            }
+            (Some(_), None) => (Status::Degraded, self.source(), Quality::Degraded),
         };
-        let (rate, correction) = match output.turn {
-            Some(turn) => (self.rate.rate(turn), self.correction.rate(output.correction)),
-            None => (AngularRate::ZERO, AngularRate::ZERO),
+        let (rate, correction) = match (turn, by_network.or(kept)) {
+            (Some(turn), Some(kept)) => {
+                let correction = Angle(turn.0.saturating_sub(kept.0));
+                (self.rate.rate(kept), self.correction.rate(correction))
+            }
+            _ => (AngularRate::ZERO, AngularRate::ZERO),
         };
         self.yaw.0 = self.yaw.0.wrapping_add(i64::from(rate.0));
         let (tick, yaw) = ((step.time.0 / PERIOD_US) as u32, self.yaw);
-        Some(YawEstimate {
-            tick,
-            rate,
-            correction,
-            yaw,
-            sigma: None,
-            status,
-            source,
-            quality,
-            faults,
-            latency_us,
-        })
+        // FoGNet does not say how good it is.
+        let [standing, moving] = self.shake;
+        let shake = if standstill == Standstill::Still { standing } else { moving };
+        let sigma = (turn.is_some() && by_network.is_none()).then(|| self.lane.sigma(rate, shake));
+        Some(YawEstimate { tick, rate, correction, yaw, sigma, status, source, quality, faults, latency_us })
+    }
+
+    /// Stops FoGNet until the next start. Its estimate still is in this step's rate.
+    fn drop_fognet(&mut self) {
+        count(&mut self.counters.dropped, 1);
+        self.fognet = FogNetUse::Off;
+        self.due = None;
+        self.estimate_faults = Faults::NONE;
+    }
+
+    /// Returns what is taken off the gyro without FoGNet.
+    fn source(&self) -> Source {
+        match self.lane.latitude() {
+            Some(_) => Source::EarthRate,
+            None if self.lane.rest().is_measured() => Source::Static,
+            None => Source::Raw,
+        }
+    }
+
+    fn count_rest(&mut self, outcome: Option<RestOutcome>) {
+        count(&mut self.counters.zero_rate_updates, u32::from(outcome == Some(RestOutcome::Used)));
+        count(&mut self.counters.contradicted, u32::from(outcome == Some(RestOutcome::Refused)));
     }
 
     /// Returns the window that is due and its number, once.
@@ -209,7 +304,6 @@ impl FogPipeline {
             self.due = Some(number);
             self.awaited = true;
         }
-        count(&mut self.counters.gaps, u32::from(output.turn.is_none()));
         count(&mut self.counters.broken, u32::from(broken.is_some()));
         // A window ends with its second; its estimate is judged with the end of the next one.
         if implausible.is_some() {

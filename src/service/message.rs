@@ -10,7 +10,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// The version of the messages; it is raised when one changes.
-pub const PROTOCOL: u8 = 5;
+pub const PROTOCOL: u8 = 6;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 

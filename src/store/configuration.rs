@@ -5,12 +5,15 @@ use super::record::Record;
 use super::{Calibration, Level};
 use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
+use crate::can::latitude::{LatitudeConfigError, LatitudeReceiver, LatitudeSettings};
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
+use crate::fog::{FogConfig, FogErrors, FogNetUse, Tilt};
 use crate::mounting::{Levelling, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
+use embedded_can::{Id, StandardId};
 use serde::{Deserialize, Serialize};
 
 /// The inertial sensor that is fitted.
@@ -57,6 +60,18 @@ impl Mounting {
     }
 }
 
+/// The correction of the fibre-optic gyro.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FogLane {
+    /// The angle between its axis and the vertical of the level vehicle, 0 to 45 deg.
+    pub tilt_deg: f32,
+    /// The use of FoGNet.
+    pub fognet: FogNetUse,
+    /// The frame that carries the vehicle's latitude, where there is one.
+    pub latitude_frame: Option<LatitudeSettings>,
+}
+
 /// Everything that a user can set. It holds from the next start on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
@@ -66,7 +81,8 @@ pub struct Configuration {
     pub fog: Option<FogPart>,
     /// Messages, identifiers, periods, protection.
     pub can: Settings,
-    /// -90 to 90 deg, north positive; `None`: the Earth's rate stays in the bias.
+    /// -90 to 90 deg, north positive; `None`: the Earth's rate stays in the bias, and the rate of a fibre-optic gyro
+    /// is degraded until [`FogLane::latitude_frame`] brings one.
     pub latitude_deg: Option<f32>,
     /// The mounting of the sensor.
     pub mounting: Mounting,
@@ -76,6 +92,8 @@ pub struct Configuration {
     pub compensate: CompensateConfig,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
+    /// The correction of the fibre-optic gyro.
+    pub fog_lane: FogLane,
 }
 
 impl Configuration {
@@ -89,6 +107,7 @@ impl Configuration {
         static_init: StaticConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         fog_ids: FOG_IDS,
+        fog_lane: FogLane { tilt_deg: 0.0, fognet: FogNetUse::Off, latitude_frame: None },
     };
 }
 
@@ -104,10 +123,7 @@ impl Configuration {
             mounting: level.map_or(mounting, |level| mounting.then(&level)),
             levelling: if level.is_some() { Levelling::Off } else { Levelling::DEFAULT },
             static_init: self.static_init,
-            earth_rate: self
-                .latitude_deg
-                .and_then(Latitude::from_degrees)
-                .map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
+            earth_rate: self.latitude().map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
             compensate: self.compensate,
             ..PipelineConfig::DEFAULT
         }
@@ -115,6 +131,33 @@ impl Configuration {
 }
 
 impl Configuration {
+    fn latitude(&self) -> Option<Latitude> {
+        self.latitude_deg.and_then(Latitude::from_degrees)
+    }
+
+    fn fog(&self) -> FogConfig {
+        FogConfig {
+            errors: match self.fog {
+                Some(FogPart::Dsp3000) => FogErrors::DSP3000,
+                Some(FogPart::Dsp1760) | None => FogErrors::DSP1760,
+            },
+            latitude: self.latitude(),
+            // A stored configuration has been checked.
+            tilt: Tilt::from_degrees(self.fog_lane.tilt_deg).unwrap_or(Tilt::NONE),
+            fognet: self.fog_lane.fognet,
+            ..FogConfig::DEFAULT
+        }
+    }
+
+    /// Makes the receiver of the vehicle's latitude; `None` where no frame carries it.
+    ///
+    /// # Errors
+    /// [`LatitudeConfigError`].
+    pub fn latitude_receiver(&self) -> Result<Option<LatitudeReceiver>, LatitudeConfigError> {
+        let make = |frame| LatitudeReceiver::new(frame, self.latitude_deg);
+        self.fog_lane.latitude_frame.map(make).transpose()
+    }
+
     /// Makes the configuration of a coprocessor; the wheels, the clock, the networks and damage found
     /// at the start are the board's to add.
     #[must_use]
@@ -125,6 +168,8 @@ impl Configuration {
             can: Config::new(self.can).unwrap_or(Config::DEFAULT),
             fog_ids: self.fog_ids,
             fog_expected: self.fog.is_some(),
+            fog: self.fog(),
+            latitude: self.latitude_receiver().unwrap_or(None),
             ..coprocessor::Config::DEFAULT
         }
     }
@@ -132,16 +177,29 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 2;
+    const VERSION: u8 = 3;
 
-    /// Returns the end that layout 1 lacks: it ended before `fog_ids`, which were [`FOG_IDS`], here as varints.
+    /// Returns the end that older layouts lack: 1 ended before `fog_ids`, which were [`FOG_IDS`], here as varints; 2
+    /// ended before `fog_lane`.
     fn missing(version: u8) -> Option<&'static [u8]> {
-        (version == 1).then_some(&[0xA4, 3, 0xA5, 3, 0xA6, 3])
+        const ALL: &[u8] = &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0];
+        match version {
+            1 => Some(ALL),
+            2 => ALL.get(6..),
+            _ => None,
+        }
     }
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;
         config.check_further(self.fog_ids).map_err(FieldError::Can)?;
+        if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)? {
+            let fog = |id: u16| StandardId::new(id).map(Id::Standard) == Some(receiver.id());
+            if config.sends(receiver.id()) || self.fog_ids.into_iter().any(fog) {
+                let id = self.fog_lane.latitude_frame.map_or(0, |frame| frame.id);
+                return Err(FieldError::Latitude(LatitudeConfigError::Own(id)));
+            }
+        }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
         // What modes and lags there are, their types say.
@@ -149,6 +207,7 @@ impl Record for Configuration {
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         for (field, value, low, high) in [
             (Field::LatitudeDeg, self.latitude_deg.unwrap_or(0.0), -90.0, 90.0),
+            (Field::FogTiltDeg, self.fog_lane.tilt_deg, 0.0, 45.0),
             (Field::MountingRollDeg, roll_deg, -180.0, 180.0),
             (Field::MountingPitchDeg, pitch_deg, -90.0, 90.0),
             (Field::MountingYawDeg, yaw_deg, -180.0, 180.0),

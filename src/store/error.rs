@@ -1,6 +1,7 @@
 //! These errors are the reasons why something is not stored, or not read.
 
 use crate::can::config::ConfigError;
+use crate::can::latitude::LatitudeConfigError;
 use serde::{Deserialize, Serialize};
 
 /// A value of the configuration or calibration that has a range.
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 #[allow(missing_docs, reason = "named as the fields that they stand for")]
 pub enum Field {
     LatitudeDeg,
+    FogTiltDeg,
     MountingRollDeg,
     MountingPitchDeg,
     MountingYawDeg,
@@ -34,6 +36,7 @@ impl Field {
     pub const fn name(self) -> &'static str {
         match self {
             Self::LatitudeDeg => "latitude_deg",
+            Self::FogTiltDeg => "fog_lane.tilt_deg",
             Self::MountingRollDeg => "mounting.roll_deg",
             Self::MountingPitchDeg => "mounting.pitch_deg",
             Self::MountingYawDeg => "mounting.yaw_deg",
@@ -74,6 +77,9 @@ pub enum FieldError {
     /// The messages on the bus are no configuration.
     #[error("can: {0}")]
     Can(ConfigError),
+    /// The place of the latitude on the bus is no configuration.
+    #[error("fog_lane.latitude_frame: {0}")]
+    Latitude(LatitudeConfigError),
     /// This firmware image does not drive the part.
     #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,

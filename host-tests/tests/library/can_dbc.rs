@@ -109,7 +109,7 @@ fn value_tables_are_our_enumerations() {
         table.iter().map(|value| (value.id, value.description.to_lowercase())).collect()
     };
     let named = |code: u8, name: &str| (i64::from(code), name.to_owned());
-    let sources = [Source::Raw, Source::Static, Source::GyroNet, Source::FogNet]
+    let sources = [Source::Raw, Source::Static, Source::GyroNet, Source::FogNet, Source::EarthRate]
         .map(|source| named(source as u8, &format!("{source:?}").to_lowercase()));
     assert_eq!(table(0x1A0, "Source"), sources);
     let qualities = [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable]
@@ -157,8 +157,13 @@ fn each_fault_has_its_bit() {
 }
 
 fn any_sample() -> impl Strategy<Value = VehicleSample> {
-    let source =
-        prop_oneof![Just(Source::Raw), Just(Source::Static), Just(Source::GyroNet), Just(Source::FogNet)];
+    let source = prop_oneof![
+        Just(Source::Raw),
+        Just(Source::Static),
+        Just(Source::GyroNet),
+        Just(Source::FogNet),
+        Just(Source::EarthRate)
+    ];
     let quality = prop_oneof![
         Just(Quality::Good),
         Just(Quality::Degraded),

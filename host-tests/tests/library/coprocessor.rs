@@ -9,6 +9,7 @@ use gyronet::can::yaw::FOG_IDS;
 use gyronet::compensate::DELAY;
 use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
 use gyronet::fog::seconds::STEPS;
+use gyronet::fog::{FogConfig, FogNetUse};
 use gyronet::health::{Faults, InputCounters, Quality, Status};
 use gyronet::model::fognet::FogEstimate;
 use gyronet::model::window::WINDOW;
@@ -270,7 +271,8 @@ fn damage_and_losses_are_reported_with_every_set() {
 
 #[test]
 fn a_fibre_optic_gyro_sends_its_own_messages_and_hands_out_its_own_windows() {
-    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
+    let fog_config = FogConfig { fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
+    let mut car = Car::new(Config { wheels: wheels(), fog: fog_config, ..Config::DEFAULT });
     let (mut sent, mut windows) = (0, 0);
     for millisecond in 1..6_000_u64 {
         let now = Micros(millisecond * 1_000);

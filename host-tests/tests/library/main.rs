@@ -19,6 +19,7 @@ mod e2e;
 mod e2e_detection;
 mod entrances;
 mod fog;
+mod fog_lane;
 mod fog_pipeline;
 mod fognet_blob;
 mod framer;

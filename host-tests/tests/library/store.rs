@@ -147,7 +147,7 @@ fn another_layout_is_named() {
     let flash = Flash::default();
     let mut store = open(&flash);
     store.set(&Later { value: 7 }).expect("it is stored");
-    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 3, expected: 2 }));
+    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 4, expected: 3 }));
     store.set(&Alien { value: [200; 3] }).expect("it is stored");
     assert_eq!(store.get::<Configuration>(), Err(StoreError::Encoding));
 }
@@ -159,24 +159,34 @@ const LAYOUT_1: &[u8] = &[
     245, 61, 88, 202, 178, 61, 2, 5, 7, 208, 238, 217, 6, 160, 210, 130, 67, 154, 250, 157, 2,
 ];
 
+/// Layout 2 ended with `fog_ids`.
+const FOG_IDS_OF_LAYOUT_2: [u8; 6] = [0xA4, 5, 0xA5, 5, 0xA6, 5];
+
 /// Stored records stay when the firmware is replaced.
 #[test]
-fn an_older_layout_is_read() {
+fn older_layouts_are_read() {
+    let wanted = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    older_layout(1, LAYOUT_1, wanted);
+    let fog_ids = [0x2A4, 0x2A5, 0x2A6];
+    let layout_2 = [LAYOUT_1, &FOG_IDS_OF_LAYOUT_2].concat();
+    older_layout(2, &layout_2, Configuration { fog_ids, ..wanted });
+}
+
+fn older_layout(version: u8, content: &[u8], mut wanted: Configuration) {
     let flash = Flash::default();
     let word = |words: &mut Vec<u8>| {
         words.resize(words.len().next_multiple_of(4), 0xFF);
         words.extend(CRC.checksum(words).to_le_bytes());
     };
-    let mut record = vec![Configuration::KEY, 1, LAYOUT_1.len() as u8, 0];
-    record.extend(LAYOUT_1);
+    let mut record = vec![Configuration::KEY, version, content.len() as u8, 0];
+    record.extend(content);
     word(&mut record);
     let header = CRC.checksum(&(1 ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
     let sector = [&1_u32.to_le_bytes()[..], &header.to_le_bytes(), &record].concat();
     region(&flash).write(0, &sector).expect("it is blank");
     let mut store = open(&flash);
-    let mut wanted = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
     assert_eq!(store.get(), Ok(Some(wanted)));
-    wanted.fog_ids = [0x2A4, 0x2A5, 0x2A6];
+    wanted.fog_ids = [0x3A4, 0x3A5, 0x3A6];
     store.set(&wanted).expect("it is stored");
     assert_eq!(open(&flash).get(), Ok(Some(wanted)));
 }

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod campaign;
+mod fog_default;
 mod fognet_golden;
 mod fognet_integer;
 mod fognet_simulated;

@@ -69,11 +69,11 @@ pub fn can(report: &mut Report, chip: &Chip, registers: pac::CAN1) {
         return report.fail(NAME, format_args!("the clock is not exact enough"));
     }
     let [Some(wanted), Some(other)] = [StandardId::new(0x155), StandardId::new(0x2AA)] else { return };
-    let ids = [Id::Standard(wanted)];
-    let mut can = match Can::start(registers, ids.into_iter(), Mode::Loopback) {
+    let mut can = match Can::start(registers, Mode::Loopback) {
         Ok(can) => can,
         Err(fault) => return report.fail(NAME, format_args!("{fault}")),
     };
+    can.receive_only([Id::Standard(wanted)].into_iter());
     can.join();
     let sent = [(other, 0), (wanted, 1), (wanted, 2)].map(|(id, number)| DataFrame::new(id, &[number; 8]));
     for frame in sent.iter().flatten() {

@@ -14,7 +14,6 @@ use crate::stm32f405::usart::Usart;
 use crate::stm32f405::{Chip, pac, supply, timer};
 use crate::{crash, serial};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
-use embedded_can::Id;
 use gyronet::health::supervisor::Supervisor;
 use gyronet::service::event::CanFault;
 use gyronet::service::message::Identity;
@@ -51,12 +50,11 @@ pub struct Handlers {
 }
 
 impl Board {
-    /// Starts everything. CAN receives the frames of these identifiers, once it has joined the bus.
-    pub fn start(p: pac::Peripherals, systick: SYST, received: impl Iterator<Item = Id>) -> (Self, Handlers) {
+    /// Starts everything.
+    pub fn start(p: pac::Peripherals, systick: SYST) -> (Self, Handlers) {
         let Chip { clocks, device_id, reset } = Chip::start(&p, BOARD.crystal_hz);
         assign_pins();
-        let can =
-            if clocks.exact() { Can::start(p.CAN1, received, Mode::Normal) } else { Err(CanFault::Clock) };
+        let can = if clocks.exact() { Can::start(p.CAN1, Mode::Normal) } else { Err(CanFault::Clock) };
         let identity = Identity {
             firmware: version(),
             device_id,

@@ -136,7 +136,7 @@ mod app {
         rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let (board, handlers) = board::Board::start(cx.device, cx.core.SYST, start::received());
+        let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
         let start::Parts { output, config, weights, fog_network, device } = parts;
         let coprocessor = cx.local.coprocessor;

@@ -27,9 +27,13 @@ const DRIVES: SupportedHardware = SupportedHardware {
 /// The maker whose wheel frames are understood.
 pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
 
-/// The identifiers of the frames that CAN receives.
-pub fn received() -> impl Iterator<Item = embedded_can::Id> {
-    WHEELS.frames.into_iter().flatten().map(|frame| frame.id)
+/// Has CAN receive the frames that the configuration names.
+fn receive(board: &Board, config: &Config) {
+    let wheels = WHEELS.frames.into_iter().flatten().map(|frame| frame.id);
+    let latitude = config.latitude.map(|latitude| latitude.id());
+    if let Some(can) = &board.can {
+        can.receive_only(wheels.chain(latitude));
+    }
 }
 
 /// The parts that the tasks get.
@@ -68,6 +72,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
         },
         ..configuration.coprocessor(device.calibration())
     };
+    receive(board, &config);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
         output: OutputParts { part, bits_per_second },

@@ -78,12 +78,12 @@ pub struct Can {
 }
 
 impl Can {
-    /// Initialises the controller, which takes part in the bus from [`Can::join`] on. The frames of up to 14
-    /// identifiers are received, and nothing else.
+    /// Initialises the controller, which takes part in the bus from [`Can::join`] on and receives what
+    /// [`Can::receive_only`] names.
     ///
     /// # Errors
     /// The step that the controller does not confirm.
-    pub fn start(can: pac::CAN1, ids: impl Iterator<Item = Id>, mode: Mode) -> Result<Self, CanFault> {
+    pub fn start(can: pac::CAN1, mode: Mode) -> Result<Self, CanFault> {
         // It sleeps after a reset, and does not initialise before it is woken (RM0090 32.4).
         can.mcr().modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
         if !within(|| can.msr().read().slak().bit_is_clear()) {
@@ -99,12 +99,16 @@ impl Can {
             w.brp().bits(PRESCALER - 1).ts1().bits(before - 1).ts2().bits(after - 1).sjw().bits(0);
             w.lbkm().bit(loopback).silm().bit(loopback)
         });
-        receive_only(&can, ids);
         can.ier().write(|w| w.fmpie0().set_bit().tmeie().set_bit());
         // Frames leave in the order of their requests.
         can.mcr().modify(|_, w| w.txfp().set_bit());
         let recovery = Recovery::On { since: 0 };
         Ok(Self { registers: can, requested: [0; MAILBOXES], recovery, interval_ms: FIRST_RESTART_MS })
+    }
+
+    /// Receives the frames of up to 14 identifiers, and nothing else.
+    pub fn receive_only(&self, ids: impl Iterator<Item = Id>) {
+        receive_only(&self.registers, ids);
     }
 
     /// Takes part in the bus. The controller waits for 11 recessive bits by itself. Called when received frames

@@ -82,6 +82,12 @@ impl Method {
     pub const FOG: Self = fog("fog", "FoG");
     /// The fibre-optic gyro less the Earth's rate at the place's latitude.
     pub const FOG_EARTH: Self = fog("fog_earth", "FoG less Earth rate");
+    /// The fibre-optic gyro as the board sends it by default: less the Earth's rate, and less the bias that it has shown
+    /// at standstills.
+    pub const FOG_DEFAULT: Self = fog("fog_default", "FoG, default lane");
+    /// FoGNet on the rate of [`Method::GYRONET_LOOP`], in the place of a fibre-optic gyro: the paper's future work.
+    /// FoGNet was not trained on such rates.
+    pub const PSEUDO_FOG: Self = mems("pseudo_fog", "FoGNet on GyroNet's rate");
     /// FoGNet, its first minute padded.
     pub const FOGNET: Self = fog("fognet", "FoGNet");
     /// FoGNet, its first minute uncorrected.

@@ -1,12 +1,18 @@
-//! A sequence through FoGNet: the turns that the board would send, computed from the gyro's increments.
+//! A sequence through the lane of a fibre-optic gyro: the turns that the board would send, computed from the gyro's
+//! increments, by default and with FoGNet.
 
+use crate::drive::DT;
+use crate::drive::wheel_frames;
 use crate::paper::sequence::{Sequence, Step};
+use crate::simulate::layout::Layout;
+use gyronet::bias::Latitude;
+use gyronet::estimate::YawEstimate;
 use gyronet::fog::seconds::FogFrame;
-use gyronet::fog::{FogConfig, FogCorrector};
+use gyronet::fog::{FogConfig, FogCorrector, FogCounters, FogErrors, FogPipeline};
 use gyronet::model::fognet::MinuteNetwork;
 use gyronet::model::window::Features;
-use gyronet::sample::RATE_HZ;
-use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
+use gyronet::sample::{FogSample, PERIOD_US, RATE_HZ};
+use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
 
 /// Steps of static initialisation: 3 s.
 const STATIC_STEPS: usize = 300;
@@ -63,6 +69,53 @@ pub fn run(
         tick();
     }
     drive
+}
+
+/// The default lane of a sequence's gyro and latitude.
+#[must_use]
+pub fn default_config(sequence: &Sequence) -> FogConfig {
+    let errors = match sequence.layout {
+        Layout::Kaist => FogErrors::DSP1760,
+        Layout::Nclt => FogErrors::DSP3000,
+    };
+    let latitude = Latitude::from_degrees(sequence.latitude_deg() as f32);
+    FogConfig { errors, latitude, ..FogConfig::DEFAULT }
+}
+
+/// Runs a sequence without FoGNet, wheels by frames as the board receives them; returns what is sent for each step (zero
+/// for the first, of which only the end is heard), and the events.
+#[must_use]
+pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>, FogCounters) {
+    let mut fog = FogPipeline::new(config, false);
+    fog.configure(config, false);
+    let mut wheels = wheel_frames::receiver();
+    let mut way = [0.0; 2];
+    let mut sent = vec![YawEstimate::default(); sequence.steps.len()];
+    for (number, step) in sequence.steps.iter().enumerate() {
+        let time = Micros((number as u64 + 1) * PERIOD_US);
+        for (way, of_step) in way.iter_mut().zip(step.wheels) {
+            *way += of_step;
+        }
+        if number % wheel_frames::FRAME_ROWS == 0 {
+            let [left, right] = way.map(|way| Some(way.abs() / (wheel_frames::FRAME_ROWS as f64 * DT) * 3.6));
+            way = [0.0; 2];
+            if let Some(frame) = wheel_frames::frame([left, right, left, right]) {
+                // A speed that no frame can carry is not valid, and the wheels fall silent.
+                let _ = wheels.decode(&frame, time);
+            }
+        }
+        let increment = [None, None, Some(angle(step.fog))];
+        let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
+        // Times are in order.
+        let _ = fog.add(time, sample);
+        let wheels = wheels.poll(time);
+        while let Some(estimate) = fog.next_step(time, None, wheels.as_ref()) {
+            // Grid step 1 is that of the first row.
+            let place = (estimate.tick as usize).checked_sub(1).and_then(|row| sent.get_mut(row));
+            place.into_iter().for_each(|place| *place = estimate);
+        }
+    }
+    (sent, *fog.counters())
 }
 
 /// The inertial sensor's features of each step, its gyro less its mean over the first 3 s; none

@@ -25,7 +25,7 @@ fn configuration_is_kept_whole() {
     let mut board = start(&flash);
     assert_eq!(
         ask(&mut board, &Request::GetConfiguration),
-        Reply::Configuration { version: 2, origin: Origin::Stored, configuration: wanted }
+        Reply::Configuration { version: 3, origin: Origin::Stored, configuration: wanted }
     );
     assert_eq!(*board.configuration(), wanted);
     // Refused, and named, and the old one stays.

@@ -64,12 +64,16 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl
     estimates.add(Method::FOG, || fog.clone());
     let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
     estimates.add(Method::FOG_EARTH, || fog.iter().map(|rate| rate - earth).collect());
+    estimates.add(Method::FOG_DEFAULT, || {
+        let (sent, _) = fog_replay::run_default(sequence, fog_replay::default_config(sequence));
+        sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
+    });
     estimates
 }
 
 impl Estimates {
-    /// Adds FoGNet, padded and not, where there is an inertial sensor; `tick` is called for each
-    /// step of both.
+    /// Adds FoGNet, padded and not, and on GyroNet's rate, where there is an inertial sensor; `tick` is called for each
+    /// step of all three.
     pub fn add_fognet(
         &mut self,
         sequence: &Sequence,
@@ -87,6 +91,22 @@ impl Estimates {
             let turns = drive.turns[self.start..].to_vec();
             self.methods.push(Estimate { method, turns, run_time });
         }
+        self.add_pseudo_fog(sequence, network, tick);
+    }
+
+    /// FoGNet on GyroNet's rate, where there is one; `tick` is called for each step.
+    fn add_pseudo_fog(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, tick: impl FnMut()) {
+        let Some(looped) = self.methods.iter().find(|estimate| estimate.method == Method::GYRONET_LOOP)
+        else {
+            return;
+        };
+        let mut sequence = sequence.clone();
+        for (step, turn) in sequence.steps.iter_mut().skip(self.start).zip(&looped.turns) {
+            step.fog = *turn;
+        }
+        let (drive, run_time) = timed(|| fog_replay::run(&sequence, network, FogConfig::DEFAULT, tick));
+        let turns = drive.turns[self.start..].to_vec();
+        self.methods.push(Estimate { method: Method::PSEUDO_FOG, turns, run_time });
     }
 
     /// The methods that start from the inertial sensor.

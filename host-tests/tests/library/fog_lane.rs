@@ -1,0 +1,277 @@
+//! The default lane of a fibre-optic gyro: Earth's rate, bias by standstills, and what its messages say of both.
+
+use embedded_can::{ExtendedId, Frame, Id};
+use gyronet::bias::Latitude;
+use gyronet::can::DataFrame;
+use gyronet::can::latitude::{
+    CONFIRM, LatitudeConfigError, LatitudeError, LatitudeReceiver, LatitudeSettings,
+};
+use gyronet::can::signal::ByteOrder;
+use gyronet::coprocessor::{Config, Coprocessor, InputError};
+use gyronet::estimate::YawEstimate;
+use gyronet::fog::{FogConfig, FogErrors, FogNetUse, FogPipeline};
+use gyronet::health::{Faults, Quality, Source};
+use gyronet::model::fognet::FogEstimate;
+use gyronet::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
+use gyronet::units::{Angle, Micros, WheelSpeed};
+use gyronet_host_tests::noise::Noise;
+
+const DEG_PER_HOUR: f64 = std::f64::consts::PI / 180.0 / 3600.0;
+const EARTH: f64 = 7.292_115e-5;
+
+/// A DSP-1760 that turns with the Earth, has a bias and the noise of its data sheet.
+struct Gyro {
+    noise: Noise,
+    rate: f64,
+    step: u64,
+    standstill: Standstill,
+    /// What FoGNet says of every minute.
+    correction: Angle,
+}
+
+impl Gyro {
+    fn new(seed: u64, latitude_deg: f64, bias_deg_per_hour: f64) -> Self {
+        let rate = EARTH * latitude_deg.to_radians().sin() + bias_deg_per_hour * DEG_PER_HOUR;
+        Self {
+            noise: Noise::new(seed),
+            rate,
+            step: 0,
+            standstill: Standstill::Still,
+            correction: Angle::ZERO,
+        }
+    }
+
+    fn sample(&mut self) -> FogSample {
+        self.step += 1;
+        // The sum of twelve even numbers has a variance of one.
+        let normal: f64 =
+            (0..12).map(|_| self.noise.int(0, 1 << 40) as f64 / (1u64 << 40) as f64).sum::<f64>() - 6.0;
+        let turn = 0.01 * self.rate + 0.1 * f64::from(FogErrors::DSP1760.angle_walk) * normal;
+        let increment = [None, None, Some(Angle((turn * f64::from(Angle::PER_RAD)).round() as i64))];
+        let time = Micros(self.step * PERIOD_US);
+        FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None }
+    }
+
+    fn run(&mut self, fog: &mut FogPipeline, seconds: usize) -> Vec<YawEstimate> {
+        let mut sent = Vec::new();
+        for _ in 0..100 * seconds {
+            let sample = self.sample();
+            fog.add(sample.time, sample).expect("in order");
+            let speeds = [Some(WheelSpeed(0)); 4];
+            let wheels = WheelSample { time: sample.time, speeds, standstill: self.standstill };
+            sent.extend(std::iter::from_fn(|| fog.next_step(sample.time, Some([0; 6]), Some(&wheels))));
+            if let Some((number, _)) = fog.window() {
+                let correction = self.correction;
+                fog.deliver(
+                    number,
+                    FogEstimate { correction, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 },
+                );
+            }
+        }
+        sent
+    }
+}
+
+fn lane(latitude_deg: Option<f32>) -> FogPipeline {
+    let config = FogConfig { latitude: latitude_deg.and_then(Latitude::from_degrees), ..FogConfig::DEFAULT };
+    let mut fog = FogPipeline::new(config, true);
+    fog.configure(config, true);
+    fog
+}
+
+fn mean_deg_per_hour(sent: &[YawEstimate]) -> f64 {
+    sent.iter().map(|yaw| yaw.rate.rad_per_sec()).sum::<f64>() / sent.len() as f64 / DEG_PER_HOUR
+}
+
+/// Ten minutes at rest, then ten minutes straight on: the gyro's own walk leaves 0.03 deg/h of each.
+#[test]
+fn ten_straight_minutes_anywhere_on_earth() {
+    for (seed, (latitude, bias)) in
+        [(0.0f32, 0.4), (60.0, -0.5), (-34.0, 0.25), (36.37, 0.0), (90.0, 0.1)].into_iter().enumerate()
+    {
+        let mut gyro = Gyro::new(seed as u64 + 1, latitude.into(), bias);
+        let mut fog = lane(Some(latitude));
+        gyro.run(&mut fog, 600);
+        gyro.standstill = Standstill::Moving;
+        let sent = gyro.run(&mut fog, 600);
+        let error = mean_deg_per_hour(&sent);
+        println!("{latitude} deg: {error:.3} deg/h");
+        assert!(error.abs() < 0.1, "{latitude}: {error}");
+        assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::EarthRate, Quality::Good)));
+        // The shaking of a moving car, and little more.
+        let sigma = sent[0].sigma.expect("expected error").rad_per_sec() / DEG_PER_HOUR;
+        assert!((35.0..36.0).contains(&sigma), "{sigma}");
+        assert_eq!((fog.counters().no_latitude, fog.counters().contradicted), (0, 0));
+        assert!(fog.counters().zero_rate_updates > 590);
+    }
+}
+
+#[test]
+fn without_a_latitude_the_rate_is_degraded() {
+    let mut gyro = Gyro::new(9, -34.0, 0.0);
+    gyro.standstill = Standstill::Moving;
+    let mut fog = lane(None);
+    let sent = gyro.run(&mut fog, 10);
+    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Raw, Quality::Degraded)));
+    // Any latitude may be the right one: 8.7 deg/h beside the shaking of 35.1.
+    let sigma = sent[0].sigma.expect("expected error").rad_per_sec() / DEG_PER_HOUR;
+    assert!((35.8..36.8).contains(&sigma), "{sigma}");
+    gyro.standstill = Standstill::Still;
+    gyro.run(&mut fog, 300);
+    gyro.standstill = Standstill::Moving;
+    let sent = gyro.run(&mut fog, 300);
+    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Static, Quality::Degraded)));
+    assert!(mean_deg_per_hour(&sent).abs() < 0.2, "{}", mean_deg_per_hour(&sent));
+    assert_eq!(fog.counters().no_latitude, 61_000);
+}
+
+#[test]
+fn a_turn_on_standing_wheels_is_reported_and_not_learnt() {
+    let mut gyro = Gyro::new(4, 60.0, 0.0);
+    let mut fog = lane(Some(60.0));
+    gyro.run(&mut fog, 60);
+    gyro.rate += 100.0 * DEG_PER_HOUR;
+    let sent = gyro.run(&mut fog, 60);
+    let last = sent.last().expect("a step");
+    assert_eq!((last.quality, last.faults), (Quality::Degraded, Faults::WHEELS));
+    assert!(fog.counters().contradicted > 55);
+    assert!((mean_deg_per_hour(&sent) - 100.0).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
+}
+
+/// The correction of a minute that FoGNet has learnt at 36.37 N.
+fn of_training() -> Angle {
+    let turn = 60.0 * EARTH * 36.37f64.to_radians().sin();
+    Angle((turn * f64::from(Angle::PER_RAD)).round() as i64)
+}
+
+#[test]
+fn fognet_is_dropped_where_a_standstill_shows_no_gain() {
+    let latitude = Latitude::from_degrees(0.0);
+    let config = FogConfig { latitude, fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
+    let mut fog = FogPipeline::new(config, true);
+    fog.configure(config, true);
+    let mut gyro = Gyro::new(5, 0.0, 0.0);
+    gyro.correction = of_training();
+    gyro.standstill = Standstill::Moving;
+    let sent = gyro.run(&mut fog, 30);
+    let last = sent.last().expect("a step");
+    assert_eq!((last.source, last.quality), (Source::FogNet, Quality::Degraded));
+    gyro.standstill = Standstill::Still;
+    gyro.run(&mut fog, 15);
+    assert_eq!(fog.counters().dropped, 1);
+    gyro.standstill = Standstill::Moving;
+    let sent = gyro.run(&mut fog, 60);
+    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::EarthRate, Quality::Good)));
+    assert!(mean_deg_per_hour(&sent).abs() < 1.0 && fog.window().is_none());
+}
+
+#[test]
+fn fognet_stays_where_it_is_better() {
+    // Without a latitude, and without a standstill long enough for the bias alone.
+    let config = FogConfig { fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
+    let mut fog = FogPipeline::new(config, true);
+    fog.configure(config, true);
+    let mut gyro = Gyro::new(6, 36.37, 0.0);
+    gyro.correction = of_training();
+    gyro.standstill = Standstill::Moving;
+    gyro.run(&mut fog, 10);
+    gyro.standstill = Standstill::Still;
+    let sent = gyro.run(&mut fog, 60);
+    assert_eq!(fog.counters().dropped, 0);
+    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::FogNet, Quality::Degraded)));
+}
+
+fn settings() -> LatitudeSettings {
+    LatitudeSettings {
+        id: 0x18FE_F31C,
+        extended: true,
+        start: 0,
+        bits: 32,
+        order: ByteOrder::Intel,
+        signed: false,
+        degrees_per_bit: 1e-7,
+        offset_deg: -210.0,
+        invalid: Some(u32::MAX),
+    }
+}
+
+/// J1939's vehicle position: 1e-7 deg from -210.
+fn position(degrees: f64) -> DataFrame {
+    let raw = ((degrees + 210.0) * 1e7).round() as u32;
+    let id = ExtendedId::new(0x18FE_F31C).expect("29 bits");
+    DataFrame::new(id, &[raw.to_le_bytes(), [0; 4]].concat()).expect("eight bytes")
+}
+
+#[test]
+fn a_latitude_over_can_is_used_when_it_is_confirmed() {
+    let mut receiver = LatitudeReceiver::new(settings(), None).expect("checked settings");
+    assert_eq!(receiver.id(), Id::Extended(ExtendedId::new(0x18FE_F31C).expect("29 bits")));
+    let mut now = 0;
+    let mut take = |receiver: &mut LatitudeReceiver, degrees: f64| {
+        now += 100_000;
+        receiver.decode(&position(degrees), Micros(now))
+    };
+    for _ in 1..CONFIRM {
+        assert_eq!(take(&mut receiver, 48.1), None);
+    }
+    let first = take(&mut receiver, 48.1).expect("confirmed").expect("good");
+    assert!((first.degrees - 48.1).abs() < 1e-4 && !first.moved);
+    let next = take(&mut receiver, 48.101).expect("known").expect("good");
+    assert!(next.moved && !receiver.is_contested());
+    // A jump is refused, and the one in use is contested until a frame agrees with it.
+    let jump = take(&mut receiver, -48.1);
+    assert!(matches!(jump, Some(Err(LatitudeError::Jump { .. }))) && receiver.is_contested(), "{jump:?}");
+    assert!(take(&mut receiver, 48.1).expect("known").is_ok() && !receiver.is_contested());
+    // One that stays has to be believed.
+    let jumps: Vec<_> = (0..CONFIRM).map(|_| take(&mut receiver, 52.0).expect("judged")).collect();
+    let (last, refused) = jumps.split_last().expect("some");
+    assert!(refused.iter().all(Result::is_err) && last.is_ok_and(|last| !last.moved));
+    // What no latitude can be.
+    assert!(matches!(take(&mut receiver, 95.0), Some(Err(LatitudeError::Range(_)))));
+    let marked = DataFrame::new(position(0.0).id(), &[0xFF; 8]).expect("eight bytes");
+    assert_eq!(receiver.decode(&marked, Micros(now)), Some(Err(LatitudeError::Invalid)));
+    let short = DataFrame::new(position(0.0).id(), &[0; 3]).expect("three bytes");
+    assert_eq!(receiver.decode(&short, Micros(now)), Some(Err(LatitudeError::Short(3))));
+}
+
+#[test]
+fn latitude_settings_that_make_none_are_refused() {
+    let refused = |settings| LatitudeReceiver::new(settings, None).expect_err("refused");
+    let outside = LatitudeSettings { start: 40, ..settings() };
+    assert_eq!(refused(outside), LatitudeConfigError::Outside { start: 40, bits: 32 });
+    let id = LatitudeSettings { extended: false, ..settings() };
+    assert_eq!(refused(id), LatitudeConfigError::Identifier(0x18FE_F31C));
+    for degrees_per_bit in [0.0, f32::NAN, 1e9] {
+        assert!(matches!(
+            refused(LatitudeSettings { degrees_per_bit, ..settings() }),
+            LatitudeConfigError::Scale(_)
+        ));
+    }
+}
+
+#[test]
+fn the_coprocessor_takes_the_latitude_from_the_bus() {
+    let receiver = LatitudeReceiver::new(settings(), None).expect("checked settings");
+    let mut coprocessor = Coprocessor::new(Config { latitude: Some(receiver), ..Config::DEFAULT });
+    let mut gyro = Gyro::new(7, -34.0, 0.0);
+    let mut sources = Vec::new();
+    for step in 0..400 {
+        let sample = gyro.sample();
+        coprocessor.fog(sample, sample.time).expect("in order");
+        while coprocessor.next_frame().is_some() {}
+        sources.extend(coprocessor.fog_estimate().map(|yaw| yaw.source));
+        if step >= 200 && step % 10 == 0 {
+            coprocessor.can(&position(-34.0), sample.time).expect("a latitude");
+        }
+    }
+    assert_eq!((sources.first(), sources.last()), (Some(&Source::Raw), Some(&Source::EarthRate)));
+    let now = Micros(400 * PERIOD_US);
+    let jump = coprocessor.can(&position(34.0), now);
+    assert!(matches!(jump, Err(InputError::Latitude(LatitudeError::Jump { .. }))), "{jump:?}");
+    assert_eq!(coprocessor.input_counters().latitude_errors, 1);
+    let sample = gyro.sample();
+    coprocessor.fog(sample, sample.time).expect("in order");
+    while coprocessor.next_frame().is_some() {}
+    let contested = coprocessor.fog_estimate().expect("a rate");
+    assert!(contested.faults.contains(Faults::IMPLAUSIBLE) && contested.quality == Quality::Degraded);
+}

@@ -1,0 +1,212 @@
+//! The receiver reads the latitude from a frame of the vehicle's bus, as a satellite receiver sends it.
+//!
+//! A latitude is used once [`CONFIRM`] frames in a row agree. From then on one that is further away than a vehicle goes
+//! is refused and counted, and the one in use is contested until a frame agrees with it again; [`CONFIRM`] such frames
+//! that agree with each other replace it. A bus that falls silent changes nothing: an hour of driving changes the
+//! Earth's rate by 0.2 deg/h at most.
+
+use super::signal::{BitField, ByteOrder};
+use crate::units::Micros;
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+
+/// Frames that must agree before a latitude is used.
+pub const CONFIRM: u8 = 10;
+/// Difference of two latitudes that agree, degrees: 2 km.
+const NEAR_DEG: f32 = 0.02;
+/// The fastest change, degrees per microsecond: 400 km/h.
+const DEG_PER_US: f32 = 1e-9;
+/// The largest change that silence explains, degrees.
+const LONGEST_DEG: f32 = 1.0;
+
+/// The place of the latitude on the bus.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LatitudeSettings {
+    /// Identifier of the frame.
+    pub id: u32,
+    /// The identifier has 29 bits.
+    pub extended: bool,
+    /// Start bit, as a DBC file gives it.
+    pub start: u8,
+    /// Number of bits, up to 32.
+    pub bits: u8,
+    /// Order of the bytes.
+    pub order: ByteOrder,
+    /// The value has a sign.
+    pub signed: bool,
+    /// Degrees for one bit, north positive.
+    pub degrees_per_bit: f32,
+    /// Degrees at raw zero.
+    pub offset_deg: f32,
+    /// The raw code that says "not valid".
+    pub invalid: Option<u32>,
+}
+
+/// The reason why latitude settings are refused.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum LatitudeConfigError {
+    /// More bits than an identifier has.
+    #[error("latitude frame {0:x} is no identifier")]
+    Identifier(u32),
+    /// One of our own messages has it.
+    #[error("latitude frame {0:x} is one of our own messages")]
+    Own(u32),
+    /// The value does not lie in a frame.
+    #[error("latitude: {bits} bits from bit {start} do not lie inside a frame")]
+    Outside {
+        /// Start bit as given.
+        start: u8,
+        /// Number of bits as given.
+        bits: u8,
+    },
+    /// A scale or an offset that makes no latitude.
+    #[error("latitude: {0} degrees for a bit, or the offset, make no latitude")]
+    Scale(f32),
+}
+
+impl LatitudeSettings {
+    /// Returns the identifier.
+    ///
+    /// # Errors
+    /// [`LatitudeConfigError::Identifier`].
+    pub fn id(&self) -> Result<Id, LatitudeConfigError> {
+        let id = match (self.extended, u16::try_from(self.id)) {
+            (true, _) => ExtendedId::new(self.id).map(Id::Extended),
+            (false, Ok(id)) => StandardId::new(id).map(Id::Standard),
+            (false, Err(_)) => None,
+        };
+        id.ok_or(LatitudeConfigError::Identifier(self.id))
+    }
+}
+
+/// The reason why a frame gives no latitude.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum LatitudeError {
+    /// It has too few bytes.
+    #[error("latitude frame of {0} bytes is too short")]
+    Short(usize),
+    /// The sender says that it is not valid.
+    #[error("latitude is marked as not valid")]
+    Invalid,
+    /// Beyond a pole.
+    #[error("latitude {0} is beyond a pole")]
+    Range(f32),
+    /// Further from the latitude in use than a vehicle goes.
+    #[error("latitude jumps from {from} to {to}")]
+    Jump {
+        /// The latitude in use.
+        from: f32,
+        /// The one that was received.
+        to: f32,
+    },
+}
+
+/// A latitude that can be used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReceivedLatitude {
+    /// Degrees, north positive.
+    pub degrees: f32,
+    /// The vehicle has moved there; else it is the first one, or the one before was wrong.
+    pub moved: bool,
+}
+
+/// Frames in, latitude out.
+#[derive(Debug, Clone, Copy)]
+pub struct LatitudeReceiver {
+    settings: LatitudeSettings,
+    id: Id,
+    field: BitField,
+    known: Option<(f32, Micros)>,
+    /// A latitude that is not used yet, and the frames that agree with it.
+    candidate: Option<(f32, u8)>,
+}
+
+impl LatitudeReceiver {
+    /// Checks settings. `known` is a latitude from elsewhere, which frames have to agree with.
+    ///
+    /// # Errors
+    /// [`LatitudeConfigError`].
+    pub fn new(settings: LatitudeSettings, known: Option<f32>) -> Result<Self, LatitudeConfigError> {
+        let LatitudeSettings { start, bits, order, signed, degrees_per_bit, offset_deg, .. } = settings;
+        let id = settings.id()?;
+        let field = BitField::new(start, bits, order, signed);
+        let field = field.map_err(|_| LatitudeConfigError::Outside { start, bits })?;
+        let scale = (1e-10..=90.0).contains(&degrees_per_bit.abs()) && (-360.0..=360.0).contains(&offset_deg);
+        if !scale {
+            return Err(LatitudeConfigError::Scale(degrees_per_bit));
+        }
+        let known = known.map(|degrees| (degrees, Micros(0)));
+        Ok(Self { settings, id, field, known, candidate: None })
+    }
+
+    /// Returns the identifier of the frame.
+    #[must_use]
+    pub fn id(&self) -> Id {
+        self.id
+    }
+
+    /// Returns whether frames contradict the latitude in use.
+    #[must_use]
+    pub fn is_contested(&self) -> bool {
+        self.known.is_some() && self.candidate.is_some()
+    }
+
+    /// Takes a frame that was received now; `None` when it carries no latitude, or one that is not confirmed yet.
+    ///
+    /// # Errors
+    /// [`LatitudeError`]: the latitude in use stays.
+    pub fn decode(
+        &mut self,
+        frame: &impl Frame,
+        now: Micros,
+    ) -> Option<Result<ReceivedLatitude, LatitudeError>> {
+        if frame.id() != self.id {
+            return None;
+        }
+        match self.degrees(frame.data()) {
+            Ok(degrees) => self.judge(degrees, now).transpose(),
+            Err(error) => Some(Err(error)),
+        }
+    }
+
+    fn degrees(&self, data: &[u8]) -> Result<f32, LatitudeError> {
+        let LatitudeSettings { degrees_per_bit, offset_deg, invalid, .. } = self.settings;
+        let value = self.field.value(data).ok_or(LatitudeError::Short(data.len()))?;
+        if invalid.is_some() && self.field.raw(data) == invalid {
+            return Err(LatitudeError::Invalid);
+        }
+        let degrees = value as f32 * degrees_per_bit + offset_deg;
+        if (-90.0..=90.0).contains(&degrees) { Ok(degrees) } else { Err(LatitudeError::Range(degrees)) }
+    }
+
+    fn judge(&mut self, degrees: f32, now: Micros) -> Result<Option<ReceivedLatitude>, LatitudeError> {
+        if let Some((from, at)) = self.known {
+            let way = (now.since(at).0 as f32 * DEG_PER_US).min(LONGEST_DEG);
+            if (degrees - from).abs() <= NEAR_DEG + way {
+                self.known = Some((degrees, now));
+                self.candidate = None;
+                return Ok(Some(ReceivedLatitude { degrees, moved: true }));
+            }
+        }
+        let agreeing = match self.candidate {
+            Some((before, frames)) if (degrees - before).abs() <= NEAR_DEG => frames + 1,
+            _ => 1,
+        };
+        if agreeing >= CONFIRM {
+            self.known = Some((degrees, now));
+            self.candidate = None;
+            return Ok(Some(ReceivedLatitude { degrees, moved: false }));
+        }
+        self.candidate = Some((degrees, agreeing));
+        match self.known {
+            Some((from, _)) => Err(LatitudeError::Jump { from, to: degrees }),
+            None => Ok(None),
+        }
+    }
+}

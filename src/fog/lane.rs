@@ -1,0 +1,142 @@
+//! The lane takes off a gyro's turns what is known without a network: the Earth's rate at the latitude, the tilt of its
+//! axis, and its bias ([`super::rest`]).
+
+use super::part::FogErrors;
+use super::rest::{RestOutcome, RestReading};
+use crate::bias::Latitude;
+use crate::sample::{RATE_HZ, Standstill};
+use crate::units::{Angle, AngularRate};
+
+/// Fraction bits of [`Tilt`].
+const TILT_FRACTION_BITS: u32 = 30;
+
+/// The angle between the gyro's axis and the vertical of the level vehicle. Such a gyro shows a turn times its cosine.
+/// The level part of the Earth's rate, which it shows too, depends on the heading and is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Tilt {
+    /// One over the cosine, less one.
+    excess: i32,
+}
+
+impl Tilt {
+    /// The axis is vertical.
+    pub const NONE: Self = Self { excess: 0 };
+
+    /// Makes a tilt of 0 to 45 degrees; `None` for anything else.
+    #[must_use]
+    pub fn from_degrees(degrees: f32) -> Option<Self> {
+        if !(0.0..=45.0).contains(&degrees) {
+            return None;
+        }
+        // 1 / cos a - 1, by a half-angle that keeps small tilts exact.
+        let half = libm::sinf(degrees.to_radians() / 2.0);
+        let excess = 2.0 * half * half / (1.0 - 2.0 * half * half);
+        Some(Self { excess: libm::roundf(excess * (1u32 << TILT_FRACTION_BITS) as f32) as i32 })
+    }
+}
+
+/// The state of the correction.
+#[derive(Debug, Clone)]
+pub struct Lane {
+    tilt: Tilt,
+    tilt_rest: i128,
+    latitude: Option<Latitude>,
+    rest: RestReading,
+    /// What is taken off each step.
+    reading: Angle,
+}
+
+impl Lane {
+    /// Begins before the first step, without a latitude.
+    #[must_use]
+    pub const fn new(errors: FogErrors, tilt: Tilt) -> Self {
+        Self { tilt, tilt_rest: 0, latitude: None, rest: RestReading::new(errors), reading: Angle::ZERO }
+    }
+
+    /// Takes the latitude. A vehicle that has `moved` there takes the gyro's bias along.
+    pub fn set_latitude(&mut self, latitude: Option<Latitude>, moved: bool) {
+        let earth = |latitude: Latitude| latitude.step_turn().0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
+        self.latitude = latitude;
+        self.rest.set_earth(latitude.map(earth), moved);
+        self.renew();
+    }
+
+    /// Returns the latitude in use.
+    #[must_use]
+    pub fn latitude(&self) -> Option<Latitude> {
+        self.latitude
+    }
+
+    /// Takes the gyro's turn in a step and what the wheels say. Returns the vehicle's turn about the vertical, less
+    /// what the gyro reads at rest.
+    pub fn correct(
+        &mut self,
+        turn: Option<Angle>,
+        standstill: Standstill,
+    ) -> (Option<Angle>, Option<RestOutcome>) {
+        let turn = turn.map(|turn| self.about_vertical(turn));
+        let outcome = self.rest.observe(turn, standstill);
+        if outcome == Some(RestOutcome::Used) {
+            self.renew();
+        }
+        (turn.map(|turn| Angle(turn.0.saturating_sub(self.reading.0))), outcome)
+    }
+
+    /// Returns the expected error of the mean rate over a second, 1 sigma, while the vehicle turns at `rate` and shakes
+    /// by `shake`, rad/s.
+    #[must_use]
+    pub fn sigma(&self, rate: AngularRate, shake: f32) -> AngularRate {
+        let sigma = self.rest.sigma(rate.0 as f32 / AngularRate::PER_RAD_PER_SEC, shake);
+        AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
+    }
+
+    /// Returns the filter of the bias.
+    #[must_use]
+    pub fn rest(&self) -> &RestReading {
+        &self.rest
+    }
+
+    fn about_vertical(&mut self, turn: Angle) -> Angle {
+        let excess = self.tilt_rest + i128::from(turn.0) * i128::from(self.tilt.excess);
+        self.tilt_rest = excess & ((1 << TILT_FRACTION_BITS) - 1);
+        // At most 0.42 times an int64.
+        Angle(turn.0.saturating_add((excess >> TILT_FRACTION_BITS) as i64))
+    }
+
+    fn renew(&mut self) {
+        let reading = self.rest.reading() / RATE_HZ as f32 * Angle::PER_RAD;
+        self.reading = Angle(libm::roundf(reading) as i64);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_earth_comes_off_to_the_resolution_of_an_increment() {
+        for degrees in [90.0, 60.0, 0.0, -34.0, -90.0f32] {
+            let mut lane = Lane::new(FogErrors::DSP1760, Tilt::NONE);
+            lane.set_latitude(Latitude::from_degrees(degrees), false);
+            let (turn, _) = lane.correct(Some(Angle::ZERO), Standstill::Moving);
+            let taken = -turn.unwrap().rad() * 100.0;
+            let earth = 7.292_115e-5 * f64::from(degrees).to_radians().sin();
+            // 1e-5 deg/h.
+            assert!((taken - earth).abs() < 5e-11, "{degrees}: {taken} {earth}");
+        }
+    }
+
+    #[test]
+    fn a_tilted_gyro_shows_the_whole_turn() {
+        let tilt = Tilt::from_degrees(5.0).unwrap();
+        let mut lane = Lane::new(FogErrors::DSP1760, tilt);
+        // A full turn in 20 s.
+        let turn = core::f64::consts::TAU / 2_000.0 * 5f64.to_radians().cos();
+        let code = Angle((turn * f64::from(Angle::PER_RAD)).round() as i64);
+        let turned = (0..2_000).filter_map(|_| lane.correct(Some(code), Standstill::Moving).0);
+        let turned: f64 = turned.map(Angle::rad).sum();
+        assert!((turned - core::f64::consts::TAU).abs() < 1e-8, "{turned}");
+        assert_eq!([Tilt::from_degrees(0.0), Tilt::from_degrees(45.1)], [Some(Tilt::NONE), None]);
+    }
+}

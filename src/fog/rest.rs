@@ -1,0 +1,293 @@
+//! This filter finds the bias of a fibre-optic gyro from what it reads while the wheels stand.
+//!
+//! Two sources say what the gyro reads at rest:
+//!
+//! - **Standstills.** A Kalman filter of one state is fed with means over two seconds, whose weights rise and fall as a
+//!   triangle: what an idling engine shakes leaves nearly nothing in them. Each second is in two of them, so the noise of
+//!   one counts as that of a plain second: the part's angle random walk, or what successive means show if that is more.
+//!   The state walks as the part's bias does.
+//! - **Latitude and data sheet.** The gyro reads the Earth's rate and a bias of the size that the data sheet says.
+//!   Without a latitude that is worth 9 deg/h.
+//!
+//! Their weighted mean is what is taken off; its variance is reported. A latitude that becomes known, or is found to
+//! have been wrong, leaves the first source as it is.
+//!
+//! A mean counts when the second after it was still, too, for wheel sensors show a car that pulls away late. One that is
+//! further off than ten sigma was no standstill, whatever the wheels say.
+
+use super::part::FogErrors;
+use crate::bias::earth::EARTH_RATE;
+use crate::root::sqrt;
+use crate::sample::{RATE_HZ, Standstill};
+use crate::units::Angle;
+
+/// Steps of a second.
+const STEPS: i64 = RATE_HZ as i64;
+/// Uncertainty of the gyro's reading before it has stood still, rad/s: more than any latitude and bias.
+const UNKNOWN: f32 = 1e-2;
+/// Sigmas by which a standing gyro may differ from what is expected.
+const GATE: f32 = 10.0;
+/// Differences of successive means that the noise is the mean of, at most.
+const MEMORY: u8 = 64;
+/// The largest square of a difference that is believed, in variances: a turn that begins is not noise.
+const LARGEST: f32 = 9.0;
+
+/// The outcome of a second at standstill.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum RestOutcome {
+    /// The mean that ended a second before was used.
+    Used,
+    /// There is none, or it waits for the next second.
+    Waits,
+    /// The gyro turns: nothing was used.
+    Refused,
+}
+
+/// Mean and its variance.
+#[derive(Debug, Clone, Copy)]
+struct Estimate {
+    mean: f32,
+    variance: f32,
+}
+
+/// A second of turns: their sum, and their sum with weights that rise from 1 to 2 [`STEPS`] - 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Second {
+    steps: u8,
+    sum: i64,
+    rising: i64,
+}
+
+impl Second {
+    /// The second has no step.
+    pub const EMPTY: Self = Self { steps: 0, sum: 0, rising: 0 };
+
+    /// Adds a step. What saturates here, 0.7 deg/s, no standing vehicle turns by.
+    pub fn add(&mut self, turn: Angle) {
+        let code = turn.0.clamp(i32::MIN.into(), i32::MAX.into());
+        self.sum += code;
+        self.rising += code * (2 * i64::from(self.steps) + 1);
+        self.steps += 1;
+    }
+
+    /// Returns the number of steps.
+    pub const fn steps(&self) -> u8 {
+        self.steps
+    }
+
+    /// Returns the mean rate over this second and the next one, rad/s, with weights that rise and fall.
+    pub fn triangle(&self, next: &Self) -> f32 {
+        let codes = self.rising + 2 * STEPS * next.sum - next.rising;
+        codes as f32 / (2 * STEPS) as f32 / Angle::PER_RAD
+    }
+}
+
+/// The gyro's reading at rest, and what it is made of.
+#[derive(Debug, Clone)]
+pub struct RestReading {
+    errors: FogErrors,
+    /// The Earth's rate about the vertical, rad/s; `None` while no latitude is known.
+    earth: Option<f32>,
+    /// By the standstills alone.
+    measured: Estimate,
+    /// Variance of the bias by the data sheet.
+    bias_variance: f32,
+    second: Second,
+    before: Option<Second>,
+    waiting: Option<Estimate>,
+    last: Option<f32>,
+    /// Variance of a mean by the differences of successive ones, and how many it is of.
+    noise: f32,
+    differences: u8,
+    refused: bool,
+    since_walk: u32,
+}
+
+impl RestReading {
+    /// Begins before the first step, without a latitude.
+    #[must_use]
+    pub const fn new(errors: FogErrors) -> Self {
+        Self {
+            errors,
+            earth: None,
+            measured: Estimate { mean: 0.0, variance: UNKNOWN * UNKNOWN },
+            bias_variance: errors.bias * errors.bias,
+            second: Second::EMPTY,
+            before: None,
+            waiting: None,
+            last: None,
+            noise: errors.angle_walk * errors.angle_walk,
+            differences: 1,
+            refused: false,
+            since_walk: 0,
+        }
+    }
+
+    /// Takes the Earth's rate at the vehicle's place, rad/s. A vehicle that has `moved` there takes its bias along; a
+    /// latitude that was wrong has not changed what the gyro reads.
+    pub fn set_earth(&mut self, earth: Option<f32>, moved: bool) {
+        if let (Some(before), Some(now), true) = (self.earth, earth, moved) {
+            self.measured.mean += now - before;
+        }
+        self.earth = earth;
+    }
+
+    /// Takes a step's turn about the vertical (`None` where it is not known), and what the wheels say. Returns what
+    /// a second of standing led to when one is over.
+    pub fn observe(&mut self, turn: Option<Angle>, standstill: Standstill) -> Option<RestOutcome> {
+        self.since_walk += 1;
+        if self.since_walk == RATE_HZ {
+            self.since_walk = 0;
+            let walk = self.errors.bias_walk * self.errors.bias_walk;
+            self.measured.variance = (self.measured.variance + walk).min(UNKNOWN * UNKNOWN);
+            self.bias_variance += walk;
+        }
+        if standstill != Standstill::Still {
+            self.refused = false;
+        }
+        let (Some(turn), Standstill::Still) = (turn, standstill) else {
+            self.second = Second::EMPTY;
+            self.before = None;
+            self.waiting = None;
+            self.last = None;
+            return None;
+        };
+        self.second.add(turn);
+        (i64::from(self.second.steps) == STEPS).then(|| self.end_second())
+    }
+
+    /// Returns the reading at rest that is taken off, rad/s.
+    #[must_use]
+    pub fn reading(&self) -> f32 {
+        self.combined().mean
+    }
+
+    /// Returns the expected error (1 sigma) of the mean rate over a second, rad/s, while the vehicle turns at `rate` and
+    /// shakes by `shake`.
+    #[must_use]
+    pub fn sigma(&self, rate: f32, shake: f32) -> f32 {
+        let FogErrors { angle_walk, scale, .. } = self.errors;
+        let scaled = scale * rate;
+        sqrt(self.combined().variance + angle_walk * angle_walk + scaled * scaled + shake * shake)
+    }
+
+    /// Returns whether a standstill has been used.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        self.measured.variance < UNKNOWN * UNKNOWN / 2.0
+    }
+
+    /// Returns whether the wheels stand while the gyro shows a turn.
+    #[must_use]
+    pub fn is_contradicted(&self) -> bool {
+        self.refused
+    }
+
+    /// Returns the weighted mean of both sources.
+    fn combined(&self) -> Estimate {
+        let expected = match self.earth {
+            Some(earth) => Estimate { mean: earth, variance: self.bias_variance },
+            // Any latitude: the Earth's rate about the vertical lies evenly between its limits.
+            None => Estimate { mean: 0.0, variance: self.bias_variance + EARTH_RATE * EARTH_RATE / 3.0 },
+        };
+        let weight = expected.variance / (expected.variance + self.measured.variance);
+        Estimate {
+            mean: expected.mean + weight * (self.measured.mean - expected.mean),
+            variance: weight * self.measured.variance,
+        }
+    }
+
+    fn end_second(&mut self) -> RestOutcome {
+        let second = core::mem::replace(&mut self.second, Second::EMPTY);
+        let Some(before) = self.before.replace(second) else { return RestOutcome::Waits };
+        let mean = before.triangle(&second);
+        if let Some(last) = self.last.replace(mean) {
+            let square = ((mean - last) * (mean - last)).min(LARGEST * self.noise);
+            self.differences = (self.differences + 1).min(MEMORY);
+            self.noise += (square - self.noise) / f32::from(self.differences);
+        }
+        let by_part = self.errors.angle_walk * self.errors.angle_walk;
+        let seen = Estimate { mean, variance: self.noise.max(by_part) };
+        let expected = self.combined();
+        self.refused = (mean - expected.mean).abs() > GATE * sqrt(expected.variance + seen.variance);
+        if self.refused {
+            self.waiting = None;
+            return RestOutcome::Refused;
+        }
+        let Some(before) = self.waiting.replace(seen) else { return RestOutcome::Waits };
+        let Estimate { mean, variance } = self.measured;
+        let gain = variance / (variance + before.variance);
+        self.measured =
+            Estimate { mean: mean + gain * (before.mean - mean), variance: gain * before.variance };
+        RestOutcome::Used
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DEG_PER_HOUR: f32 = core::f32::consts::PI / 180.0 / 3600.0;
+
+    /// A gyro at rest that reads this, with the part's noise.
+    fn stand(rest: &mut RestReading, reading: f32, seconds: u32) -> Option<RestOutcome> {
+        let noise = FogErrors::DSP1760.angle_walk * sqrt(RATE_HZ as f32);
+        let mut last = None;
+        for step in 0..seconds * RATE_HZ {
+            let noise = if step % 2 == 0 { noise } else { -noise };
+            let turn = Angle((f64::from(reading + noise) / 100.0 * f64::from(Angle::PER_RAD)) as i64);
+            last = rest.observe(Some(turn), Standstill::Still).or(last);
+        }
+        last
+    }
+
+    #[test]
+    fn ten_minutes_of_standstill_leave_the_angle_random_walk() {
+        let mut rest = RestReading::new(FogErrors::DSP1760);
+        rest.set_earth(Some(9.0 * DEG_PER_HOUR), false);
+        stand(&mut rest, 9.4 * DEG_PER_HOUR, 600);
+        assert!((rest.reading() / DEG_PER_HOUR - 9.4).abs() < 0.02, "{}", rest.reading() / DEG_PER_HOUR);
+        // 0.012 deg per square root of an hour: 0.03 deg/h after ten minutes.
+        let bias = rest.combined().variance.sqrt() / DEG_PER_HOUR;
+        assert!((0.02..0.05).contains(&bias), "{bias}");
+    }
+
+    #[test]
+    fn a_standstill_finds_bias_and_earth_without_a_latitude() {
+        let mut rest = RestReading::new(FogErrors::DSP1760);
+        assert!(rest.sigma(0.0, 0.0) > 8.0 * DEG_PER_HOUR && !rest.is_measured());
+        stand(&mut rest, -12.0 * DEG_PER_HOUR, 60);
+        assert!((rest.reading() / DEG_PER_HOUR + 12.0).abs() < 0.05, "{}", rest.reading() / DEG_PER_HOUR);
+        // A latitude that says the same but for 0.2 deg/h changes little of it.
+        rest.set_earth(Some(-12.2 * DEG_PER_HOUR), false);
+        assert!((rest.reading() / DEG_PER_HOUR + 12.0).abs() < 0.05 && rest.is_measured());
+        // Where the Earth's rate has become another, the bias stays.
+        rest.set_earth(Some(-11.2 * DEG_PER_HOUR), true);
+        assert!((rest.reading() / DEG_PER_HOUR + 11.0).abs() < 0.05, "{}", rest.reading() / DEG_PER_HOUR);
+    }
+
+    #[test]
+    fn shaking_leaves_nearly_nothing() {
+        let mut rest = RestReading::new(FogErrors::DSP1760);
+        rest.set_earth(Some(0.0), false);
+        for step in 0..300 * RATE_HZ {
+            // 3e-4 rad/s at 13.7 Hz: 60 deg/h, plainly averaged over a second.
+            let shake = 3e-4 * libm::sin(f64::from(step) * 0.01 * 13.7 * core::f64::consts::TAU);
+            let turn = (2e-6 + shake) * 0.01 * f64::from(Angle::PER_RAD);
+            rest.observe(Some(Angle(turn as i64)), Standstill::Still);
+        }
+        assert!((rest.reading() - 2e-6).abs() < 0.05 * DEG_PER_HOUR, "{}", rest.reading() / DEG_PER_HOUR);
+        assert!(!rest.is_contradicted());
+    }
+
+    #[test]
+    fn a_turn_on_standing_wheels_is_refused() {
+        let mut rest = RestReading::new(FogErrors::DSP1760);
+        rest.set_earth(Some(0.0), false);
+        assert_eq!(stand(&mut rest, 60.0 * DEG_PER_HOUR, 60), Some(RestOutcome::Refused));
+        assert!(rest.is_contradicted() && !rest.is_measured() && rest.reading() == 0.0);
+        assert_eq!(rest.observe(None, Standstill::Moving), None);
+        assert!(!rest.is_contradicted());
+    }
+}

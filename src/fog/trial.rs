@@ -1,0 +1,57 @@
+//! The trial drops FoGNet where standstills show no gain by it.
+//!
+//! A standing vehicle turns by nothing, so what is left of a rate is its error. Each second the squares of both rates,
+//! with FoGNet and without, are compared over the same two seconds ([`super::rest`]); their difference is summed up and
+//! forgotten again over some two minutes of standing. FoGNet is dropped, until the next start, when it is clearly worse
+//! after ten seconds, or no better after thirty.
+
+use super::rest::Second;
+use crate::sample::{RATE_HZ, Standstill};
+use crate::units::Angle;
+
+/// Comparisons after which FoGNet must not be clearly worse.
+const SOON: u8 = 10;
+/// Comparisons after which it must be better.
+const LATE: u8 = 30;
+/// Comparisons that the sum is of, at most.
+const MEMORY: f32 = 128.0;
+/// The variance of a mean that is clearly more than noise: 5 deg/h.
+const CLEAR: f32 = 6e-10;
+
+/// The comparison of the rates with and without FoGNet.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    second: [Second; 2],
+    before: Option<[Second; 2]>,
+    /// Sum of the squares without FoGNet less those with it, rad^2/s^2.
+    gain: f32,
+    comparisons: u8,
+}
+
+impl Trial {
+    /// Begins before the first step.
+    pub const START: Self = Self { second: [Second::EMPTY; 2], before: None, gain: 0.0, comparisons: 0 };
+
+    /// Takes a step's turns without FoGNet and with it, where both are known. Returns whether FoGNet is to be dropped.
+    pub fn observe(&mut self, turns: Option<[Angle; 2]>, standstill: Standstill) -> bool {
+        let (Some(turns), Standstill::Still) = (turns, standstill) else {
+            self.second = [Second::EMPTY; 2];
+            self.before = None;
+            return false;
+        };
+        for (second, turn) in self.second.iter_mut().zip(turns) {
+            second.add(turn);
+        }
+        let [first, _] = &self.second;
+        if u32::from(first.steps()) < RATE_HZ {
+            return false;
+        }
+        let second = core::mem::replace(&mut self.second, [Second::EMPTY; 2]);
+        let Some([lane, network]) = self.before.replace(second) else { return false };
+        let [next_lane, next_network] = &second;
+        let (lane, network) = (lane.triangle(next_lane), network.triangle(next_network));
+        self.gain += lane * lane - network * network - self.gain / MEMORY;
+        self.comparisons = self.comparisons.saturating_add(1);
+        self.comparisons >= SOON && self.gain < -CLEAR || self.comparisons >= LATE && self.gain <= 0.0
+    }
+}
