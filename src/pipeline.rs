@@ -257,7 +257,7 @@ impl Pipeline {
         };
         count(&mut counters.windows, 1);
         count(&mut counters.clamped_inputs, u32::from(estimate.clamped_inputs));
-        match compensator.revise(&estimate.corrections) {
+        match compensator.revise(&estimate) {
             Ok(()) => {
                 windows.accept();
                 uncertainty.window(estimate.scale);
@@ -275,9 +275,10 @@ impl Pipeline {
     fn estimate_rates(&mut self, frame: &Frame, zero: &ZeroPoint, quiet: bool) -> Rates {
         let sample = &frame.sample;
         let features = window::features(sample, &zero.reading());
-        let [.., rate] = features.map(AngularRate);
+        let [_, _, _, rates @ ..] = features.map(AngularRate);
+        let [.., rate] = rates;
         let good = sample.validity.is_good();
-        self.state.compensator.add(frame.tick, rate, sample.validity);
+        self.state.compensator.add(frame.tick, rates, sample.validity);
         self.state.inertial = good.then_some(features);
         if good {
             self.state.windows.add(features);

@@ -198,7 +198,7 @@ mod tests {
 
     impl WindowNetwork for Constant {
         fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
-            Estimate { corrections: [AngularRate(100); WINDOW], scale: SCALE_MIN, clamped_inputs: 0 }
+            Estimate { corrections: [AngularRate(100); WINDOW], scale: SCALE_MIN, ..Estimate::NONE }
         }
     }
 

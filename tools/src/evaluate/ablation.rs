@@ -41,7 +41,7 @@ impl WindowNetwork for Nothing {
     fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
         let corrections = [AngularRate::ZERO; gyronet::model::window::WINDOW];
         // 1e-3 rad/s: with it a second's sigma is that of an uncorrected rate.
-        Estimate { corrections, scale: AngularRate(134_218), clamped_inputs: 0 }
+        Estimate { corrections, scale: AngularRate(134_218), ..Estimate::NONE }
     }
 }
 
