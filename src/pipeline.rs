@@ -119,6 +119,7 @@ impl Pipeline {
     pub fn correct(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
         let mut frame = self.state.aligner.align(sample).inspect_err(|error| self.refuse(*error))?;
         frame.sample = self.config.mounting.sample(&sample);
+        frame.sample.angular_rate = self.config.gyro_map.rate(frame.sample.angular_rate);
         count(&mut self.state.counters.samples, 1);
         if frame.missing > 0 {
             count(&mut self.state.counters.missing, frame.missing);

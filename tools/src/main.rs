@@ -40,6 +40,7 @@ struct Cli {
 enum Command {
     Demo(commands::demo::Args),
     Evaluate(commands::evaluate::Args),
+    Calibrate(commands::calibrate::Args),
     Replay(commands::replay::Args),
     Campaign(commands::campaign::Args),
     Simulate(commands::simulate::Args),
@@ -60,6 +61,7 @@ fn main() -> ExitCode {
     let result = match &command {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
+        Command::Calibrate(args) => commands::calibrate::run(args, common),
         Command::Replay(args) => commands::replay::run(args, common),
         Command::Campaign(args) => commands::campaign::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
