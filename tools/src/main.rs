@@ -15,7 +15,8 @@ use std::process::ExitCode;
 ///   t_s                    time, s
 ///   acc_x, acc_y, acc_z    specific force, m/s^2 (x forward, y left, z up)
 ///   gyr_x, gyr_y, gyr_z    angular rate, rad/s
-///   ref_gyr_z              true yaw rate, rad/s; optional, needed for errors
+///   ref_gyr_z              true yaw rate, rad/s; optional, this or the next is needed for errors
+///   ref_yaw                course by GNSS, rad to the left; optional, empty where unknown
 ///   wheel1_rate ..4        wheels, rad/s; optional (front right, rear right, front left, rear left)
 ///
 /// The vehicle must stand still for the first 3 s.
