@@ -3,8 +3,7 @@
 
 use gyronet::model::blob::Shape;
 use gyronet::model::window::{Features, WINDOW};
-use gyronet::model::{Estimate, SCALE_MIN, WindowNetwork};
-use gyronet::units::AngularRate;
+use gyronet::model::{Estimate, WindowNetwork};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::rates::{Network, Networks, Rates};
@@ -23,7 +22,7 @@ struct Uncorrected;
 
 impl WindowNetwork for Uncorrected {
     fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
-        Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 }
+        Estimate::NONE
     }
 }
 
