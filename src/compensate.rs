@@ -13,7 +13,7 @@
 //! most a bounded part of it, so that none jumps. With c_k(t) the estimate for sample k as known
 //! at sample t, and L the lag:
 //! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`.
-//! The prompt rate carries 1/128 of what it owes with each sample ([`PROMPT_CARRY`]). What a window revises is mostly
+//! The prompt rate carries an eighth of what it owes with each sample. What a window revises is mostly
 //! noise of samples that are over, which the newest sample does not have; carried at once it would be added to it.
 //!
 //! No window of 0.1 s can know a constant error, and one that a network was trained to is wrong on another vehicle.
@@ -73,8 +73,8 @@ impl CompensateConfig {
     };
 }
 
-/// The prompt rate carries one part in so many of what it owes: a time constant of 1.28 s.
-const PROMPT_CARRY: i64 = 128;
+/// The prompt rate carries one part in so many of what it owes: a time constant of 80 ms.
+const PROMPT_CARRY: i64 = 8;
 /// Samples over which a carry may be spread before it is reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
 /// The number of quarters of a second of standing whose angle may still be carried: the last second and the quarter
