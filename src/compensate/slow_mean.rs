@@ -1,7 +1,7 @@
 //! The slow mean follows the constant part of the corrections, so that it can be taken out of them.
 
-/// Windows over which the mean goes back: 51 s with one every five samples.
-const MEMORY: i64 = 1024;
+/// Windows over which the mean goes back: 13 s with one every five samples.
+const MEMORY: i64 = 256;
 /// Fraction bits of the mean.
 const Q: u32 = 16;
 

@@ -70,7 +70,7 @@ impl Ledger {
         assert_eq!(window.len(), WINDOW, "windows cover samples that went out");
         let beyond: i64 = window.iter().map(|(sample, estimate)| estimate - sample.steady).sum();
         let (constant, windows) = &mut self.constant;
-        *windows = (*windows + 1).min(1_024);
+        *windows = (*windows + 1).min(256);
         *constant += ((beyond / WINDOW as i64 * 65_536) - *constant) / *windows;
         for (sample, estimate) in &mut window[mode.used()] {
             sample.estimates.push(*estimate - (*constant >> 16));
