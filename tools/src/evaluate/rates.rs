@@ -136,7 +136,7 @@ impl Rates {
             Method::FIR_ZERO_RATE => LowPass::chosen().filter(&updated)[drive.compared()].to_vec(),
             Method::VQF => {
                 let samples = drive.steps.iter().map(|step| unbiased(&drive, row(step.row)));
-                vqf::rates(vqf::published(), samples)[drive.compared()].to_vec()
+                vqf::rates(vqf::on_a_vehicle(), samples)[drive.compared()].to_vec()
             }
             Method::GYRONET_F32 => settled(&float),
             Method::GYRONET_INT => gyronet.clone(),
