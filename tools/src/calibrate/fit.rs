@@ -108,7 +108,7 @@ fn solve(
         weights =
             residuals.map(|residual| if residual.abs() <= limit { 1.0 } else { limit / residual.abs() });
     }
-    let shares = std::array::from_fn(|k| solution[k]);
+    let shares = std::array::from_fn(|k| if fitted[k] { solution[k] } else { 0.0 });
     (shares, solution.iter().skip(3).copied().collect())
 }
 
