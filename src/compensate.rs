@@ -3,8 +3,8 @@
 //! A sample's best estimate is the mean of what the windows that cover it say ([`Mode`]). It is
 //! known some samples later; two rates go out for every sample all the same:
 //!
-//! - the **prompt** one at once, for a receiver that steers by it. It starts from the mean of the
-//!   last window, for no window has seen the sample yet.
+//! - the **prompt** one at once, for a receiver that steers by it. No window has seen the sample yet, so of its
+//!   correction only the steady part is known ([`SteadyGain`]: mounting and gain of the unit).
 //! - the **navigation** one [`CompensateConfig::lag`] samples later, for a receiver that sums it
 //!   up to a heading. Most of what there is to know is known by then.
 //!
@@ -13,6 +13,11 @@
 //! most a bounded part of it, so that none jumps. With c_k(t) the estimate for sample k as known
 //! at sample t, and L the lag:
 //! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`.
+//! The prompt rate carries an eighth of what it owes with each sample. What a window revises is mostly
+//! noise of samples that are over, which the newest sample does not have; carried at once it would be added to it.
+//!
+//! No window of 0.1 s can know a constant error, and one that a network was trained to is wrong on another vehicle.
+//! The mean of the corrections beyond their steady part is taken out of them ([`SlowMean`]): standstill finds the bias.
 //!
 //! | when | prompt | navigation |
 //! |---|---|---|
@@ -24,11 +29,14 @@
 //! Samples are counted, not time: a gap delays the samples before it, it swallows none.
 
 mod mode;
+mod slow_mean;
 
 pub use mode::{DELAY, Hop, Lag, Mode, OutOfRange};
 
-use crate::model::Corrections;
+use slow_mean::SlowMean;
+
 use crate::model::window::WINDOW;
+use crate::model::{Estimate, SteadyGain};
 use crate::sample::{RATE_HZ, Validity};
 use crate::units::AngularRate;
 
@@ -65,6 +73,8 @@ impl CompensateConfig {
     };
 }
 
+/// The prompt rate carries one part in so many of what it owes: a time constant of 80 ms.
+const PROMPT_CARRY: i64 = 8;
 /// Samples over which a carry may be spread before it is reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
 /// The number of quarters of a second of standing whose angle may still be carried: the last second and the quarter
@@ -85,7 +95,9 @@ struct Entry {
     held: bool,
     sum: i64,
     count: i32,
-    /// The estimate; the prior where `count` is 0.
+    /// The steady part of the correction, known with the sample.
+    steady: i32,
+    /// The estimate; the steady part where `count` is 0.
     estimate: i32,
 }
 
@@ -143,8 +155,10 @@ pub struct Compensator {
     config: CompensateConfig,
     /// The newest sample last.
     kept: [Option<Entry>; KEPT],
-    /// Mean of the last window: what a sample goes out with before a window has covered it.
-    prior: i32,
+    /// The steady gain of the newest estimate's model; none without an estimate.
+    steady_gain: SteadyGain,
+    /// The mean of the corrections beyond their steady part.
+    slow_mean: SlowMean,
     /// Revisions not yet in the prompt rate, and in the navigation rate.
     prompt_carry: i64,
     navigation_carry: i64,
@@ -162,7 +176,8 @@ impl Compensator {
         Self {
             config,
             kept: [None; KEPT],
-            prior: 0,
+            steady_gain: SteadyGain::NONE,
+            slow_mean: SlowMean::NONE,
             prompt_carry: 0,
             navigation_carry: 0,
             held: [0; HELD_QUARTERS],
@@ -178,23 +193,28 @@ impl Compensator {
     /// Revises the samples of the window that ended [`Mode::delay`] samples before the next one.
     ///
     /// # Errors
-    /// [`Implausible`]: nothing was revised, and the prior falls back to zero.
-    pub fn revise(&mut self, corrections: &Corrections) -> Result<(), Implausible> {
+    /// [`Implausible`]: nothing was revised, and the next samples have no steady part.
+    pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
         let CompensateConfig { mode, lag, max_mean, max_single, .. } = self.config;
+        let corrections = &estimate.corrections;
         let average = mean(corrections);
         let largest = corrections.iter().max_by_key(|c| c.0.unsigned_abs()).copied().unwrap_or_default();
         if average.unsigned_abs() > max_mean.0.unsigned_abs()
             || largest.0.unsigned_abs() > max_single.0.unsigned_abs()
         {
-            self.prior = 0;
+            self.forget();
             return Err(Implausible { mean: AngularRate(average), largest });
         }
+        self.steady_gain = estimate.steady_gain;
         let used = mode.used();
-        self.prior = mean(corrections.get(used.clone()).unwrap_or(corrections));
         let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
+        let window = self.kept.iter().skip(oldest).zip(corrections);
+        let beyond = window.filter_map(|(entry, c)| Some(i64::from(c.0) - i64::from(entry.as_ref()?.steady)));
+        self.slow_mean.observe(beyond.sum::<i64>() / WINDOW as i64);
+        let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
-            entry.sum += i64::from(correction.0);
+            entry.sum += i64::from(correction.0) - constant;
             entry.count += 1;
             let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
             let revision = estimate - i64::from(entry.estimate);
@@ -210,12 +230,13 @@ impl Compensator {
         Ok(())
     }
 
-    /// Takes in a sample: its gyro rate less static bias.
-    pub fn add(&mut self, tick: u32, rate: AngularRate, validity: Validity) {
+    /// Takes in a sample: its gyro rates less static bias.
+    pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity) {
         self.kept.rotate_left(1);
-        let estimate = self.prior;
-        self.kept[KEPT - 1] =
-            Some(Entry { tick, rate: rate.0, validity, held: false, sum: 0, count: 0, estimate });
+        let steady = self.steady_gain.correction(rates).0;
+        let [.., AngularRate(rate)] = rates;
+        let entry = Entry { tick, rate, validity, held: false, sum: 0, count: 0, steady, estimate: steady };
+        self.kept[KEPT - 1] = Some(entry);
     }
 
     /// Returns the rate of the newest sample, less a bias that is subtracted beside the estimate.
@@ -224,7 +245,8 @@ impl Compensator {
     pub fn prompt(&mut self, bias: AngularRate) -> Option<Compensated> {
         let entry = self.kept[KEPT - 1]?;
         let taken = i64::from(entry.estimate) + i64::from(bias.0);
-        Some(emit(&entry, taken, &mut self.prompt_carry, self.config.max_carry))
+        let carried = self.prompt_carry / PROMPT_CARRY;
+        Some(emit(&entry, taken, carried, &mut self.prompt_carry, self.config.max_carry))
     }
 
     /// Returns the rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before there is one.
@@ -244,7 +266,8 @@ impl Compensator {
             self.held[0] += i64::from(entry.rate) - taken;
             taken = i64::from(entry.rate);
         }
-        Some(emit(entry, taken, &mut self.navigation_carry, self.config.max_carry))
+        let carried = self.navigation_carry;
+        Some(emit(entry, taken, carried, &mut self.navigation_carry, self.config.max_carry))
     }
 
     /// Returns the newest sample that no window changes any more; each sample is returned once.
@@ -259,9 +282,9 @@ impl Compensator {
         })
     }
 
-    /// Drops the prior, because no estimate came.
+    /// Lets the next samples go without a steady part, because no estimate came.
     pub fn forget(&mut self) {
-        self.prior = 0;
+        self.steady_gain = SteadyGain::NONE;
     }
 
     /// Notes that the vehicle stands no more. It may have moved before that was noticed, so what was held at zero in
@@ -295,11 +318,11 @@ impl Compensator {
     }
 }
 
-/// Takes off the estimate and a bounded part of the carry. What the code cannot hold stays owed.
-fn emit(entry: &Entry, taken: i64, carry: &mut i64, max_carry: AngularRate) -> Compensated {
+/// Takes off the estimate and `carried` of the carry, as far as the bound allows. What the code cannot hold stays owed.
+fn emit(entry: &Entry, taken: i64, carried: i64, carry: &mut i64, max_carry: AngularRate) -> Compensated {
     // A negative bound would be none.
     let bound = if entry.validity.is_good() { i64::from(max_carry.0).max(0) } else { 0 };
-    let carried = (*carry).clamp(-bound, bound);
+    let carried = carried.clamp(-bound, bound);
     let wanted = i64::from(entry.rate) - taken - carried;
     let rate = wanted.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
     *carry += rate - wanted - carried;

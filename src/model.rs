@@ -26,6 +26,7 @@ pub use fognet_blob::FogBlob;
 pub use gyronet::GyroNet;
 pub use window::{FEATURES, Features, WINDOW};
 
+use crate::nn::linear::Linear;
 use crate::units::AngularRate;
 
 /// Estimates of the yaw gyro's error, one for each sample of a window, oldest first.
@@ -53,4 +54,33 @@ pub struct Estimate {
     pub scale: AngularRate,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
+    /// The part of the corrections that follows from a sample's own rates.
+    pub steady_gain: SteadyGain,
+}
+
+impl Estimate {
+    /// No correction, and nothing known of its error.
+    pub const NONE: Self = Self {
+        corrections: [AngularRate::ZERO; window::WINDOW],
+        scale: SCALE_MAX,
+        clamped_inputs: 0,
+        steady_gain: SteadyGain::NONE,
+    };
+}
+
+/// The correction of an angular rate that does not change, for each of the rates about x, y and z: what a linear part
+/// makes of the unit's mounting and gain. Q24, from rate codes to a rate code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SteadyGain(pub [i32; 3]);
+
+impl SteadyGain {
+    /// The gain of a model without a linear part.
+    pub const NONE: Self = Self([0; 3]);
+
+    /// Returns the correction of a sample with these rates.
+    #[must_use]
+    pub fn correction(&self, rates: [AngularRate; 3]) -> AngularRate {
+        AngularRate(Linear::output(&self.0, &rates.map(|rate| rate.0)))
+    }
 }

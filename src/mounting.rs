@@ -1,6 +1,7 @@
-//! A rotation turns the sensor's axes into the vehicle's: a configured one, and levelling at standstill.
+//! A rotation turns the sensor's axes into the vehicle's: a configured one, and levelling at standstill. A gyro map
+//! then takes out what is left of mounting and gain in the rates, as a calibration of the unit found it.
 //!
-//! Rotations are 3 x 3 matrices of Q30 numbers, applied in integers: the same bits everywhere.
+//! Both are 3 x 3 matrices of Q30 numbers, applied in integers: the same bits everywhere.
 //!
 //! Levelling finds the vertical from the accelerometer. It cannot tell a tilted board from a
 //! tilted street: on the recordings the parking slopes of 2 to 8 degrees, taken for mounting,
@@ -156,10 +157,64 @@ impl Rotation {
 
     /// Turns a vector, rounded to nearest and saturated.
     fn turn(&self, vector: [i32; 3]) -> [i32; 3] {
-        let Self(rows) = self;
-        rows.map(|row| {
-            let sum: i64 = row.iter().zip(vector).map(|(m, v)| i64::from(*m) * i64::from(v)).sum();
-            ((sum + (1 << (Q - 1))) >> Q).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+        product(&self.0, vector)
+    }
+}
+
+/// Returns a Q30 matrix times a vector, rounded to nearest and saturated.
+fn product(rows: &[[i32; 3]; 3], vector: [i32; 3]) -> [i32; 3] {
+    rows.map(|row| {
+        let sum: i64 = row.iter().zip(vector).map(|(m, v)| i64::from(*m) * i64::from(v)).sum();
+        ((sum + (1 << (Q - 1))) >> Q).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+    })
+}
+
+/// A map of the gyro's three rates, in the vehicle's axes, to the true ones: gain and mounting of one unit.
+///
+/// Its matrix is close to the identity: within [`GyroMap::MAX_GAIN`] on the diagonal and [`GyroMap::MAX_CROSS`] beside
+/// it. More is a mounting that has to be configured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct GyroMap([[i32; 3]; 3]);
+
+impl GyroMap {
+    /// The map that leaves every bit as it is.
+    pub const IDENTITY: Self = Self(Rotation::IDENTITY.0);
+    /// Largest gain error of a unit.
+    pub const MAX_GAIN: f32 = 0.05;
+    /// Largest share of another axis: the sine of 8.6 degrees.
+    pub const MAX_CROSS: f32 = 0.15;
+
+    /// Makes a map of a matrix, row by row; `None` where an element is further from the identity than any unit's.
+    #[must_use]
+    pub fn from_elements(elements: [[f32; 3]; 3]) -> Option<Self> {
+        let map = Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)));
+        let finite = elements.as_flattened().iter().all(|element| element.is_finite());
+        (finite && map.is_plausible()).then_some(map)
+    }
+
+    /// Returns the matrix, row by row.
+    #[must_use]
+    pub fn elements(&self) -> [[f32; 3]; 3] {
+        self.0.map(|row| row.map(|element| element as f32 / ONE))
+    }
+
+    /// Returns whether every element is as near to the identity as that of a unit.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        let [gain, cross] = [Self::MAX_GAIN, Self::MAX_CROSS].map(|limit| (limit * ONE) as u32);
+        self.0.iter().zip(Self::IDENTITY.0).enumerate().all(|(row, (elements, identity))| {
+            elements.iter().zip(identity).enumerate().all(|(column, (element, identity))| {
+                element.abs_diff(identity) <= if row == column { gain } else { cross }
+            })
         })
+    }
+
+    /// Returns the true rates of what the gyro reads.
+    #[must_use]
+    #[doc(hidden)]
+    pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {
+        product(&self.0, rate.map(|axis| axis.0)).map(AngularRate)
     }
 }

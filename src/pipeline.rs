@@ -119,6 +119,7 @@ impl Pipeline {
     pub fn correct(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
         let mut frame = self.state.aligner.align(sample).inspect_err(|error| self.refuse(*error))?;
         frame.sample = self.config.mounting.sample(&sample);
+        frame.sample.angular_rate = self.config.gyro_map.rate(frame.sample.angular_rate);
         count(&mut self.state.counters.samples, 1);
         if frame.missing > 0 {
             count(&mut self.state.counters.missing, frame.missing);
@@ -257,7 +258,7 @@ impl Pipeline {
         };
         count(&mut counters.windows, 1);
         count(&mut counters.clamped_inputs, u32::from(estimate.clamped_inputs));
-        match compensator.revise(&estimate.corrections) {
+        match compensator.revise(&estimate) {
             Ok(()) => {
                 windows.accept();
                 uncertainty.window(estimate.scale);
@@ -275,9 +276,10 @@ impl Pipeline {
     fn estimate_rates(&mut self, frame: &Frame, zero: &ZeroPoint, quiet: bool) -> Rates {
         let sample = &frame.sample;
         let features = window::features(sample, &zero.reading());
-        let [.., rate] = features.map(AngularRate);
+        let [_, _, _, rates @ ..] = features.map(AngularRate);
+        let [.., rate] = rates;
         let good = sample.validity.is_good();
-        self.state.compensator.add(frame.tick, rate, sample.validity);
+        self.state.compensator.add(frame.tick, rates, sample.validity);
         self.state.inertial = good.then_some(features);
         if good {
             self.state.windows.add(features);

@@ -19,7 +19,7 @@ mod record;
 #[doc(hidden)]
 pub mod slots;
 
-pub use calibration::{BiasPoint, Calibration, Level};
+pub use calibration::{BiasPoint, Calibration, Level, UnitMap};
 pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};
 pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use record::{Record, Store};

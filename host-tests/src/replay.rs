@@ -129,7 +129,7 @@ impl Board {
         let config = coprocessor::Config {
             wheels: Some(wheels),
             clock: Clock::Sensor,
-            ..configuration.coprocessor(&Calibration::NONE)
+            ..configuration.coprocessor(&Calibration::NONE, 0)
         };
         Self {
             coprocessor: Coprocessor::new(config),

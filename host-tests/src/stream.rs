@@ -23,7 +23,7 @@ pub fn drive(ticks: impl IntoIterator<Item = u64>) -> impl Iterator<Item = ImuSa
 
 /// Returns a network whose corrections are always the same, rad/s.
 pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
-    move |_| Some(Estimate { corrections: [rate(correction); WINDOW], scale: SCALE_MIN, clamped_inputs: 0 })
+    move |_| Some(Estimate { corrections: [rate(correction); WINDOW], scale: SCALE_MIN, ..Estimate::NONE })
 }
 
 /// Runs samples through a pipeline; estimates are delivered at once, `None` never.

@@ -168,7 +168,7 @@ mod firmware {
                     let estimate = Estimate {
                         corrections: [AngularRate(1_000); WINDOW],
                         scale: SCALE_MIN,
-                        clamped_inputs: 0,
+                        ..Estimate::NONE
                     };
                     pipeline.deliver(due.end, estimate);
                 }

@@ -6,7 +6,7 @@
 
 use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
-use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
+use super::{Estimate, SCALE_MAX, SCALE_MIN, SteadyGain, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::bilstm::{self, Direction, Pass, Run};
 use crate::nn::lstm::{DirectionWeights, Scratch};
@@ -75,6 +75,7 @@ pub struct GyroNet<
     const R: usize = { recurrent_words(HIDDEN) },
 > {
     blob: Blob<'w>,
+    steady_gain: SteadyGain,
     state: S,
 }
 
@@ -83,7 +84,7 @@ impl<'w> GyroNet<'w> {
     #[must_use]
     pub fn new(blob: Blob<'w>) -> Self {
         // The memory is that of the largest network.
-        Self { blob, state: GyroNetState::ZERO }
+        Self { blob, steady_gain: steady_gain(&blob), state: GyroNetState::ZERO }
     }
 }
 
@@ -102,7 +103,7 @@ where
             return Err(BlobError::Units { found, largest: U as u16 });
         }
         state.borrow_mut().under_way = false;
-        Ok(Self { blob, state })
+        Ok(Self { blob, steady_gain: steady_gain(&blob), state })
     }
 
     /// Returns the weights that it runs on.
@@ -114,7 +115,7 @@ where
     /// Loads a window and runs the linear part on it; [`GyroNet::advance`] then runs the Bi-LSTMs piece by piece. One
     /// that was under way is dropped.
     pub fn start(&mut self, window: &[Features; WINDOW]) {
-        let Self { blob, state } = self;
+        let Self { blob, state, .. } = self;
         let state = state.borrow_mut();
         state.clamped_inputs = load(blob, window, &mut state.input);
         state.linear = [0; _];
@@ -129,7 +130,7 @@ where
     /// Runs a bounded piece of the window (one direction of one layer, a third of it or less); returns the estimate
     /// with the last one, `None` before that and when none is under way.
     pub fn advance(&mut self) -> Option<Estimate> {
-        let Self { blob, state } = self;
+        let Self { blob, steady_gain, state } = self;
         let GyroNetState { input, layer1, scratch, recurrent, linear, sums, clamped_inputs, run, under_way } =
             state.borrow_mut();
         if !*under_way {
@@ -158,14 +159,14 @@ where
         let log_scale =
             sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
         let scale = AngularRate(times_exp2(blob.scale_unit, log_scale)).clamp(SCALE_MIN, SCALE_MAX);
-        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs })
+        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, steady_gain: *steady_gain })
     }
 
     /// Returns the newest sample's correction without a scale, and the clamped inputs. The backward half of layer 2
     /// needs just its first step for that, which saves a third of the work; the result is the last of
     /// [`WindowNetwork::estimate`]'s, bit for bit.
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
-        let Self { blob, state } = self;
+        let Self { blob, state, .. } = self;
         let GyroNetState { input, layer1, scratch, recurrent, .. } = state.borrow_mut();
         let clamped_inputs = load(blob, window, input);
         let newest = blob.linear.and_then(|linear| linear.rows().last());
@@ -202,6 +203,19 @@ where
         }
         (AngularRate(blob.gyro_error.scale(sum).saturating_add(linear)), clamped_inputs)
     }
+}
+
+/// Returns what the outputs of the linear part make of steady rates, on average.
+fn steady_gain(blob: &Blob<'_>) -> SteadyGain {
+    const RATES: core::ops::Range<usize> = FEATURES - 3..FEATURES;
+    let mut sums = [0; 3];
+    for sample in blob.linear.iter().flat_map(Linear::rows).flat_map(|row| row.chunks_exact(FEATURES)) {
+        for (sum, weight) in sums.iter_mut().zip(sample.get(RATES).unwrap_or_default()) {
+            *sum += i64::from(*weight);
+        }
+    }
+    // A row's sum is below 2^32 in magnitude; a gain of 128 and more is no unit's.
+    SteadyGain(sums.map(|sum| i32::try_from(sum / WINDOW as i64).unwrap_or(0)))
 }
 
 /// Normalises the window into the first layer's input, if there is one; counts what had to be clamped.

@@ -2,7 +2,7 @@
 
 use crate::bias::{EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
-use crate::mounting::{Levelling, Rotation};
+use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::uncertainty::UncertaintyConfig;
 
 /// Everything that can be set about the way from sample to rate.
@@ -10,6 +10,8 @@ use crate::pipeline::uncertainty::UncertaintyConfig;
 pub struct PipelineConfig {
     /// The rotation of the board in the vehicle.
     pub mounting: Rotation,
+    /// The gain and the rest of the mounting of this unit's gyro.
+    pub gyro_map: GyroMap,
     /// The condition under which the accelerometer corrects that.
     pub levelling: Levelling,
     /// Limits of static initialisation.
@@ -30,6 +32,7 @@ impl PipelineConfig {
     /// The configuration of a MEMS part on a car, x forward, y left, z up.
     pub const DEFAULT: Self = Self {
         mounting: Rotation::IDENTITY,
+        gyro_map: GyroMap::IDENTITY,
         levelling: Levelling::DEFAULT,
         static_init: StaticConfig::DEFAULT,
         earth_rate: EarthRate::LeftInBias,

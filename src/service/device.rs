@@ -271,6 +271,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 self.store_calibration()?;
                 self.calibration_state = State::Idle;
             }
+            Calibrate::SetUnit(unit) => self.set_unit(unit)?,
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use super::event::{CanFault, ClockFault, Crash, LogPage, ResetCause, SensorFault
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::slots::{SlotError, WeightSource};
-use crate::store::{Calibration, Configuration, Slot, StoreError};
+use crate::store::{Calibration, Configuration, Slot, StoreError, UnitMap};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +66,7 @@ impl Request {
     pub const fn interrupts(&self) -> bool {
         match self {
             Self::SetConfiguration { .. }
-            | Self::Calibrate(Calibrate::Store)
+            | Self::Calibrate(Calibrate::Store | Calibrate::SetUnit(_))
             | Self::WeightsBegin { .. }
             | Self::WeightsBlock { .. }
             | Self::WeightsActivate
@@ -97,6 +97,8 @@ pub enum Calibrate {
     Cancel,
     /// Keep over the next start what was found.
     Store,
+    /// Store the map of this unit's gyro, or none; it holds from the next start on.
+    SetUnit(Option<UnitMap>),
 }
 
 /// The answers.
@@ -168,6 +170,14 @@ pub enum Refusal {
     /// There is no result that could be stored.
     #[error("no calibration has been found that could be stored")]
     NothingFound,
+    /// The map of the gyro was found with other weights than the board runs.
+    #[error("found with the weights {found:08x}, the board runs {runs:08x}")]
+    OtherWeights {
+        /// The checksum of those.
+        found: u32,
+        /// The checksum of the board's.
+        runs: u32,
+    },
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
     #[error("the vehicle is not proven to stand still")]
     Moving,

@@ -2,7 +2,7 @@
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
-use crate::mounting::Rotation;
+use crate::mounting::{GyroMap, Rotation};
 use crate::units::{AngularRate, CentiCelsius};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -46,6 +46,16 @@ impl Level {
     }
 }
 
+/// The gain and mounting of the unit's gyro, as a drive with a heading reference has shown them (`gyronet calibrate`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct UnitMap {
+    /// The map.
+    pub gyro_map: GyroMap,
+    /// The checksum of the weights that corrected the drive: what they take off by themselves is not in the map.
+    pub weights: u32,
+}
+
 /// Bias, its temperature table, and the mounting as found on level ground.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Calibration {
@@ -55,11 +65,19 @@ pub struct Calibration {
     pub temperature_table: Vec<BiasPoint, MAX_POINTS>,
     /// The result of the last mounting calibration.
     pub level: Option<Level>,
+    /// The result of a calibration against a heading reference.
+    pub unit: Option<UnitMap>,
 }
 
 impl Calibration {
     /// The calibration of an unknown sensor.
-    pub const NONE: Self = Self { gyro_bias: None, temperature_table: Vec::new(), level: None };
+    pub const NONE: Self = Self { gyro_bias: None, temperature_table: Vec::new(), level: None, unit: None };
+
+    /// Returns the map for a board that runs these weights; `None` where there is none or it belongs to others.
+    #[must_use]
+    pub fn gyro_map(&self, weights: u32) -> Option<GyroMap> {
+        self.unit.filter(|unit| unit.weights == weights).map(|unit| unit.gyro_map)
+    }
 
     /// Takes over the bias of a static calibration, and into the table where the part gives its
     /// temperature: instead of a point that is nearer than 5 deg C, else as a new one. A full
@@ -89,7 +107,12 @@ impl Calibration {
 
 impl Record for Calibration {
     const KEY: u8 = 2;
-    const VERSION: u8 = 1;
+    const VERSION: u8 = 2;
+
+    /// Returns the end that layout 1 lacks: it ended before `unit`.
+    fn missing(version: u8) -> Option<&'static [u8]> {
+        (version == 1).then_some(&[0])
+    }
 
     fn check(&self) -> Result<(), FieldError> {
         let biases = self.gyro_bias.iter().chain(self.temperature_table.iter().map(|point| &point.gyro_bias));
@@ -108,6 +131,9 @@ impl Record for Calibration {
         if let Some(Level { roll_deg, pitch_deg }) = self.level {
             within(Field::CalibrationRollDeg, roll_deg, -MAX_TILT_DEG, MAX_TILT_DEG)?;
             within(Field::CalibrationPitchDeg, pitch_deg, -MAX_TILT_DEG, MAX_TILT_DEG)?;
+        }
+        if self.unit.is_some_and(|unit| !unit.gyro_map.is_plausible()) {
+            return Err(FieldError::Implausible(Field::CalibrationGyroMap));
         }
         Ok(())
     }

@@ -10,7 +10,7 @@ use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
 use crate::fog::{FogConfig, FogErrors, FogNetUse, Tilt};
-use crate::mounting::{Levelling, Rotation};
+use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
 use embedded_can::{Id, StandardId};
@@ -113,14 +113,15 @@ impl Configuration {
 
 impl Configuration {
     /// Makes the pipeline's configuration from this one and a calibration. A level that was found on level ground
-    /// is the mounting: the street is not asked any more.
+    /// is the mounting: the street is not asked any more. The map of the gyro counts for the weights it was found with.
     #[must_use]
-    pub fn pipeline(&self, calibration: &Calibration) -> PipelineConfig {
+    pub fn pipeline(&self, calibration: &Calibration, weights: u32) -> PipelineConfig {
         // All angles have been checked to be finite.
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let level = calibration.level.as_ref().and_then(Level::rotation);
         PipelineConfig {
             mounting: level.map_or(mounting, |level| mounting.then(&level)),
+            gyro_map: calibration.gyro_map(weights).unwrap_or(GyroMap::IDENTITY),
             levelling: if level.is_some() { Levelling::Off } else { Levelling::DEFAULT },
             static_init: self.static_init,
             earth_rate: self.latitude().map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
@@ -158,12 +159,13 @@ impl Configuration {
         self.fog_lane.latitude_frame.map(make).transpose()
     }
 
-    /// Makes the configuration of a coprocessor; the wheels, the clock, the networks and damage found
+    /// Makes the configuration of a coprocessor that runs the weights with this checksum; the wheels, the clock, the
+    /// networks and damage found
     /// at the start are the board's to add.
     #[must_use]
-    pub fn coprocessor(&self, calibration: &Calibration) -> coprocessor::Config {
+    pub fn coprocessor(&self, calibration: &Calibration, weights: u32) -> coprocessor::Config {
         coprocessor::Config {
-            pipeline: self.pipeline(calibration),
+            pipeline: self.pipeline(calibration, weights),
             // A stored configuration has been checked.
             can: Config::new(self.can).unwrap_or(Config::DEFAULT),
             fog_ids: self.fog_ids,

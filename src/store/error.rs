@@ -28,6 +28,7 @@ pub enum Field {
     CalibrationTemperatureOrder,
     CalibrationRollDeg,
     CalibrationPitchDeg,
+    CalibrationGyroMap,
 }
 
 impl Field {
@@ -53,6 +54,7 @@ impl Field {
             Self::CalibrationTemperatureOrder => "temperature_table (order)",
             Self::CalibrationRollDeg => "level.roll_deg",
             Self::CalibrationPitchDeg => "level.pitch_deg",
+            Self::CalibrationGyroMap => "gyro_map",
         }
     }
 }
@@ -74,6 +76,9 @@ pub enum FieldError {
         /// Most that it may be.
         high: f32,
     },
+    /// A map of the gyro that no unit has: an element is too far from the identity.
+    #[error("{}: no unit is so far from the identity", .0.name())]
+    Implausible(Field),
     /// The messages on the bus are no configuration.
     #[error("can: {0}")]
     Can(ConfigError),

@@ -2,6 +2,7 @@
 
 pub mod bench_target;
 pub mod bus;
+pub mod calibrate;
 pub mod campaign;
 pub mod completions;
 pub mod demo;

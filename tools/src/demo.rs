@@ -8,9 +8,9 @@ pub mod picture;
 mod trajectory;
 
 use crate::drive::recording::Recording;
-use crate::evaluate::methods::{PerMethod, Rates};
-use crate::evaluate::metrics::YawError;
-use crate::evaluate::report::DriveErrors;
+use crate::evaluate::methods::PerMethod;
+use crate::evaluate::rates::Rates;
+use crate::evaluate::report::{Comparisons, DriveErrors, Row};
 use board::Outcome;
 use gyronet::can::config::Config;
 use serde::Serialize;
@@ -51,7 +51,9 @@ pub struct Summary<'a> {
     samples: usize,
     missing: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    methods: Option<&'a PerMethod<YawError>>,
+    over_best_classical: Option<Comparisons>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    methods: Option<&'a PerMethod<Row>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     paths: Option<&'a [Path]>,
     frames: u64,
@@ -93,6 +95,7 @@ impl<'a> Demo<'a> {
             seconds: self.recording.seconds(),
             samples: self.recording.rows.len(),
             missing: self.recording.missing,
+            over_best_classical: self.errors.and_then(|errors| errors.over_best_classical),
             methods: self.errors.map(|errors| &errors.methods),
             paths: self.trajectories.as_ref().map(|trajectories| trajectories.paths.as_slice()),
             frames: self.frames,

@@ -6,12 +6,14 @@
 //!
 //! ```text
 //! drive <- parts <- campaign -> plot, client, simulate
+//! drive <- calibrate
 //! drive <- evaluate <- paper -> plot, simulate
 //! target -> simulate      network      client
 //! demo -> everything above
 //! ```
 
 pub mod bundled;
+pub mod calibrate;
 pub mod campaign;
 pub mod client;
 pub mod demo;

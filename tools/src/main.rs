@@ -15,7 +15,8 @@ use std::process::ExitCode;
 ///   t_s                    time, s
 ///   acc_x, acc_y, acc_z    specific force, m/s^2 (x forward, y left, z up)
 ///   gyr_x, gyr_y, gyr_z    angular rate, rad/s
-///   ref_gyr_z              true yaw rate, rad/s; optional, needed for errors
+///   ref_gyr_z              true yaw rate, rad/s; optional, this or the next is needed for errors
+///   ref_yaw                course by GNSS, rad to the left; optional, empty where unknown
 ///   wheel1_rate ..4        wheels, rad/s; optional (front right, rear right, front left, rear left)
 ///
 /// The vehicle must stand still for the first 3 s.
@@ -40,6 +41,7 @@ struct Cli {
 enum Command {
     Demo(commands::demo::Args),
     Evaluate(commands::evaluate::Args),
+    Calibrate(commands::calibrate::Args),
     Replay(commands::replay::Args),
     Campaign(commands::campaign::Args),
     Simulate(commands::simulate::Args),
@@ -60,6 +62,7 @@ fn main() -> ExitCode {
     let result = match &command {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
+        Command::Calibrate(args) => commands::calibrate::run(args, common),
         Command::Replay(args) => commands::replay::run(args, common),
         Command::Campaign(args) => commands::campaign::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),

@@ -33,7 +33,9 @@ pub fn flash(mut data: &[u8]) {
 
 /// Runs a few samples through a coprocessor with this configuration.
 fn run(configuration: &Configuration, calibration: &Calibration) {
-    let mut coprocessor = Coprocessor::new(configuration.coprocessor(calibration));
+    let mut coprocessor = Coprocessor::new(
+        configuration.coprocessor(calibration, calibration.unit.map_or(0, |unit| unit.weights)),
+    );
     for tick in 0..3 {
         let sample = turning(tick, AngularRate(1_000));
         coprocessor.imu(sample, sample.time).expect("a place on the grid");

@@ -22,7 +22,7 @@ use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::idling;
 
 const NOTHING: Estimate =
-    Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 };
+    Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE };
 /// Returns a frame of four wheels at 0 km/h.
 const STANDS: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
 /// Frames of a sample.

@@ -89,7 +89,12 @@ fn an_implausible_estimate_is_not_believed() {
     let limit = CompensateConfig::DEFAULT.max_mean;
     let corrections = |due: &DueWindow| if due.end < 350 { limit } else { AngularRate(limit.0 + 1) };
     let outputs = run(&mut pipeline, drive(0..400), |due| {
-        Some(Estimate { corrections: [corrections(due); WINDOW], scale: SCALE_MIN, clamped_inputs: 1 })
+        Some(Estimate {
+            corrections: [corrections(due); WINDOW],
+            scale: SCALE_MIN,
+            clamped_inputs: 1,
+            ..Estimate::NONE
+        })
     });
     assert_eq!(statuses(&outputs), [(Init, 300), (Degraded, 11), (Ready, 45), (Degraded, 44)]);
     assert_eq!((pipeline.counters().implausible, pipeline.counters().clamped_inputs), (9, 18));

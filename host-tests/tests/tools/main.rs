@@ -2,6 +2,8 @@
 
 mod accuracy;
 mod campaign;
+mod course_reference;
+mod fir_choice;
 mod fog_default;
 mod fognet_golden;
 mod fognet_integer;

@@ -49,7 +49,7 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
         // No network has been trained for this part.
         if let Some(due) = output.window {
             let estimate =
-                Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 };
+                Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE };
             pipeline.deliver(due.end, estimate);
         }
         last = output.vehicle.navigation.yaw.rad().to_degrees();

@@ -15,9 +15,11 @@
 
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork, weights};
+use gyronet::mounting::GyroMap;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::{parallel, recordings};
+use gyronet_tools::calibrate::{self, Drive};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::{Replay, Step};
 use gyronet_tools::evaluate::metrics::YawError;
@@ -107,10 +109,10 @@ struct Rates {
 impl Rates {
     /// Runs a recording without wheels, so that nothing but the network corrects.
     fn new(recording: &Recording, seen: Unit) -> Self {
-        let network =
-            GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-        let drive = Replay::run(recording, &PipelineConfig::DEFAULT, None, &mut Seen(network, seen), || {});
-        let drive = drive.expect("it stands still first");
+        Self::of(recording, replay(recording, seen, GyroMap::IDENTITY))
+    }
+
+    fn of(recording: &Recording, drive: Replay) -> Self {
         let steps = &drive.steps[drive.start..];
         let reference = steps.iter().map(|step| recording.rows[step.row].reference);
         let [.., bias] = drive.gyro_bias;
@@ -134,6 +136,12 @@ impl Rates {
     fn error(&self, rates: &[f64]) -> f64 {
         YawError::new(rates, &self.reference).expect("a whole second").mean_1s_rad
     }
+}
+
+fn replay(recording: &Recording, seen: Unit, gyro_map: GyroMap) -> Replay {
+    let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
+    let config = PipelineConfig { gyro_map, ..PipelineConfig::DEFAULT };
+    Replay::run(recording, &config, None, &mut Seen(network, seen), || {}).expect("it stands still first")
 }
 
 /// Lines of the table, and what does not hold.
@@ -185,4 +193,35 @@ fn another_unit_of_the_part_moves_no_correction() {
     let drives: Vec<_> = TRIALS.into_iter().zip(paths.into_iter().flatten()).collect();
     let heading = "1 s errors, rad           static |    inputs  ratio | recording  ratio |   perfect    unmoved  ratio";
     parallel::table(heading, &drives, |(trial, path)| judge(*trial, path));
+}
+
+/// Criterion: calibrated on one drive, the errors of such a unit on other drives are within 10 % of the unmodified
+/// unit's.
+#[test]
+fn one_drive_calibrates_another_unit() {
+    const TEST: &str = "one_drive_calibrates_another_unit";
+    /// A training drive with turns.
+    const CALIBRATED_ON: u32 = 7;
+    let Some(shown) = recordings::trial(TEST, CALIBRATED_ON) else { return };
+    let shown = Recording::read(&shown).expect("a recording");
+    let all = Unit { name: "all, 2 deg about x", bias: BIAS, gain: 1.01, mounting: [TILT, 0.0, 0.0] };
+    for unit in [all, Unit { name: "all, 2 deg about y", mounting: [0.0, TILT, 0.0], ..all }] {
+        let recording = unit.recording(&shown);
+        let replay = replay(&recording, SAME, GyroMap::IDENTITY);
+        let found =
+            calibrate::calibrate(&[Drive { recording: &recording, replay }], 0).expect("it turns and tilts");
+        println!("{}: {:?}", unit.name, found.shares);
+        for trial in TRIALS {
+            let Some(path) = recordings::trial(TEST, trial) else { return };
+            let drive = Recording::read(&path).expect("a recording");
+            let error = |recording: &Recording, map| {
+                let rates = Rates::of(recording, self::replay(recording, SAME, map));
+                rates.error(&rates.settled)
+            };
+            let (base, other) = (error(&drive, GyroMap::IDENTITY), unit.recording(&drive));
+            let [before, after] = [GyroMap::IDENTITY, found.gyro_map].map(|map| error(&other, map) / base);
+            println!("  trial {trial:02}: {before:.3} of the unmodified unit's error, calibrated {after:.3}");
+            assert!(after < WITHIN, "{}, trial {trial:02}: {after}", unit.name);
+        }
+    }
 }

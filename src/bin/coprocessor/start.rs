@@ -59,6 +59,8 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let blob = device.weights(Some(regions::slots_at_start()), &weights::DEFAULT.0);
     let check = blob.as_ref().map(BackgroundCheck::new);
     let configuration = device.configuration();
+    let weights = blob.map_or(0, |blob| blob.crc);
+    let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
     let fog_network = fog_network();
     let config = Config {
         wheels: WheelReceiver::new(WHEELS).ok(),
@@ -67,10 +69,10 @@ pub fn parts(board: &Board) -> Option<Parts> {
         clock: if board.emulated { Clock::Sensor } else { Clock::Outside },
         clock_ratio: board.clocks.exact().then_some(ClockRatioConfig::DEFAULT),
         storage: StorageFaults {
-            damaged: device.stored_damaged(),
+            damaged: device.stored_damaged() || of_other_weights,
             configuration_lost: device.configuration_lost(),
         },
-        ..configuration.coprocessor(device.calibration())
+        ..configuration.coprocessor(device.calibration(), weights)
     };
     receive(board, &config);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);

@@ -3,7 +3,7 @@
 use super::{Device, MappedSlots, SupportedHardware};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
-use crate::store::{Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError};
+use crate::store::{Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError, UnitMap};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
@@ -112,6 +112,19 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.store()?.set(configuration)?;
         self.note(EventKind::ConfigurationStored);
         Ok(())
+    }
+
+    pub(super) fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<(), Refusal> {
+        let runs = self.weights_crc.unwrap_or(0);
+        if let Some(UnitMap { weights: found, .. }) = unit
+            && found != runs
+        {
+            return Err(Refusal::OtherWeights { found, runs });
+        }
+        let calibration = Calibration { unit, ..self.calibration.clone() };
+        calibration.check().map_err(StoreError::from)?;
+        self.calibration = calibration;
+        self.store_calibration()
     }
 
     pub(super) fn store_calibration(&mut self) -> Result<(), Refusal> {

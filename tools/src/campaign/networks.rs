@@ -88,7 +88,7 @@ pub struct Collecting(pub Known);
 impl Networks for Collecting {
     fn window(&mut self, window: &[Features; WINDOW]) -> Estimate {
         self.0.windows.insert(*window, OnceLock::new());
-        Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, clamped_inputs: 0 }
+        Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE }
     }
 
     fn minute(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {

@@ -2,16 +2,13 @@
 
 use super::{Common, WriteError, paint, print_json, progress, replay, weights};
 use gyronet::can::config::Config;
-use gyronet::model::weights::LINEAR_WINDOW;
-use gyronet::model::{Blob, GyroNet};
+use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::Demo;
 use gyronet_tools::demo::board::{Agreement, BoardError, Difference, Figures, Outcome};
 use gyronet_tools::demo::picture;
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::evaluate::methods::{self, Rates};
 use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError, Report};
-
 use gyronet_tools::target::bench;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -31,7 +28,7 @@ Examples:
   gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns
   gyronet demo drive.csv --json --no-board")]
 pub struct Args {
-    /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z, and a path needs wheelN_rate.
+    /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
     /// Folder for demo.html, yaw.svg and can.log [default: target/demo].
@@ -46,7 +43,6 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let checkpoint = args.networks.checkpoint()?;
     let weights = args.networks.weights()?;
     let (recording, title) = match &args.file {
         Some(path) => {
@@ -56,12 +52,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         None => (bundled::simulated_drive()?, String::from("Yaw of a simulated drive")),
     };
-    let bar = progress::bar(common, methods::RUNS * recording.rows.len(), recording.name());
-    let mut integer = GyroNet::new(weights.blob()?);
-    let mut linear = GyroNet::new(Blob::new_checked(&LINEAR_WINDOW.0)?);
-    let rates = Rates::new(&recording, &mut checkpoint.network(), &mut integer, &mut linear, || bar.inc(1));
-    bar.finish_and_clear();
-    let rates = rates?;
+    let rates = args.networks.rates(&recording, common)?;
     let errors = match DriveErrors::new(&recording, &rates) {
         Ok(errors) => Some(errors),
         // A drive without a reference still has its log and its picture.
@@ -74,7 +65,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
     let frames = replay::write_file(&rates.drive, &log)?;
     std::fs::write(&picture, picture::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
-    let board = board(args, common, &recording, &mut integer)?;
+    let board = board(args, common, &recording, &mut GyroNet::new(weights.blob()?))?;
     let simulated = args.file.is_none();
     let demo = Demo::new(&recording, simulated, &rates, errors.as_ref(), (Config::DEFAULT, frames), board);
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
@@ -93,7 +84,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     match &errors {
         Some(errors) => write!(out, "{}", paint::report(&Report::new(vec![errors.clone()])))?,
-        None => writeln!(out, "{}: no reference yaw rate, so no errors\n", recording.name())?,
+        None => writeln!(out, "{}: no reference, so no errors\n", recording.name())?,
     }
     writeln!(out, "{frames} CAN frames: {}", log.display())?;
     writeln!(out, "picture: {}", picture.display())?;

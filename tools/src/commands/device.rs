@@ -52,6 +52,9 @@ enum Action {
         /// The task, or `show` for the calibration that is stored.
         #[arg(value_enum)]
         task: calibration::What,
+        /// The file of `gyronet calibrate`, for `unit`.
+        #[arg(long, value_name = "FILE.json")]
+        file: Option<PathBuf>,
         /// Store the result, so that it survives a restart.
         #[arg(long)]
         store: bool,
@@ -86,7 +89,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         Action::Get => settings::print(&settings::get(&mut device)?, json)?,
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
-        Action::Calibrate { task, store } => calibration::run(&mut device, *task, *store, json)?,
+        Action::Calibrate { task, file, store } => {
+            calibration::run(&mut device, *task, file.as_deref(), *store, json)?;
+        }
         Action::Log => log(&mut device, json)?,
         Action::Counters => {
             let Reply::Counters(counters) = device.ask(&Request::Counters)? else { return mismatch() };

@@ -1,31 +1,33 @@
-//! `gyronet evaluate`: yaw errors of each method on recorded drives.
+//! `gyronet evaluate`: heading errors of each method on recorded drives.
 
 use super::{Common, paint, print_json, progress, weights};
-use gyronet::model::weights::LINEAR_WINDOW;
-use gyronet::model::{Blob, GyroNet};
+use gyronet::model::GyroNet;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
-use gyronet_tools::evaluate::methods::{self, Rates};
 use gyronet_tools::evaluate::report::{DriveErrors, Report};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Measure the yaw error of every method on recorded drives.
+/// Measure the heading error of every method on recorded drives.
 ///
-/// The methods are the raw gyro, static initialisation, a low-pass filter, and GyroNet in f32 and in integers. For
-/// each drive, and as a mean, the command prints the mean error of the yaw change over 1 s (rad), its ratio to that
-/// of static initialisation, and the error of the yaw at the end (rad). The network rows are settled estimates after
-/// static initialisation; the linear rows are the same with the linear window that comes with the library, and the
-/// rates that the board would send with it. The last two rows are the rates that the board sends: with the sample (Bosch TX1, J1939
-/// VDC2), and in its own yaw messages some samples later. The wheels of a drive replace the vehicle's bus.
+/// The reference is a yaw rate (ref_gyr_z), or a course (ref_yaw), which judges a minute and more. For each drive, and as
+/// a mean of each folder, the command prints first the error of the rate for navigation over that of the best classical
+/// method with the same inputs and no more delay: the raw gyro, static initialisation, zero-rate updates, a low pass of
+/// linear phase, VQF. Then for each method the error over 1 s, 10 s, 60 s and the drive (rad; RMS and at the end), its
+/// ratio to static initialisation's (1 s, or RMS against a course), the mean of what it takes off beyond static
+/// initialisation and zero-rate updates, its multiplications per sample, and its delay. GyroNet and the linear window
+/// are settled estimates after static initialisation. The last two rows are the rates that the board sends: with the
+/// sample (Bosch TX1, J1939 VDC2), and in its own yaw messages some samples later. The wheels of a drive replace the
+/// vehicle's bus. A drive with a course that starts moving gets a simulated standstill, and the output says so.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet evaluate trial09.csv trial11.csv
+  gyronet evaluate */*.csv --json               # every drive of every folder, and the means
   gyronet evaluate drive.csv --weights mine.blob --json
   gyronet evaluate drive.csv --ablation         # what each part is worth")]
 pub struct Args {
-    /// Recorded drives with ref_gyr_z.
+    /// Recorded drives with ref_gyr_z or ref_yaw.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Compare configurations: the error without each part of the compensation, how often errors stay inside one, two
@@ -47,18 +49,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if args.lags {
         return compare(args, common, &ablation::lags());
     }
-    let checkpoint = args.networks.checkpoint()?;
-    let weights = args.networks.weights()?;
-    let mut integer = GyroNet::new(weights.blob()?);
-    let mut linear = GyroNet::new(Blob::new_checked(&LINEAR_WINDOW.0)?);
     let mut drives = Vec::new();
     for file in &args.files {
         let recording = Recording::read(file)?;
-        let bar = progress::bar(common, methods::RUNS * recording.rows.len(), recording.name());
-        let rates =
-            Rates::new(&recording, &mut checkpoint.network(), &mut integer, &mut linear, || bar.inc(1));
-        bar.finish_and_clear();
-        drives.push(DriveErrors::new(&recording, &rates?)?);
+        let rates = args.networks.rates(&recording, common)?;
+        drives.push(DriveErrors::new(&recording, &rates)?);
     }
     let report = Report::new(drives);
     let mut out = std::io::stdout().lock();

@@ -2,7 +2,7 @@
 
 use console::style;
 use gyronet_tools::evaluate::methods::Method;
-use gyronet_tools::evaluate::report::Report;
+use gyronet_tools::evaluate::report::{COLUMNS, Report};
 
 /// A report with its headings and what the board sends standing out.
 pub fn report(report: &Report) -> String {
@@ -10,7 +10,7 @@ pub fn report(report: &Report) -> String {
     for line in report.to_string().lines() {
         let line = if !line.starts_with(' ') {
             style(line).bold()
-        } else if line.trim_start().starts_with("yaw error") {
+        } else if line.trim_start().starts_with(COLUMNS[0]) {
             style(line).dim()
         } else if line.trim_start().starts_with(Method::NAVIGATION.name) {
             style(line).green().bold()

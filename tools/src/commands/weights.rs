@@ -1,7 +1,10 @@
-//! The choice of weights: the bundled ones, or a file.
+//! The choice of weights: the bundled ones, or a file; and the rates of every method with them.
 
-use gyronet::model::{Blob, weights};
+use super::{Common, progress};
+use gyronet::model::{self, Blob, weights};
 use gyronet_tools::bundled;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::evaluate::rates::{self, Network, Networks, Rates};
 use gyronet_tools::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
 use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
 use std::path::{Path, PathBuf};
@@ -28,7 +31,7 @@ impl Weights {
 /// The networks to compare.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Files {
-    /// Weight file of the integer network [default: the one that comes with the library].
+    /// Weight file of the rates that are sent [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     pub weights: Option<PathBuf>,
     /// Checkpoint of the f32 network, safetensors [default: the one that comes with the tools].
@@ -43,7 +46,30 @@ impl Files {
     }
 
     /// The f32 network's weights.
-    pub fn checkpoint(&self) -> Result<Checkpoint<GyroNet>, CheckpointError> {
+    fn checkpoint(&self) -> Result<Checkpoint<GyroNet>, CheckpointError> {
         self.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read)
+    }
+
+    /// The rates of a drive by every method. GyroNet and the linear window are those of the library, whatever is sent.
+    pub fn rates(&self, recording: &Recording, common: Common) -> Result<Rates, Box<dyn std::error::Error>> {
+        let checkpoint = self.checkpoint()?;
+        let (mut float, sent) = (checkpoint.network(), self.weights()?);
+        let mut integer = model::GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
+        let mut linear = model::GyroNet::new(Blob::new_checked(&weights::LINEAR_WINDOW.0)?);
+        let mut sent = self.weights.as_ref().map(|_| sent.blob().map(model::GyroNet::new)).transpose()?;
+        let [of_integer, of_linear] = [&integer, &linear].map(|network| network.blob().shape);
+        let mut networks = Networks {
+            float: Network::new(&mut float, checkpoint.shape()),
+            integer: Network::new(&mut integer, of_integer),
+            linear: Network::new(&mut linear, of_linear),
+            sent: sent.as_mut().map(|sent| {
+                let shape = sent.blob().shape;
+                Network::new(sent, shape)
+            }),
+        };
+        let bar = progress::bar(common, rates::RUNS * recording.rows.len(), recording.name());
+        let rates = Rates::new(recording, &mut networks, || bar.inc(1));
+        bar.finish_and_clear();
+        Ok(rates?)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::board::{Figures, Outcome};
 use crate::drive::recording::Recording;
-use crate::evaluate::methods::Rates;
+use crate::evaluate::rates::Rates;
 use crate::plot::page::grouped;
 use gyronet::can::config::Config;
 use gyronet::model::fognet::FogNetState;

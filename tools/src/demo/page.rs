@@ -4,15 +4,23 @@ use super::board::Outcome;
 use super::trajectory::Trajectories;
 use super::{Cost, Demo, Message};
 use crate::drive::DT;
+use crate::evaluate::heading_error::Reference;
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
+use crate::evaluate::report::{COLUMNS, columns};
 use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
 
 /// Whose curves are drawn, from back to front.
-const DRAWN: [Method; 6] =
-    [Method::RAW, Method::FIR, Method::STATIC, Method::PROMPT, Method::GYRONET_INT, Method::NAVIGATION];
+const DRAWN: [Method; 6] = [
+    Method::RAW,
+    Method::STATIC,
+    Method::STATIC_ZERO_RATE,
+    Method::PROMPT,
+    Method::GYRONET_INT,
+    Method::NAVIGATION,
+];
 /// The class and the name of the reference.
 const REFERENCE: &str = "reference";
 
@@ -52,11 +60,14 @@ pub fn page(demo: &Demo<'_>) -> String {
 fn facts(demo: &Demo<'_>) -> String {
     let mut facts = Vec::new();
     if let Some(errors) = demo.errors {
-        let [still, sent] = [Method::STATIC, Method::NAVIGATION].map(|method| errors.methods[method]);
+        let sent = errors.methods[Method::NAVIGATION].error;
+        if let Some(ours) = errors.over_best_classical {
+            facts
+                .push(("error over that of the best classical method", format!("{:.2}", ours.default.ratio)));
+        }
         let mrad = |rad: f64| format!("{:.3} <small>mrad</small>", 1e3 * rad);
-        facts.push(("yaw error in 1 s, static initialisation", mrad(still.mean_1s_rad)));
-        facts.push(("the same, sent for navigation", mrad(sent.mean_1s_rad)));
-        facts.push(("ratio of the two", format!("{:.2}", sent.mean_1s_rad / still.mean_1s_rad)));
+        facts.extend(sent.mean_1s_rad.map(|rad| ("error in 1 s, sent for navigation", mrad(rad))));
+        facts.extend(sent.rms_rad.map(|rad| ("its RMS over the drive", mrad(rad))));
     }
     facts.push(("CAN messages", grouped(demo.frames)));
     let verdict = match &demo.board {
@@ -73,13 +84,13 @@ fn facts(demo: &Demo<'_>) -> String {
 fn yaw(demo: &Demo<'_>) -> String {
     let rates = demo.rates;
     let points = |values: Vec<f64>| rates.seconds.iter().copied().zip(values).collect::<Vec<(f64, f64)>>();
-    let truth = rates.reference.as_deref().map(integral);
+    let truth = rates.reference.as_ref().and_then(Reference::rate).map(integral);
     let mut angles: Vec<Curve> = Vec::new();
     let mut errors: Vec<Curve> = Vec::new();
     for method in DRAWN {
         let yaw = integral(&rates.rates[method]);
         // What still has its bias may run off the errors' scale.
-        let in_scale = !matches!(method, Method::RAW | Method::FIR);
+        let in_scale = method != Method::RAW;
         let curve = |note, values, in_scale| Curve {
             class: method.key,
             label: method.name.into(),
@@ -116,9 +127,7 @@ fn yaw(demo: &Demo<'_>) -> String {
         Some(_) => {
             " The errors' scale is that of the corrected methods; what keeps its bias runs off it.</p>\n"
         }
-        None => {
-            " The drive has no reference yaw rate (<code>ref_gyr_z</code>), so there are no errors.</p>\n"
-        }
+        None => " The drive has no reference yaw rate (<code>ref_gyr_z</code>), so no error is drawn.</p>\n",
     };
     html
 }
@@ -149,25 +158,20 @@ fn paths(trajectories: &Trajectories) -> String {
 
 fn methods(demo: &Demo<'_>) -> String {
     let Some(errors) = demo.errors else {
-        return "<p>No reference yaw rate, so no errors.</p>\n".into();
+        return "<p>No reference, so no errors.</p>\n".into();
     };
-    let still = errors.methods[Method::STATIC].mean_1s_rad;
-    let rows = errors.methods.each().map(|(method, error)| {
-        let ratio = error.mean_1s_rad / still;
-        vec![
-            method.name.to_owned(),
-            format!("{:.6}", error.mean_1s_rad),
-            format!("{ratio:.3}"),
-            format!("{:.6}", error.final_rad),
-        ]
-    });
-    let header = ["yaw error", "in 1 s, rad", "to static init", "final, rad"];
+    let ours = errors.over_best_classical.map(|ours| format!("<p>Sent for navigation: {ours}.</p>\n"));
+    let rows = columns(&errors.methods).map(|(_, columns)| columns.to_vec());
     format!(
-        "{}<p class=\"note\">Mean error of the yaw change over 1 s, and error of the yaw at the end, over {:.1} s. The \
-         network rows are settled estimates after static initialisation; the last two are what the board sends: with \
-         the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
-        table("methods", "", &header, rows),
-        errors.seconds
+        "{}{}<p class=\"note\">Mean error of the change of heading over windows of 1, 10 and 60 s, its RMS and its value at \
+         the end, over {:.1} s against <code>{}</code>; to static: of 1 s, or of the RMS where the reference is a course; \
+         mean: what is taken off beyond static initialisation and zero-rate updates. GyroNet and the linear window are \
+         settled estimates after static initialisation; the last two rows are what the board sends: with the sample \
+         (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
+        ours.unwrap_or_default(),
+        table("methods", "", &COLUMNS, rows),
+        errors.seconds,
+        errors.reference
     )
 }
 

@@ -1,7 +1,9 @@
 //! One picture of a drive: the yaw of each method, and below it the error of each.
 
-use crate::evaluate::methods::{Method, Rates};
+use crate::evaluate::heading_error::Reference;
+use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
+use crate::evaluate::rates::Rates;
 use crate::plot::curve::range;
 use crate::plot::svg::{Axis, COLORS, Color, Figure, Marks, Panel, PlotError, Stroke};
 
@@ -13,7 +15,7 @@ const AIR: f64 = 0.06;
 const STYLES: [(Method, Color, u32); 6] = [
     (Method::RAW, COLORS[4], 2),
     (Method::STATIC, COLORS[0], 2),
-    (Method::FIR, COLORS[3], 2),
+    (Method::STATIC_ZERO_RATE, COLORS[3], 2),
     (Method::PROMPT, COLORS[6], 1),
     (Method::GYRONET_INT, COLORS[2], 4),
     (Method::NAVIGATION, COLORS[1], 2),
@@ -28,7 +30,7 @@ pub fn svg(title: &str, rates: &Rates) -> Result<String, PlotError> {
     let degrees = |yaw: &[f64]| -> Vec<(f64, f64)> {
         points(&yaw.iter().map(|rad| rad.to_degrees()).collect::<Vec<f64>>())
     };
-    let truth = rates.reference.as_deref().map(integral);
+    let truth = rates.reference.as_ref().and_then(Reference::rate).map(integral);
     let (mut legend, mut angles, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     // The corrected methods set the scale; a method that keeps its bias may run off it.
     let mut scale = Vec::new();
@@ -39,7 +41,7 @@ pub fn svg(title: &str, rates: &Rates) -> Result<String, PlotError> {
             let off: Vec<f64> = yaw.iter().zip(truth).map(|(yaw, truth)| 1e3 * (yaw - truth)).collect();
             label += &format!(": ends {:+.1} mrad off", off.last().copied().unwrap_or(0.0));
             errors.push(Marks::Line(stroke, points(&off)));
-            if !matches!(method, Method::RAW | Method::FIR) {
+            if method != Method::RAW {
                 scale.extend(off);
             }
         }

@@ -3,7 +3,9 @@
 use crate::drive::DT;
 use crate::drive::recording::Recording;
 use crate::drive::wheel_frames::Speeds;
-use crate::evaluate::methods::{Method, Rates};
+use crate::evaluate::heading_error::Reference;
+use crate::evaluate::methods::Method;
+use crate::evaluate::rates::Rates;
 use crate::evaluate::trajectory_error::{Point, TrajectoryError};
 use gyronet::odometry::Track;
 use serde::Serialize;
@@ -57,7 +59,7 @@ impl Trajectories {
             };
             ways.iter().zip(rates).map(step).collect::<Vec<Point>>()
         };
-        let truth = rates.reference.as_deref().map(path);
+        let truth = rates.reference.as_ref().and_then(Reference::rate).map(path);
         let mut paths = Vec::new();
         for method in METHODS {
             let points = path(&rates.rates[method]);

@@ -8,6 +8,7 @@
 //! | `acc_x`, `acc_y`, `acc_z` | m/s^2 | specific force: x forward, y left, z up |
 //! | `gyr_x`, `gyr_y`, `gyr_z` | rad/s | angular rate |
 //! | `ref_gyr_z` | rad/s | optional: the true yaw rate; an empty field is a value not known |
+//! | `ref_yaw` | rad | optional: the true course, to the left; an empty field is a value not known |
 //! | `wheel1_rate` .. `wheel4_rate` | rad/s | optional: an empty field is a value not recorded |
 //!
 //! Values become the codes of [`gyronet::units`] by way of f32 and time by way of 10 kHz ticks,
@@ -41,6 +42,8 @@ pub struct Row {
     pub sample: ImuSample,
     /// The true yaw rate, rad/s.
     pub reference: Option<f64>,
+    /// The true course, rad to the left from any direction, wrapped or not.
+    pub course: Option<f64>,
     /// Rates of the wheels, rad/s.
     pub wheels: [Option<f64>; WHEELS],
 }

@@ -4,7 +4,6 @@
 use crate::drive::recording::Recording;
 use crate::drive::replay::{Replay, ReplayError};
 use crate::drive::wheel_frames::{self, WheelFrames};
-use crate::evaluate::methods::with_mode;
 use crate::evaluate::metrics::{WINDOW, YawError};
 use gyronet::compensate::{CompensateConfig, Lag, Mode};
 use gyronet::estimate::YawEstimate;
@@ -35,14 +34,26 @@ impl Variant {
 }
 
 /// A network that corrects nothing.
-struct Nothing;
+pub(crate) struct Uncorrected;
 
-impl WindowNetwork for Nothing {
+impl WindowNetwork for Uncorrected {
     fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
         let corrections = [AngularRate::ZERO; gyronet::model::window::WINDOW];
         // 1e-3 rad/s: with it a second's sigma is that of an uncorrected rate.
-        Estimate { corrections, scale: AngularRate(134_218), clamped_inputs: 0 }
+        Estimate { corrections, scale: AngularRate(134_218), ..Estimate::NONE }
     }
+}
+
+/// The default, with estimates chosen in this way.
+fn with_mode(mode: Mode) -> PipelineConfig {
+    let compensate = CompensateConfig { mode, ..CompensateConfig::DEFAULT };
+    PipelineConfig { compensate, ..PipelineConfig::DEFAULT }
+}
+
+/// A configuration with another lag of the rate for navigation.
+pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
+    let compensate = CompensateConfig { lag, ..config.compensate };
+    PipelineConfig { compensate, ..config }
 }
 
 /// Part by part.
@@ -50,17 +61,13 @@ impl WindowNetwork for Nothing {
 pub fn parts() -> Vec<Variant> {
     let alone = |config| PipelineConfig { zero_rate: None, ..config };
     let overlap = CompensateConfig::DEFAULT.mode;
-    let lag = |config: PipelineConfig, lag| {
-        let compensate = CompensateConfig { lag, ..config.compensate };
-        PipelineConfig { compensate, ..config }
-    };
     vec![
         Variant { network: false, ..Variant::new("static initialisation", alone(PipelineConfig::DEFAULT)) },
         Variant { network: false, ..Variant::new("+ zero-rate updates", PipelineConfig::DEFAULT) },
-        Variant::new("newest, settled", alone(lag(with_mode(Mode::Newest), Lag::MAX))),
-        Variant::new("middle, settled", alone(lag(with_mode(Mode::Middle), Lag::MAX))),
-        Variant::new("overlap, at once", alone(lag(with_mode(overlap), Lag::NONE))),
-        Variant::new("overlap, settled", alone(lag(with_mode(overlap), Lag::MAX))),
+        Variant::new("newest, settled", alone(with_lag(with_mode(Mode::Newest), Lag::MAX))),
+        Variant::new("middle, settled", alone(with_lag(with_mode(Mode::Middle), Lag::MAX))),
+        Variant::new("overlap, at once", alone(with_lag(with_mode(overlap), Lag::NONE))),
+        Variant::new("overlap, settled", alone(with_lag(with_mode(overlap), Lag::MAX))),
         Variant::new("overlap, default lag", alone(PipelineConfig::DEFAULT)),
         Variant { wheels: false, ..Variant::new("+ updates, no wheels", PipelineConfig::DEFAULT) },
         Variant::new("+ zero-rate updates", PipelineConfig::DEFAULT),
@@ -73,8 +80,7 @@ pub fn lags() -> Vec<Variant> {
     (0..)
         .map_while(Lag::new)
         .map(|lag| {
-            let compensate = CompensateConfig { lag, ..CompensateConfig::DEFAULT };
-            let config = PipelineConfig { compensate, ..PipelineConfig::DEFAULT };
+            let config = with_lag(PipelineConfig::DEFAULT, lag);
             Variant::new(format!("lag {} ms", 10 * lag.samples()), config)
         })
         .collect()
@@ -124,7 +130,7 @@ pub fn run(
             let drive = if *with_network {
                 Replay::run(recording, config, wheels, network, &mut tick)
             } else {
-                Replay::run(recording, config, wheels, &mut Nothing, &mut tick)
+                Replay::run(recording, config, wheels, &mut Uncorrected, &mut tick)
             };
             let drive = match drive {
                 Ok(drive) => drive,

@@ -1,45 +1,179 @@
-//! The yaw errors of each method, drive by drive, as a table and as JSON.
+//! The errors and costs of each method, drive by drive, as a table and as JSON.
 
+use crate::drive::DT;
 use crate::drive::recording::Recording;
-use crate::evaluate::methods::{Method, PerMethod, Rates};
-use crate::evaluate::metrics::{WINDOW, YawError};
-use gyronet::sample::RATE_HZ;
+use crate::evaluate::cost::Cost;
+use crate::evaluate::heading_error::{HeadingError, PLAUSIBLE_10S_RAD};
+use crate::evaluate::methods::{Method, PerMethod};
+use crate::evaluate::metrics::integral;
+use crate::evaluate::rates::Rates;
 use serde::Serialize;
 use std::fmt;
+use std::path::Path;
 
 /// The error of a drive that cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
     /// There is no truth to compare with.
-    #[error("{path}: line {line}: no reference yaw rate (column ref_gyr_z), which evaluation needs")]
+    #[error(
+        "{path}: line {line}: no reference, which evaluation needs: neither a yaw rate (ref_gyr_z, in every row) nor a \
+         course (ref_yaw)"
+    )]
     NoReference {
         /// The recording.
         path: String,
         /// The first line without it.
         line: u64,
     },
-    /// Less than a second is left after static initialisation.
-    #[error("{path}: {seconds:.2} s are left after static initialisation, evaluation needs 1 s")]
+    /// The reference is known for too short a time after static initialisation.
+    #[error(
+        "{path}: {column} is known for too short a time after static initialisation, which is {seconds:.2} s: a yaw \
+         rate is needed for 1 s, a course for 20 s"
+    )]
     TooShort {
         /// The recording.
         path: String,
-        /// The time that is left.
+        /// The reference's column.
+        column: &'static str,
+        /// The time after static initialisation.
         seconds: f64,
+    },
+    /// Gyro and reference are too far apart.
+    #[error(
+        "{path}: {column} turns otherwise than the gyro, by {rad:.2} rad in 10 s: another unit or sign (rad, positive to \
+         the left), or another drive"
+    )]
+    Disagrees {
+        /// The recording.
+        path: String,
+        /// The reference's column.
+        column: &'static str,
+        /// The typical difference in 10 s.
+        rad: f64,
     },
 }
 
-/// Errors of all methods on one drive.
+/// A method's errors and cost.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Row {
+    /// The errors.
+    #[serde(flatten)]
+    pub error: HeadingError,
+    /// The mean of what it takes off beyond static initialisation and zero-rate updates, deg/h.
+    pub mean_correction_deg_h: f64,
+    /// Its cost.
+    #[serde(flatten)]
+    pub cost: Cost,
+}
+
+/// What the columns of [`columns`] say.
+pub const COLUMNS: [&str; 10] = [
+    "heading error, rad",
+    "in 1 s",
+    "in 10 s",
+    "in 60 s",
+    "rms",
+    "final",
+    "to static",
+    "mean, deg/h",
+    "mult./sample",
+    "delay, ms",
+];
+
+/// Returns the table of a drive or of a mean: the name of each method and its figures, a dash where there is none.
+pub fn columns(rows: &PerMethod<Row>) -> impl Iterator<Item = (Method, [String; 10])> {
+    let still = rows[Method::STATIC].error.compared();
+    rows.each().map(move |(method, row)| {
+        let figure = |figure: Option<f64>, decimals| {
+            figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.decimals$}"))
+        };
+        let HeadingError { mean_1s_rad, mean_10s_rad, mean_60s_rad, rms_rad, final_rad } = row.error;
+        let to_static = row.error.compared().zip(still).map(|(own, still)| own / still);
+        let [in_1s, in_10s, in_60s, rms, end] =
+            [mean_1s_rad, mean_10s_rad, mean_60s_rad, rms_rad, final_rad].map(|error| figure(error, 6));
+        let columns = [
+            method.name.to_owned(),
+            in_1s,
+            in_10s,
+            in_60s,
+            rms,
+            end,
+            figure(to_static, 3),
+            format!("{:+.1}", row.mean_correction_deg_h),
+            format!("{:.0}", row.cost.multiplications_per_sample),
+            row.cost.delay_ms.to_string(),
+        ];
+        (method, columns)
+    })
+}
+
+/// One of our rates beside the best classical method that has the same inputs and no more delay.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The classical method.
+    pub best_classical: &'static str,
+    /// Our error over its: over 1 s, or the RMS of the drive where the reference gives no 1 s error.
+    pub ratio: f64,
+}
+
+/// Both rates that are sent, each beside the best classical method.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Comparisons {
+    /// The rate for navigation.
+    pub default: Comparison,
+    /// The rate that is sent at once.
+    pub prompt: Comparison,
+}
+
+impl Comparisons {
+    /// `None` where there is no error to compare.
+    #[must_use]
+    pub fn new(rows: &PerMethod<Row>) -> Option<Self> {
+        let compare = |ours: Method| {
+            let Row { error, cost, .. } = rows[ours];
+            let classical = Method::CLASSICAL.into_iter();
+            let as_fast = classical.filter(|method| rows[*method].cost.delay_ms <= cost.delay_ms);
+            let errors = as_fast.filter_map(|method| Some((method, rows[method].error.compared()?)));
+            let (best, least) = errors.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+            Some(Comparison { best_classical: best.key, ratio: error.compared()? / least })
+        };
+        Some(Self { default: compare(Method::NAVIGATION)?, prompt: compare(Method::PROMPT)? })
+    }
+}
+
+impl fmt::Display for Comparisons {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { default, prompt } = self;
+        write!(
+            f,
+            "{:.2} of the best classical method ({}); sent at once {:.2} ({})",
+            default.ratio, default.best_classical, prompt.ratio, prompt.best_classical
+        )
+    }
+}
+
+/// All methods on one drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriveErrors {
     /// The recording's name.
     pub name: String,
+    /// The folder that it is in.
+    pub set: String,
     /// The length of the comparison, s.
     pub seconds: f64,
     /// Grid steps without a sample; they count for no method.
     pub missing: u32,
-    /// The errors.
-    pub methods: PerMethod<YawError>,
+    /// The column of the reference.
+    pub reference: &'static str,
+    /// The vehicle's wheels are known.
+    pub wheels: bool,
+    /// The standstill at the start is simulated.
+    pub simulated_rest: bool,
+    /// Our rates beside the best classical method.
+    pub over_best_classical: Option<Comparisons>,
+    /// The methods.
+    pub methods: PerMethod<Row>,
 }
 
 impl DriveErrors {
@@ -49,122 +183,233 @@ impl DriveErrors {
     /// [`EvaluateError`], which names the file.
     pub fn new(recording: &Recording, rates: &Rates) -> Result<Self, EvaluateError> {
         let path = || recording.path.clone();
+        let drive = &rates.drive;
         let Some(reference) = &rates.reference else {
-            let mut rows = rates.drive.steps[rates.drive.compared()].iter().map(|s| &recording.rows[s.row]);
+            let mut rows = drive.steps[drive.compared()].iter().map(|step| &recording.rows[step.row]);
             let line = rows.find(|row| row.reference.is_none()).map_or(1, |row| row.line);
             return Err(EvaluateError::NoReference { path: path(), line });
         };
-        let seconds = reference.len() as f64 / f64::from(RATE_HZ);
-        if reference.len() < WINDOW {
-            return Err(EvaluateError::TooShort { path: path(), seconds });
+        let (column, seconds) = (reference.column(), rates.seconds.len() as f64 * DT);
+        let errors = rates.rates.map(|rate| reference.errors(rate));
+        let still = errors[Method::STATIC].as_ref().and_then(|errors| errors.typical_10s());
+        if let Some(rad) = still.filter(|rad| *rad > PLAUSIBLE_10S_RAD) {
+            return Err(EvaluateError::Disagrees { path: path(), column, rad });
         }
-        let methods = rates.rates.map(|rate| YawError::new(rate, reference)).all();
-        let methods = methods.ok_or_else(|| EvaluateError::TooShort { path: path(), seconds })?;
-        let missing = rates.drive.counters.missing;
-        Ok(Self { name: recording.name().to_owned(), seconds, missing, methods })
+        let yaw = |method: Method| integral(&rates.rates[method]).last().copied().unwrap_or(0.0);
+        let updated = yaw(Method::STATIC_ZERO_RATE);
+        let row = |method: Method| {
+            let error = errors[method].as_ref()?.figures();
+            let mean_correction_deg_h = (yaw(method) - updated).to_degrees() / seconds * 3600.0;
+            Some(Row { error, mean_correction_deg_h, cost: rates.costs[method] })
+        };
+        let methods = PerMethod::new(row).all();
+        let methods = methods.ok_or_else(|| EvaluateError::TooShort { path: path(), column, seconds })?;
+        let set = Path::new(&recording.path).parent().and_then(Path::file_name).unwrap_or_default();
+        Ok(Self {
+            name: recording.name().to_owned(),
+            set: set.to_string_lossy().into_owned(),
+            seconds,
+            missing: drive.counters.missing,
+            reference: column,
+            wheels: recording.rows.iter().any(|row| row.wheels.iter().any(Option::is_some)),
+            simulated_rest: rates.simulated_rest,
+            over_best_classical: Comparisons::new(&methods),
+            methods,
+        })
     }
 }
 
-/// Errors on several drives and their mean.
+/// The mean of some drives, each counting the same; each figure over those that have it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mean {
+    /// The folder of the drives, or "all".
+    pub set: String,
+    /// The number of drives.
+    pub drives: usize,
+    /// Our rates beside the best classical method.
+    pub over_best_classical: Option<Comparisons>,
+    /// The methods.
+    pub methods: PerMethod<Row>,
+}
+
+impl Mean {
+    fn new(set: &str, drives: &[&DriveErrors]) -> Option<Self> {
+        let count = (!drives.is_empty()).then_some(drives.len() as f64)?;
+        let methods = PerMethod::new(|method| {
+            let rows: Vec<Row> = drives.iter().map(|drive| drive.methods[method]).collect();
+            let error = HeadingError::mean(&rows.iter().map(|row| row.error).collect::<Vec<_>>());
+            let mean_correction_deg_h = rows.iter().map(|row| row.mean_correction_deg_h).sum::<f64>() / count;
+            Row { error, mean_correction_deg_h, cost: rows[0].cost }
+        });
+        let over_best_classical = Comparisons::new(&methods);
+        Some(Self { set: set.to_owned(), drives: drives.len(), over_best_classical, methods })
+    }
+}
+
+/// The methods on several drives and their means.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// One for each drive.
     pub drives: Vec<DriveErrors>,
-    /// The mean of the drives, each counting the same; absent without drives.
+    /// The mean of each folder's drives.
+    pub sets: Vec<Mean>,
+    /// The mean of all drives; absent without drives.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean: Option<PerMethod<YawError>>,
+    pub mean: Option<PerMethod<Row>>,
 }
 
 impl Report {
-    /// Adds the mean.
+    /// Adds the means.
     #[must_use]
     pub fn new(drives: Vec<DriveErrors>) -> Self {
-        let of_method =
-            |method| YawError::mean(&drives.iter().map(|drive| drive.methods[method]).collect::<Vec<_>>());
-        let mean = PerMethod::new(of_method).all();
-        Self { drives, mean }
+        let mut names: Vec<&String> = Vec::new();
+        for drive in &drives {
+            if !names.contains(&&drive.set) {
+                names.push(&drive.set);
+            }
+        }
+        let of = |set: &String| drives.iter().filter(|drive| drive.set == *set).collect::<Vec<_>>();
+        let sets = names.iter().filter_map(|set| Mean::new(set, &of(set))).collect();
+        let mean = Mean::new("all", &drives.iter().collect::<Vec<_>>()).map(|mean| mean.methods);
+        Self { drives, sets, mean }
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for drive in &self.drives {
-            write!(f, "{}: {:.1} s after static initialisation", drive.name, drive.seconds)?;
-            if drive.missing > 0 {
-                write!(f, ", {} samples missing", drive.missing)?;
+            let DriveErrors { name, seconds, reference, missing, .. } = drive;
+            write!(f, "{name}: {seconds:.1} s after static initialisation, against {reference}, ")?;
+            write!(f, "{}", if drive.wheels { "with wheels" } else { "no wheels" })?;
+            if *missing > 0 {
+                write!(f, ", {missing} samples missing")?;
+            }
+            if drive.simulated_rest {
+                write!(f, "; it starts moving: 3 s at rest are simulated, with the best constant bias")?;
             }
             writeln!(f)?;
-            table(f, &drive.methods)?;
-            writeln!(f)?;
+            table(f, drive.over_best_classical, &drive.methods)?;
         }
-        if let (Some(mean), [_, _, ..]) = (&self.mean, self.drives.as_slice()) {
-            writeln!(f, "mean of {} drives", self.drives.len())?;
-            table(f, mean)?;
-            writeln!(f)?;
+        for Mean { set, drives, over_best_classical, methods } in &self.sets {
+            if *drives > 1 {
+                writeln!(f, "mean of {drives} drives{}{set}", if set.is_empty() { "" } else { " of " })?;
+                table(f, *over_best_classical, methods)?;
+            }
         }
         Ok(())
     }
 }
 
-fn table(f: &mut fmt::Formatter<'_>, errors: &PerMethod<YawError>) -> fmt::Result {
-    writeln!(f, "  {:<24}{:>14}{:>16}{:>14}", "yaw error", "in 1 s, rad", "to static init", "final, rad")?;
-    let baseline = errors[Method::STATIC].mean_1s_rad;
-    for (method, error) in errors.each() {
-        let ratio = error.mean_1s_rad / baseline;
-        let name = method.name;
-        writeln!(f, "  {name:<24}{:>14.6}{ratio:>16.3}{:>14.6}", error.mean_1s_rad, error.final_rad)?;
+fn table(f: &mut fmt::Formatter<'_>, ours: Option<Comparisons>, rows: &PerMethod<Row>) -> fmt::Result {
+    if let Some(ours) = ours {
+        writeln!(f, "  sent for navigation: {ours}")?;
     }
-    Ok(())
+    let mut line = |columns: [&str; 10]| {
+        write!(f, "  {:<26}", columns[0])?;
+        columns[1..7].iter().try_for_each(|column| write!(f, "{column:>10}"))?;
+        columns[7..].iter().try_for_each(|column| write!(f, "{column:>14}"))?;
+        writeln!(f)
+    };
+    line(COLUMNS)?;
+    for (_, row) in columns(rows) {
+        line(row.each_ref().map(String::as_str))?;
+    }
+    writeln!(f)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn report(drives: usize) -> Report {
-        let error = |x| YawError { mean_1s_rad: x, final_rad: 2.0 * x, final_unwrapped_rad: 2.0 * x };
-        let methods = |scale: f64| {
-            PerMethod::new(|method| {
-                error(match method {
-                    Method::RAW => scale,
-                    Method::STATIC => 0.5 * scale,
-                    Method::FIR => 2.0 * scale,
-                    Method::GYRONET_F32 => 0.25 * scale,
-                    Method::GYRONET_INT => 0.125 * scale,
-                    _ => 0.0625 * scale,
-                })
-            })
-        };
-        let drive = |k| DriveErrors {
+    fn drive(k: u32, set: &str, reference: &'static str) -> DriveErrors {
+        let methods = PerMethod::new(|method| {
+            let error = f64::from(k)
+                * match method {
+                    Method::RAW => 1.0,
+                    Method::FIR_ZERO_RATE => 0.3125,
+                    Method::STATIC_ZERO_RATE => 0.375,
+                    Method::NAVIGATION => 0.25,
+                    _ => 0.5,
+                };
+            let rate = (reference == "ref_gyr_z").then_some(error);
+            let error = HeadingError {
+                mean_1s_rad: rate,
+                mean_10s_rad: rate,
+                mean_60s_rad: Some(error),
+                rms_rad: Some(error),
+                final_rad: Some(2.0 * error),
+            };
+            let delay_ms = match method {
+                Method::FIR_ZERO_RATE => 50,
+                Method::NAVIGATION => 70,
+                _ => 0,
+            };
+            Row {
+                error,
+                mean_correction_deg_h: -3.0,
+                cost: Cost { multiplications_per_sample: 6.0, delay_ms },
+            }
+        });
+        DriveErrors {
             name: format!("drive{k}"),
+            set: set.into(),
             seconds: 10.0,
             missing: 0,
-            methods: methods((k + 1) as f64),
-        };
-        Report::new((0..drives).map(drive).collect())
+            reference,
+            wheels: false,
+            simulated_rest: reference == "ref_yaw",
+            over_best_classical: Comparisons::new(&methods),
+            methods,
+        }
+    }
+
+    fn report() -> Report {
+        Report::new(vec![drive(1, "a", "ref_gyr_z"), drive(2, "b", "ref_yaw"), drive(3, "a", "ref_gyr_z")])
     }
 
     #[test]
-    fn json_has_the_documented_shape() {
-        let json = serde_json::to_value(report(2)).unwrap();
-        assert_eq!(json["drives"][0]["name"], "drive0");
-        for (method, value) in
-            [("raw", 1.5), ("static", 0.75), ("fir", 3.0), ("gyronet_f32", 0.375), ("default", 0.09375)]
-        {
-            assert!(json["drives"][1]["methods"][method]["mean_1s_rad"].is_f64());
-            assert!(json["drives"][1]["methods"][method]["final_rad"].is_f64());
-            assert_eq!(json["mean"][method]["mean_1s_rad"], value);
-            assert_eq!(json["mean"][method]["final_rad"], 2.0 * value);
+    fn json_has_the_documented_names() {
+        let json = serde_json::to_value(report()).unwrap();
+        let methods = json["drives"][1]["methods"].as_object().unwrap();
+        let names: Vec<&str> = methods.keys().map(String::as_str).collect();
+        let mut due =
+            vec!["raw", "static", "static_zero_rate", "fir", "linear", "vqf", "gyronet_f32", "gyronet_int"];
+        due.extend(["prompt", "default", "fir_zero_rate"]);
+        due.sort_unstable();
+        assert_eq!(names, due);
+        let row = json["drives"][1]["methods"]["default"].as_object().unwrap();
+        let mut due = vec!["mean_1s_rad", "mean_10s_rad", "mean_60s_rad", "rms_rad", "final_rad"];
+        due.extend(["mean_correction_deg_h", "multiplications_per_sample", "delay_ms"]);
+        due.sort_unstable();
+        assert_eq!(row.keys().map(String::as_str).collect::<Vec<_>>(), due);
+        assert!(row["mean_1s_rad"].is_null() && row["mean_10s_rad"].is_null());
+        assert_eq!((&row["rms_rad"], &row["final_rad"]), (&0.5.into(), &1.0.into()));
+        // A mean is over those that have the figure.
+        assert_eq!(json["mean"]["raw"]["mean_1s_rad"], 2.0);
+        assert_eq!(json["mean"]["raw"]["rms_rad"], 2.0);
+        let sets = json["sets"].as_array().unwrap().iter().map(|set| (&set["set"], &set["drives"]));
+        assert_eq!(sets.collect::<Vec<_>>(), [(&"a".into(), &2.into()), (&"b".into(), &1.into())]);
+    }
+
+    #[test]
+    fn ours_is_beside_the_best_that_is_no_later() {
+        for drive in report().drives {
+            let Comparisons { default, prompt } = drive.over_best_classical.unwrap();
+            assert_eq!((default.best_classical, default.ratio), ("fir_zero_rate", 0.8));
+            assert_eq!((prompt.best_classical, prompt.ratio), ("static_zero_rate", 0.5 / 0.375));
         }
     }
 
     #[test]
-    fn table_is_aligned() {
-        let text = report(2).to_string();
-        let widths: Vec<usize> = text.lines().filter(|line| line.starts_with("  ")).map(str::len).collect();
-        assert_eq!(widths.len(), 39);
+    fn table_is_aligned_and_the_ratio_comes_first() {
+        let text = report().to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[1].contains("0.80 of the best classical method (fir_zero_rate)"), "{text}");
+        let rows = lines.iter().filter(|line| line.starts_with("  ") && !line.contains("classical"));
+        let widths: Vec<usize> = rows.map(|line| line.len()).collect();
+        // Three drives and one mean of two.
+        assert_eq!(widths.len(), 4 * (1 + Method::ON_A_DRIVE.len()));
         assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
-        assert!(text.contains("mean of 2 drives"));
-        assert!(!report(1).to_string().contains("mean of"));
+        assert!(text.contains("mean of 2 drives of a") && !text.contains("mean of 1"), "{text}");
     }
 }

@@ -230,7 +230,8 @@ impl Sequence {
             };
             let [left, right] = self.wheel_rates(step).map(Some);
             let wheels = [None, right, None, left];
-            Some(RecordingRow { line: k as u64 + 1, sample, reference: Some(turn / DT), wheels })
+            let reference = Some(turn / DT);
+            Some(RecordingRow { line: k as u64 + 1, sample, reference, course: None, wheels })
         });
         Ok(Recording { path: self.path.display().to_string(), rows: rows.collect(), missing: 0 })
     }

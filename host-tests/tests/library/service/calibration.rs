@@ -2,12 +2,13 @@
 
 use super::{Board, ask, sample, set, start};
 use gyronet::health::Status;
+use gyronet::mounting::GyroMap;
 use gyronet::sample::Standstill;
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::frame::{MAX_FRAME, emit};
 use gyronet::service::message::{Calibrate, Origin, Refusal};
 use gyronet::service::{Reply, Request};
-use gyronet::store::{Configuration, Mounting};
+use gyronet::store::{Configuration, Mounting, UnitMap};
 use gyronet::units::{AngularRate, CentiCelsius};
 use gyronet_host_tests::flash::F405;
 use std::cell::RefCell;
@@ -54,6 +55,26 @@ fn calibration_is_found_and_kept() {
     assert!((level.roll_deg - 30.0).abs() < 1e-3 && level.pitch_deg.abs() < 1e-3, "{level:?}");
     let bias = calibration.gyro_bias.expect("it was stored");
     assert!(bias.iter().all(|rate| (rate.rad_per_sec() - 0.01).abs() < 1e-5), "{bias:?}");
+}
+
+#[test]
+fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    let Reply::Info(info) = ask(&mut board, &Request::Info) else { panic!("it has an identity") };
+    let runs = info.weights_crc.unwrap_or(0);
+    let elements = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.006, 0.029, 1.001]];
+    let gyro_map = GyroMap::from_elements(elements).expect("a unit's");
+    let set = |weights| Request::Calibrate(Calibrate::SetUnit(Some(UnitMap { gyro_map, weights })));
+    let refused = Refusal::OtherWeights { found: runs ^ 1, runs };
+    assert_eq!(ask(&mut board, &set(runs ^ 1)), Reply::Refused(refused));
+    assert_eq!(ask(&mut board, &set(runs)), Reply::Done);
+    let board = start(&flash);
+    assert_eq!(board.calibration().gyro_map(runs), Some(gyro_map));
+    let of = |weights| Configuration::DEFAULT.pipeline(board.calibration(), weights).gyro_map;
+    assert_eq!((of(runs), of(runs ^ 1)), (gyro_map, GyroMap::IDENTITY));
+    assert_eq!(GyroMap::from_elements([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.0, 1.0]]), None);
+    assert_eq!(GyroMap::from_elements([[f32::NAN, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None);
 }
 
 #[test]

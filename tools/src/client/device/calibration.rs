@@ -22,6 +22,9 @@ pub fn to_value(calibration: &Calibration) -> serde_json::Result<Value> {
         "gyro_bias_rad_per_s": calibration.gyro_bias.map(rates),
         "temperature_table": points.collect::<Value>(),
         "level": value(&calibration.level)?,
+        "unit": calibration.unit.map(|unit| {
+            json!({ "gyro_map": unit.gyro_map.elements(), "weights": unit.weights })
+        }),
     }))
 }
 
@@ -37,7 +40,7 @@ mod tests {
         let mut calibration = Calibration::NONE;
         assert_eq!(
             to_value(&calibration).unwrap(),
-            json!({ "gyro_bias_rad_per_s": null, "temperature_table": [], "level": null })
+            json!({ "gyro_bias_rad_per_s": null, "temperature_table": [], "level": null, "unit": null })
         );
         calibration.add_bias(bias, Some(CentiCelsius(2_150)));
         calibration.level = Some(Level { roll_deg: 1.5, pitch_deg: -0.25 });

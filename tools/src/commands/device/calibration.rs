@@ -5,7 +5,9 @@ use clap::ValueEnum;
 use gyronet::service::calibrate::{State, Task};
 use gyronet::service::message::Calibrate;
 use gyronet::service::{Reply, Request};
+use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::client::device::calibration::to_value;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -14,6 +16,8 @@ pub enum What {
     Static,
     /// Measure roll and pitch of the sensor at rest on level ground.
     Mounting,
+    /// Store the gain and mounting that `gyronet calibrate` found; wants --file.
+    Unit,
     /// Print the calibration.
     Show,
     /// Stop without a result.
@@ -24,9 +28,20 @@ pub enum What {
 const LIMIT: Duration = Duration::from_secs(10);
 const POLL: Duration = Duration::from_millis(200);
 
-pub fn run(device: &mut Board, what: What, store: bool, json: bool) -> crate::commands::Result {
+pub fn run(
+    device: &mut Board,
+    what: What,
+    file: Option<&Path>,
+    store: bool,
+    json: bool,
+) -> crate::commands::Result {
     let task = match what {
         What::Show => None,
+        What::Unit => {
+            let path = file.ok_or("give the file of `gyronet calibrate` with --file")?;
+            device.ask(&Request::Calibrate(Calibrate::SetUnit(Some(unit_file::read(path)?))))?;
+            None
+        }
         What::Cancel => {
             device.ask(&Request::Calibrate(Calibrate::Cancel))?;
             None

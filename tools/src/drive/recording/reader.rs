@@ -11,6 +11,7 @@ const TIME: &str = "t_s";
 const FORCE: [&str; 3] = ["acc_x", "acc_y", "acc_z"];
 const RATE: [&str; 3] = ["gyr_x", "gyr_y", "gyr_z"];
 const REFERENCE: &str = "ref_gyr_z";
+const COURSE: &str = "ref_yaw";
 const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
 
 /// Device time on the wire: 10 kHz.
@@ -27,6 +28,7 @@ struct Columns {
     force: [Column; 3],
     rate: [Column; 3],
     reference: Option<Column>,
+    course: Option<Column>,
     wheels: [Option<Column>; WHEELS],
 }
 
@@ -48,6 +50,7 @@ impl Columns {
             force: three(FORCE)?,
             rate: three(RATE)?,
             reference: optional(REFERENCE),
+            course: optional(COURSE),
             wheels: WHEEL.map(optional),
         })
     }
@@ -81,7 +84,7 @@ impl<R: std::io::Read> Reader<R> {
 
     fn row(&mut self, record: &StringRecord) -> Result<Row, DataError> {
         let line = record.position().map_or(0, csv::Position::line);
-        let Columns { time, force, rate, reference, wheels } = self.columns.clone();
+        let Columns { time, force, rate, reference, course, wheels } = self.columns.clone();
         let fields = Fields { path: &self.path, line, record };
         let time = fields.time(time)?;
         if let Some(last) = self.last
@@ -102,10 +105,10 @@ impl<R: std::io::Read> Reader<R> {
             temperature: None,
             validity: Validity::Good,
         };
-        let reference = optional(reference)?;
+        let (reference, course) = (optional(reference)?, optional(course)?);
         let wheels = [w1?, w2?, w3?, w4?];
         self.last = Some(time);
-        Ok(Row { line, sample, reference, wheels })
+        Ok(Row { line, sample, reference, course, wheels })
     }
 }
 

@@ -11,8 +11,9 @@ use crate::drive::DT;
 use crate::drive::recording::Recording;
 use crate::drive::replay::{Replay, Step};
 use crate::drive::wheel_frames::WheelFrames;
-use crate::evaluate::fir;
+use crate::evaluate::fir::LowPass;
 use crate::evaluate::methods::Method;
+use crate::evaluate::vqf;
 use crate::paper::fog_replay;
 use crate::paper::sequence::Sequence;
 use crate::simulate::world::EARTH_RATE;
@@ -129,7 +130,9 @@ impl Estimates {
         match drive.and_then(|drive| Ok((drive, looped?))) {
             Ok((drive, looped)) => {
                 let still = &gyro[..self.start];
-                self.add(Method::STATIC, || constant(still.iter().sum::<f64>() / still.len().max(1) as f64));
+                let bias = still.iter().sum::<f64>() / still.len().max(1) as f64;
+                self.add(Method::STATIC, || constant(bias));
+                self.add(Method::FIR, || LowPass::chosen().filter(&constant(bias)));
                 for (method, run_time, rates) in [
                     (Method::GYRONET, alone_s, corrected(&drive, &gyro, |step| step.settled)),
                     (
@@ -154,16 +157,20 @@ impl Estimates {
             }
             Err(error) => self.refused = Some(error.to_string()),
         }
-        self.add(Method::FIR, || fir::filter(&fir::Design::PAPER.taps(), &gyro));
-        let filter = || vqf_rs::VQF::new(DT, None, None, None);
-        self.add(Method::VQF, || vqf(sequence, filter()));
+        let samples = || {
+            sequence
+                .steps
+                .iter()
+                .map(|step| (step.angular_rate.map(f64::from), step.specific_force.map(f64::from)))
+        };
+        self.add(Method::VQF, || vqf::rates(vqf::published(), samples()));
         self.add(Method::VQF_VEHICLE, || {
-            let mut filter = filter();
+            let mut filter = vqf::published();
             // Three times the spread that static initialisation allows: VQF looks at each sample.
             let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
             let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
             filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
-            vqf(sequence, filter)
+            vqf::rates(filter, samples())
         });
     }
 
@@ -195,19 +202,6 @@ fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate)
         gyro - taken_off
     };
     gyro.iter().enumerate().map(rate).collect()
-}
-
-/// Rates of VQF's heading.
-fn vqf(sequence: &Sequence, mut filter: vqf_rs::VQF) -> Vec<f64> {
-    let mut unwrapped = 0.0;
-    let mut last = None;
-    rates(sequence.steps.iter().map(|step| {
-        filter.update(step.angular_rate.map(f64::from), step.specific_force.map(f64::from), None);
-        let vqf_rs::Quaternion(w, x, y, z) = filter.quat_6d();
-        let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
-        unwrapped += crate::evaluate::metrics::wrap(yaw - last.replace(yaw).unwrap_or(yaw));
-        unwrapped
-    }))
 }
 
 /// Rates of an unwrapped heading; the first step has none.

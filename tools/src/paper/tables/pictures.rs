@@ -44,8 +44,7 @@ pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Res
     let simulated = if errors.simulated { " (simulated)" } else { "" };
     let name = format!("{}{simulated}", errors.name);
     // A gyro with its bias runs off any scale that shows the others.
-    let in_scale =
-        |path: &&Path| path.method.is_none_or(|method| method != Method::RAW && method != Method::FIR);
+    let in_scale = |path: &&Path| path.method.is_none_or(|method| method != Method::RAW);
     let of = |gyro: Gyro| {
         let is_wanted = move |path: &&Path| path.method.is_none_or(|method| method.gyro == gyro);
         paths.iter().filter(is_wanted).filter(in_scale).collect::<Vec<&Path>>()

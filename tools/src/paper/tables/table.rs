@@ -103,7 +103,8 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
     let mut notes = vec![
         "The paper's figures are for KAIST Urban.".into(),
         "Errors are against the data set's truth.".into(),
-        "Unlike the paper's, our GyroNet gets readings less the mean of static initialisation.".into(),
+        "Unlike the paper's, our GyroNet and our FIR get readings less the mean of static initialisation."
+            .into(),
     ];
     let [still, network, looped] = ["static", "gyronet", "gyronet_loop"].map(|key| means.get(key));
     if let (Some(still), Some(network), Some(looped)) = (still, network, looped) {

@@ -16,7 +16,7 @@ struct Nothing;
 impl WindowNetwork for Nothing {
     fn estimate(&mut self, _window: &[Features; WINDOW]) -> WindowEstimate {
         let (corrections, scale) = ([AngularRate::ZERO; WINDOW], gyronet::model::SCALE_MAX);
-        WindowEstimate { corrections, scale, clamped_inputs: 0 }
+        WindowEstimate { corrections, scale, ..WindowEstimate::NONE }
     }
 }
 

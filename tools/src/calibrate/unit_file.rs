@@ -1,0 +1,142 @@
+//! The file of a unit's calibration: the map for the board, and how well it is known.
+
+use super::{Drive, Share, fit::Fit};
+use gyronet::mounting::GyroMap;
+use gyronet::store::UnitMap;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The calibration of a unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnitFile {
+    /// The map.
+    pub gyro_map: GyroMap,
+    /// Its last row: what is added to the yaw rate of roll, pitch and yaw rate.
+    pub shares: [Share; 3],
+    /// The checksum of the weights that corrected the drives.
+    pub weights: u32,
+    /// The drives.
+    pub drives: Vec<DriveFit>,
+}
+
+/// The fit on one drive.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DriveFit {
+    /// The recording.
+    pub name: String,
+    /// The gyro's bias about x, y and z at its start, rad/s.
+    pub gyro_bias_rad_per_s: [f64; 3],
+    /// What the corrected yaw rate lacks of the reference all the time, rad/s: the bias that is left.
+    pub yaw_rate_bias_rad_per_s: f64,
+    /// The robust standard deviation of the spans' angles behind the fit, rad.
+    pub deviation_rad: f64,
+}
+
+/// The reason why a file is not used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UnitFileError {
+    /// It cannot be read.
+    #[error("{path}: {source}")]
+    Read {
+        /// The file.
+        path: String,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// It is no calibration of a unit.
+    #[error("{path}: {source}")]
+    Json {
+        /// The file.
+        path: String,
+        /// The reason.
+        source: serde_json::Error,
+    },
+    /// Its map is no unit's.
+    #[error("{path}: gyro_map: an element is too far from the identity")]
+    Implausible {
+        /// The file.
+        path: String,
+    },
+    /// It was found with other weights.
+    #[error("{path}: found with the weights {found:08x}, these are {runs:08x}")]
+    OtherWeights {
+        /// The file.
+        path: String,
+        /// The checksum of those.
+        found: u32,
+        /// The checksum of the weights in use.
+        runs: u32,
+    },
+}
+
+/// The content as JSON has it.
+#[derive(Serialize, Deserialize)]
+struct Content {
+    gyro_map: [[f32; 3]; 3],
+    weights: u32,
+    #[serde(default)]
+    shares: serde_json::Value,
+    #[serde(default)]
+    drives: Vec<DriveFit>,
+}
+
+impl UnitFile {
+    /// Returns the content as JSON.
+    #[must_use]
+    pub fn json(&self) -> serde_json::Value {
+        let shares = self.shares.map(|Share { name, value, sigma, refused }| {
+            (String::from(name), serde_json::json!({ "value": value, "sigma": sigma, "refused": refused }))
+        });
+        let content = Content {
+            gyro_map: self.gyro_map.elements(),
+            weights: self.weights,
+            shares: serde_json::Value::Object(shares.into_iter().collect()),
+            drives: self.drives.clone(),
+        };
+        serde_json::json!(content)
+    }
+}
+
+/// Reads the map of a file.
+///
+/// # Errors
+/// [`UnitFileError`], which names the file.
+pub fn read(path: &Path) -> Result<UnitMap, UnitFileError> {
+    let name = || path.display().to_string();
+    let text =
+        std::fs::read_to_string(path).map_err(|source| UnitFileError::Read { path: name(), source })?;
+    let content: Content =
+        serde_json::from_str(&text).map_err(|source| UnitFileError::Json { path: name(), source })?;
+    let gyro_map = GyroMap::from_elements(content.gyro_map)
+        .ok_or_else(|| UnitFileError::Implausible { path: name() })?;
+    Ok(UnitMap { gyro_map, weights: content.weights })
+}
+
+/// Reads the map of a file for weights with this checksum.
+///
+/// # Errors
+/// [`UnitFileError`], which names the file.
+pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, UnitFileError> {
+    let UnitMap { gyro_map, weights: found } = read(path)?;
+    if found == runs {
+        Ok(gyro_map)
+    } else {
+        Err(UnitFileError::OtherWeights { path: path.display().to_string(), found, runs })
+    }
+}
+
+/// Returns what each drive has shown.
+pub(super) fn drives(drives: &[Drive<'_>], fit: &Fit) -> Vec<DriveFit> {
+    let fits = fit.biases.iter().zip(&fit.deviations);
+    drives
+        .iter()
+        .zip(fits)
+        .map(|(drive, (bias, deviation))| DriveFit {
+            name: drive.recording.name().to_owned(),
+            gyro_bias_rad_per_s: drive.replay.gyro_bias.map(|bias| bias.rad_per_sec()),
+            yaw_rate_bias_rad_per_s: *bias,
+            deviation_rad: *deviation,
+        })
+        .collect()
+}

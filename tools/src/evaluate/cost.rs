@@ -1,0 +1,86 @@
+//! What a method costs: its multiplications and its delay, from the structure of each.
+
+use super::fir::LowPass;
+use super::methods::Method;
+use super::vqf;
+use gyronet::compensate::CompensateConfig;
+use gyronet::model::blob::Shape;
+use gyronet::model::window::{FEATURES, WINDOW};
+use gyronet::sample::PERIOD_US;
+use serde::Serialize;
+
+/// The cost of one sample. What happens once a second at standstill is not in it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Cost {
+    /// Multiplications per sample.
+    pub multiplications_per_sample: f64,
+    /// Delay from the sample to its rate, ms.
+    pub delay_ms: u64,
+}
+
+/// The shapes of the networks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shapes {
+    /// GyroNet in f32.
+    pub float: Shape,
+    /// GyroNet in integers.
+    pub integer: Shape,
+    /// The linear window.
+    pub linear: Shape,
+    /// The model of the rates that are sent.
+    pub sent: Shape,
+}
+
+impl Cost {
+    /// Returns the cost of a method of [`Method::ON_A_DRIVE`].
+    #[must_use]
+    pub fn new(method: Method, shapes: &Shapes) -> Self {
+        let CompensateConfig { mode, lag, .. } = CompensateConfig::DEFAULT;
+        let low_pass = LowPass::chosen();
+        let windows = |shape| multiplications(shape) as f64 / f64::from(mode.hop());
+        let settled = mode.settled_after();
+        let (multiplications_per_sample, samples) = match method {
+            Method::FIR | Method::FIR_ZERO_RATE => (low_pass.multiplications() as f64, low_pass.delay()),
+            Method::VQF => (vqf::MULTIPLICATIONS as f64, 0),
+            Method::LINEAR => (windows(shapes.linear), settled),
+            Method::GYRONET_F32 => (windows(shapes.float), settled),
+            Method::GYRONET_INT => (windows(shapes.integer), settled),
+            Method::PROMPT => (windows(shapes.sent), 0),
+            Method::NAVIGATION => (windows(shapes.sent), lag.samples()),
+            // The gyro, less a bias.
+            _ => (0.0, 0),
+        };
+        Self { multiplications_per_sample, delay_ms: samples as u64 * PERIOD_US / 1_000 }
+    }
+}
+
+/// Returns the multiply-accumulates of one window: the linear part, the gates of two Bi-LSTMs, and the layer on top.
+#[must_use]
+pub fn multiplications(Shape { units, linear }: Shape) -> usize {
+    let units = usize::from(units);
+    let layer = |inputs: usize| 2 * 4 * units * (inputs + units);
+    let step = layer(FEATURES) + layer(2 * units) + 2 * units;
+    WINDOW * (step + if linear { WINDOW * FEATURES } else { 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn multiplications_follow_from_the_shape() {
+        assert_eq!(multiplications(Shape { units: 0, linear: true }), 600);
+        // Two directions, four gates of 6 + 60 and of 120 + 60 inputs, 120 on top.
+        let step = 2 * (4 * 60 * 66) + 2 * (4 * 60 * 180) + 120;
+        assert_eq!(multiplications(Shape::PAPER), 10 * step);
+        assert_eq!(multiplications(Shape::LARGEST), 10 * step + 600);
+    }
+
+    #[test]
+    fn delays_are_those_of_the_pipeline() {
+        let shape = Shape::PAPER;
+        let shapes = Shapes { float: shape, integer: shape, linear: shape, sent: shape };
+        let delays = Method::ON_A_DRIVE.map(|method| Cost::new(method, &shapes).delay_ms);
+        assert_eq!(delays, [0, 0, 0, 50, 50, 0, 110, 110, 110, 0, 70]);
+    }
+}
