@@ -19,7 +19,8 @@ impl SlowMean {
     /// Takes in a value, within 2^32.
     pub(super) fn observe(&mut self, value: i64) {
         self.count = (self.count + 1).min(MEMORY);
-        self.mean += ((value << Q) - self.mean) / self.count;
+        let beyond = (value << Q) - self.mean;
+        self.mean += beyond.checked_div(self.count).unwrap_or(0);
     }
 
     /// Returns the mean.
