@@ -2,7 +2,7 @@
 //!
 //! `static_init` takes the mean of three seconds at the start. `zero_rate` goes on whenever
 //! the vehicle stands: it estimates what is left of the rate behind the network, so that the
-//! loop is closed around gyro and network together. That the vehicle stands the wheels prove;
+//! loop is closed around gyro and network together. The wheels show that the vehicle stands;
 //! where there are none, `quiet` looks at the inertial sensors, within limits that are
 //! tighter than those of the start. `earth` keeps the rotation of the Earth from being taken
 //! off twice.

@@ -26,7 +26,7 @@
 //! | clipped sample | gyro less bias, marked; nothing is carried into it | the same |
 //! | wheels prove that the vehicle stands | as ever | zero |
 //!
-//! Samples are counted, not time: a gap delays the samples before it, it swallows none.
+//! Samples are counted, not time: a gap delays earlier samples and drops none.
 
 mod mode;
 mod slow_mean;
@@ -282,7 +282,7 @@ impl Compensator {
         })
     }
 
-    /// Lets the next samples go without a steady part, because no estimate came.
+    /// Clears the steady part of the samples that follow, because no estimate arrived.
     pub fn forget(&mut self) {
         self.steady_gain = SteadyGain::NONE;
     }
@@ -295,7 +295,7 @@ impl Compensator {
     }
 
     /// Returns whether the navigation rates have more to carry than a window revises, because the wheels stood
-    /// while the vehicle turned. The rates are off until it is carried.
+    /// while the vehicle turned. Until it is carried, the rates are wrong by it.
     #[must_use]
     pub fn carry_exceeds_limit(&self) -> bool {
         let much = LONG * u64::from(self.config.max_carry.0.unsigned_abs());
@@ -320,7 +320,7 @@ impl Compensator {
 
 /// Takes off the estimate and `carried` of the carry, as far as the bound allows. What the code cannot hold stays owed.
 fn emit(entry: &Entry, taken: i64, carried: i64, carry: &mut i64, max_carry: AngularRate) -> Compensated {
-    // A negative bound would be none.
+    // A negative bound would disable the limit.
     let bound = if entry.validity.is_good() { i64::from(max_carry.0).max(0) } else { 0 };
     let carried = carried.clamp(-bound, bound);
     let wanted = i64::from(entry.rate) - taken - carried;

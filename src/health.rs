@@ -80,7 +80,7 @@ pub enum Source {
 pub enum Quality {
     /// The rate is as good as it gets.
     Good = 0,
-    /// Usable, but less is behind it than there could be.
+    /// Usable, with reduced confidence.
     Degraded = 1,
     /// Shown, not to be used yet.
     #[default]

@@ -223,7 +223,7 @@ impl Pipeline {
         } else {
             count(&mut self.state.counters.misplaced, 1);
         }
-        // Whatever was wrong with its stamp, it may be of time that no other sample is of.
+        // The refused sample may be the only one of its step, so it counts as a gap.
         if !matches!(error, AlignError::Duplicate { .. }) {
             self.gap();
         }

@@ -66,7 +66,7 @@ impl Resampler {
         let _ = self.samples.push_back(sample);
     }
 
-    /// Forgets the end of the newest increment: a gap follows.
+    /// Discards all samples.
     pub fn clear(&mut self) {
         self.samples.clear();
     }

@@ -54,7 +54,7 @@ impl ZeroRateConfig {
     };
 }
 
-/// Bits of a rate that the watch over a standing vehicle leaves out.
+/// Low-order bits that are dropped when the turn at standstill is summed.
 const TURNED_SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
 
 /// The evidence that the vehicle stands.
@@ -160,7 +160,7 @@ impl ZeroRate {
             return None;
         }
         let Some(AngularRate(left)) = left else {
-            // Not a whole second any more; a gap ends the waiting too.
+            // A gap makes the second incomplete, and cancels the pending one.
             self.restart();
             return None;
         };

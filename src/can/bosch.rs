@@ -76,7 +76,7 @@ pub struct Tx1 {
     pub counter: u8,
 }
 
-/// The reason why eight bytes are no good TX1.
+/// The reason why a frame is no valid TX1 message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

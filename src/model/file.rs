@@ -188,7 +188,7 @@ impl<const INPUTS: usize, S> Header<INPUTS, S> {
             return Err(BlobError::Length { expected: length, found: bytes.len() });
         }
         let [window, inputs, units, layers] = [reader.u16()?, reader.u16()?, reader.u16()?, reader.u16()?];
-        // More outputs than a u16 holds are as wrong as the most that it holds.
+        // The conversion saturates: no shape has u16::MAX outputs.
         let linear = u16::try_from(reader.i32()? as u32).unwrap_or(u16::MAX);
         let found = [network, window, inputs, units, layers, linear];
         let shape = shape(found).ok_or(BlobError::Topology { found, expected })?;

@@ -149,9 +149,6 @@ fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
     let sent = frames(&board.can_frames());
     let faults = flags(&sent);
     assert!(!has(faults[0], Faults::BUS), "the first 0x1A1 reports a bus without faults");
-    // The wheels stand (67.67 km/h is their zero), which holds the rate at zero after initialisation; that
-    // the drive turns meanwhile is contradicted. Without wheels neither is known.
-    assert!(counters.pipeline.zero_rate_updates + counters.pipeline.contradicted == 0 || !faults.is_empty());
     let silent = faults.iter().filter(|faults| has(**faults, Faults::WHEELS)).count();
     board.run(Duration::from_millis(500));
     let later = flags(&frames(&board.can_frames()));

@@ -2,6 +2,8 @@
 //! leaves its reason.
 
 use crate::common::{self, START, boot, drive, info, resets};
+use embedded_can::{Frame, StandardId};
+use gyronet::can::DataFrame;
 use gyronet::service::crash::{Crash, CrashKind};
 use gyronet::service::event::ResetCause;
 use gyronet_host_tests::board::{At, Board};
@@ -25,7 +27,10 @@ fn hang_of_each_task() {
         "USART1",
         "USART2",
         "USART3",
+        "USART6",
         "SysTick",
+        "CAN1_RX0",
+        "CAN1_TX",
         "UART4",
         "UART5",
         "idle::Idle::turn",
@@ -45,6 +50,10 @@ fn hang_of_each_task() {
             board.configure(&format!("{task}.baud"), 57_600);
             board.send(line.parse().expect("a digit"), &[0]);
         }
+        if task == "CAN1_RX0" {
+            let wheels = StandardId::new(0xAA).expect("11 bits");
+            board.can_send(&DataFrame::new(wheels, &[0; 8]).expect("eight bytes"));
+        }
         let began = board.run(Duration::ZERO);
         let reset = board.run_until("reset", SECOND);
         let reset = reset.unwrap_or_else(|| panic!("a hang of {task} goes unnoticed"));
@@ -52,6 +61,8 @@ fn hang_of_each_task() {
         // 100 ms at 32 kHz, and what was left of the period.
         assert!(reset - began <= 110 * MS, "{task}: {:?}", reset - began);
         board.patch(At::Symbol(task), &original);
+        // The service line answers at its own rate.
+        board.configure("USART6.baud", 115_200);
         board.run(START);
         let identity = info(&mut board).identity;
         assert_eq!((identity.reset, identity.crash), (ResetCause::Watchdog, None), "{task}");

@@ -1,4 +1,5 @@
-//! Every link inside the repository's pages leads to a file and, where it names one, to a heading.
+//! Every link inside the repository's pages leads to a file and, where it names one, to a heading; every test that a page
+//! names exists.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,32 @@ fn no_link_is_dead() {
         }
     }
     assert!(seen > 10, "{seen} links found in all pages: are they read at all?");
+}
+
+/// Criterion: a page names a test as `binary::module::test` in backticks, and that module's file has such a function.
+#[test]
+fn tests_that_pages_name_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut seen = 0;
+    for page in PAGES {
+        let text = fs::read_to_string(root.join(page)).unwrap();
+        for name in text.split('`').skip(1).step_by(2) {
+            let parts: Vec<&str> = name.split("::").collect();
+            let [binary @ ("board" | "image" | "library" | "tools" | "soak"), modules @ .., test] =
+                &parts[..]
+            else {
+                continue;
+            };
+            let module = root.join("host-tests/tests").join(binary).join(modules.join("/"));
+            let file = fs::read_to_string(module.with_extension("rs"));
+            // A name may be that of a whole module.
+            let whole = module.join(test).with_extension("rs").exists();
+            let has = |text: String| text.contains(&format!("fn {test}("));
+            assert!(whole || file.is_ok_and(has), "{page}: no test {name}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 30, "{seen} names found in all pages: are they read at all?");
 }
 
 /// Returns the targets in the round brackets of `[text](link)`.

@@ -58,7 +58,7 @@ impl OutputParts {
 
 // What the coprocessor refuses it has counted, so its results are not looked at here.
 impl Output {
-    /// Does what there is to do.
+    /// Runs one turn of the output task.
     #[inline(never)]
     pub fn turn(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
         // A part's bytes come one by one. All else is looked at with the next tick, or before the sample

@@ -1,4 +1,4 @@
-//! Makes what the tasks own, where it stays.
+//! Builds the resources of the tasks in their statics.
 #![allow(unsafe_code, reason = "a peripheral that is taken; the block says why it is sound")]
 
 use crate::board::Board;

@@ -14,8 +14,7 @@
 //! | [`Bandwidth::Fortieth`] | 7 | 10.1 | 35.2 | -41.7 | -59.7 |
 //!
 //! Bandwidth and group delay are the data sheet's (tables of 5.5). It gives no attenuation: the
-//! last two columns are those of a Butterworth filter of that order and bandwidth, which the data
-//! sheet's noise bandwidths agree with to 3 % (test `library::icm42688::attenuation_of_what_folds_back`). What would
+//! last two columns are those of a Butterworth filter of that order and bandwidth. What would
 //! fold at 400 Hz meets the anti-alias filter (258 Hz) and the decimation's own (104.8 Hz) before.
 //!
 //! A mean of ten samples at 1 kHz would be late by 4.5 ms only and have its zeros where it folds,

@@ -115,7 +115,7 @@ fn fifo_packet(reading: &Reading) -> Vec<u8> {
     packet.emit().to_vec()
 }
 
-/// The part has no form of a number that is none: it says what is wrong with it.
+/// The part has no code for NaN: it says what is wrong with it.
 fn burst(row: usize, reading: &Reading) -> Burst {
     let mut burst = adis16465::burst(row, &reading.sample);
     let largest = |code: i32| if code < 0 { i16::MIN } else { i16::MAX };
