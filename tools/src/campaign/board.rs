@@ -11,9 +11,11 @@ use crate::drive::wheel_frames;
 use crate::parts::Part;
 use embedded_can::{Frame, Id};
 use gyronet::align::clock_ratio::ClockRatioConfig;
+use gyronet::bias::Latitude;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::coprocessor::{Config, Coprocessor, TimedFrame};
+use gyronet::fog::FogConfig;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::units::{AngularRate, Micros};
@@ -41,6 +43,8 @@ impl Board {
             wheels,
             fog_expected: part == Part::Dsp1760,
             clock_ratio: Some(ClockRatioConfig::DEFAULT),
+            // The drives' increments have no Earth's rate in them.
+            fog: FogConfig { latitude: Latitude::from_degrees(0.0), ..FogConfig::DEFAULT },
             ..Config::DEFAULT
         };
         Self {
