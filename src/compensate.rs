@@ -17,7 +17,7 @@
 //! noise of samples that are over, which the newest sample does not have; carried at once it would be added to it.
 //!
 //! No window of 0.1 s can know a constant error, and one that a network was trained to is wrong on another vehicle.
-//! The mean of the corrections beyond their steady part is taken out of them ([`SlowMean`]): standstill finds the bias.
+//! The mean of the corrections beyond their steady part is taken out of them: standstill finds the bias.
 //!
 //! | when | prompt | navigation |
 //! |---|---|---|
