@@ -208,9 +208,9 @@ impl Compensator {
         self.steady_gain = estimate.steady_gain;
         let used = mode.used();
         let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
-        let window = self.kept.iter().skip(oldest).zip(corrections);
+        let window = self.kept.iter().skip(oldest).zip(corrections).take(used.end).skip(used.start);
         let beyond = window.filter_map(|(entry, c)| Some(i64::from(c.0) - i64::from(entry.as_ref()?.steady)));
-        self.slow_mean.observe(beyond.sum::<i64>() / WINDOW as i64);
+        self.slow_mean.observe(beyond.sum::<i64>() / used.len() as i64, mode.hop());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };

@@ -3,6 +3,7 @@
 
 pub mod board;
 pub mod connected;
+pub mod dead_reckoning;
 pub mod entrance;
 pub mod flash;
 pub mod golden;

@@ -43,7 +43,7 @@ pub struct Lane {
     tilt_rest: i128,
     latitude: Option<Latitude>,
     rest: RestReading,
-    /// What is taken off each step.
+    /// The angle that is taken off each step.
     reading: Angle,
 }
 

@@ -35,7 +35,7 @@ pub struct GyroNetState<
     scratch: Scratch<U, W, { WINDOW / 2 }>,
     /// The recurrent weights of the direction at work, which each step reads.
     recurrent: [u32; R],
-    /// What the linear part makes of the window.
+    /// The outputs of the linear part.
     linear: [i32; WINDOW],
     /// The biases of the gyro error's row, then of the log scale's row.
     sums: [[i32; 2]; WINDOW],

@@ -40,7 +40,7 @@ pub struct NetworkF32<'w> {
 pub struct LayerOutputs {
     /// Features less mean, over standard deviation.
     pub normalised: [[f32; FEATURES]; WINDOW],
-    /// What the linear part gives of the gyro error, rad/s.
+    /// The linear part of the gyro error, rad/s.
     pub linear: [f32; WINDOW],
     /// Hidden states of layer 1, forward then backward.
     pub layer1: [[f32; 2 * HIDDEN]; WINDOW],

@@ -46,7 +46,7 @@ impl Level {
     }
 }
 
-/// The gain and mounting of the unit's gyro, as a drive with a heading reference has shown them (`gyronet calibrate`).
+/// The gain and mounting of the unit's gyro, as a drive with a reference yaw rate has shown them (`gyronet calibrate`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnitMap {
@@ -65,7 +65,7 @@ pub struct Calibration {
     pub temperature_table: Vec<BiasPoint, MAX_POINTS>,
     /// The result of the last mounting calibration.
     pub level: Option<Level>,
-    /// The result of a calibration against a heading reference.
+    /// The result of a calibration against a reference yaw rate.
     pub unit: Option<UnitMap>,
 }
 

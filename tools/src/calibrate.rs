@@ -1,4 +1,4 @@
-//! The calibration of one unit: gain and mounting of its gyro, from drives with a heading reference.
+//! The calibration of one unit: gain and mounting of its gyro, from drives with a reference yaw rate.
 //!
 //! A yaw rate that the coprocessor has corrected still errs by a share of the roll rate and of the pitch rate (the
 //! sensor is not level in the vehicle, or the reference is not) and by a share of itself (gain). Over a second or more

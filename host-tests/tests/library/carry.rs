@@ -68,10 +68,11 @@ impl Ledger {
         let covered = self.samples.range_mut(end + 1 - WINDOW as u32..=end);
         let mut window: Vec<(&mut Sample, i64)> = covered.map(|(_, sample)| sample).zip(estimate).collect();
         assert_eq!(window.len(), WINDOW, "windows cover samples that went out");
-        let beyond: i64 = window.iter().map(|(sample, estimate)| estimate - sample.steady).sum();
+        let used = &window[mode.used()];
+        let beyond: i64 = used.iter().map(|(sample, estimate)| estimate - sample.steady).sum();
         let (constant, windows) = &mut self.constant;
-        *windows = (*windows + 1).min(256);
-        *constant += ((beyond / WINDOW as i64 * 65_536) - *constant) / *windows;
+        *windows = (*windows + 1).min(1_280 / i64::from(mode.hop()));
+        *constant += ((beyond / used.len() as i64 * 65_536) - *constant) / *windows;
         for (sample, estimate) in &mut window[mode.used()] {
             sample.estimates.push(*estimate - (*constant >> 16));
         }

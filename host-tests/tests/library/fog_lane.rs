@@ -25,7 +25,7 @@ struct Gyro {
     rate: f64,
     step: u64,
     standstill: Standstill,
-    /// What FoGNet says of every minute.
+    /// FoGNet's estimate of every minute.
     correction: Angle,
 }
 

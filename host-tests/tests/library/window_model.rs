@@ -61,7 +61,7 @@ fn check<const LEN: usize, const U: usize, const W: usize, const R: usize>(shape
     assert_eq!(different > 0, shape.units > 0, "the linear part alone is exact; the Bi-LSTMs add to it");
 }
 
-/// What the linear part gives, in 128 bits.
+/// Returns the output of the linear part, computed in 128 bits.
 fn exact(blob: &Blob<'_>, window: &[Features; WINDOW]) -> [i32; WINDOW] {
     let mut outputs = [0; WINDOW];
     for (output, row) in outputs.iter_mut().zip(blob.linear.iter().flat_map(|linear| linear.rows())) {

@@ -14,7 +14,7 @@ use std::fmt::Write;
 const ROWS: usize = 13_000;
 /// The gyro's bias, rad/s.
 const BIAS: f64 = 0.002;
-/// What it is off by after 10 s, rad/s.
+/// The gyro's error after 10 s, rad/s.
 const DRIFT: f64 = 0.001;
 
 /// A network that corrects nothing.

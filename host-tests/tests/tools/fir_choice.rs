@@ -12,7 +12,7 @@ const TRIALS: [u32; 5] = [2, 3, 4, 6, 7];
 const HALVES: std::ops::RangeInclusive<usize> = 1..=7;
 /// Corners, Hz.
 const CORNERS: [f64; 9] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0];
-/// What the best one of the grid may be better by: the grid is flat around it.
+/// The largest lead of the best one of the grid: the grid is flat around it.
 const FLAT: f64 = 1.001;
 
 /// A drive's gyro less its static bias, and its reference, rad/s.

@@ -2,25 +2,12 @@
 //! seen and has not: what standstills add to the Earth's rate, and whether the expected errors are as large as the true
 //! ones.
 
-use gyronet::odometry::Track;
-use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
+use gyronet_host_tests::dead_reckoning::error;
 use gyronet_tools::paper::fog_replay::{default_config, run_default};
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set};
 use gyronet_tools::simulate::world::EARTH_RATE;
 use std::path::Path;
-
-/// Root mean square distance from the true path of dead reckoning with these turns, m.
-fn error(sequence: &Sequence, turns: impl Iterator<Item = f64>) -> f64 {
-    let yaw = sequence.steps.first().expect("it has steps").yaw;
-    let mut track = Track { yaw, ..Track::default() };
-    let walked = sequence.steps.iter().zip(turns).map(|(step, turn)| {
-        track.step(step.wheels, turn);
-        track.position
-    });
-    let truth: Vec<_> = sequence.steps.iter().map(|step| step.position).collect();
-    TrajectoryError::new(&walked.collect::<Vec<_>>(), &truth).expect("as many of both").rmse_m
-}
 
 /// The errors of one or more drives.
 #[derive(Default)]

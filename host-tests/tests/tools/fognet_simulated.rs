@@ -4,8 +4,7 @@
 use gyronet::fog::FogConfig;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogBlob, FogNet, weights};
-use gyronet::odometry::Track;
-use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
+use gyronet_host_tests::dead_reckoning::error;
 use gyronet_tools::paper::fog_replay;
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::layout::{self, Layout, Set, Spec};
@@ -20,18 +19,6 @@ fn simulated() -> Sequence {
     let spec = Set::Test.specs(Layout::Kaist).swap_remove(0);
     layout::write(&Spec { seconds: SECONDS, ..spec }, &folder, || {}).expect("there is room");
     Sequence::read(&folder, |_| {}).expect("it has just been written")
-}
-
-/// Root mean square distance from the true path of dead reckoning with these turns, m.
-fn error(sequence: &Sequence, turns: impl Iterator<Item = f64>) -> f64 {
-    let yaw = sequence.steps.first().expect("it has steps").yaw;
-    let mut track = Track { yaw, ..Track::default() };
-    let walked = sequence.steps.iter().zip(turns).map(|(step, turn)| {
-        track.step(step.wheels, turn);
-        track.position
-    });
-    let truth: Vec<_> = sequence.steps.iter().map(|step| step.position).collect();
-    TrajectoryError::new(&walked.collect::<Vec<_>>(), &truth).expect("as many of both").rmse_m
 }
 
 #[test]

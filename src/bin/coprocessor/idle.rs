@@ -1,4 +1,4 @@
-//! The idle task runs the service line and checks the weights again: the service line, and the weights' own checksum.
+//! The idle task runs the service line and checks the weights against their checksum.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::fog_network::{FogNetwork, FogParts};

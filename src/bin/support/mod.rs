@@ -1,4 +1,4 @@
-//! What the self-test and the bench share: reproducible numbers and weights of any size.
+//! The self-test and the bench share this module: reproducible numbers and weights of any size.
 
 mod numbers;
 #[allow(dead_code, reason = "the self-test has no models of its own")]

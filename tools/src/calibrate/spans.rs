@@ -10,7 +10,7 @@ const RATE_SPAN: usize = RATE_HZ as usize;
 /// A piece of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Span {
-    /// What the corrected yaw rate lacks of the true turn, rad.
+    /// The true turn less that of the corrected yaw rate, rad.
     pub error: f64,
     /// The turns about x, y and z by the gyro, rad.
     pub turns: [f64; 3],

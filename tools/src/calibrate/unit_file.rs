@@ -26,7 +26,7 @@ pub struct DriveFit {
     pub name: String,
     /// The gyro's bias about x, y and z at its start, rad/s.
     pub gyro_bias_rad_per_s: [f64; 3],
-    /// What the corrected yaw rate lacks of the reference all the time, rad/s: the bias that is left.
+    /// The mean of the reference less the corrected yaw rate, rad/s: the bias that is left.
     pub yaw_rate_bias_rad_per_s: f64,
     /// The robust standard deviation of the spans' angles behind the fit, rad.
     pub deviation_rad: f64,

@@ -1,4 +1,4 @@
-//! `gyronet calibrate`: gain and mounting of a unit's gyro, from drives with a heading reference.
+//! `gyronet calibrate`: gain and mounting of a unit's gyro, from drives with a reference yaw rate.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};

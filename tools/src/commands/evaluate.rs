@@ -2,11 +2,12 @@
 
 use super::{Common, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
+use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::report::{DriveErrors, Report};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Measure the heading error of every method on recorded drives.
 ///
@@ -37,8 +38,26 @@ pub struct Args {
     /// Print the error of the rate for navigation at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
+    /// Calibration of the unit, from `gyronet calibrate`: every method gets the calibrated gyro. The map
+    /// holds what the weights leave of gain and mounting, so a classical method gets that alone.
+    #[arg(long, value_name = "FILE.json")]
+    calibration: Option<PathBuf>,
     #[command(flatten)]
     networks: weights::Files,
+}
+
+impl Args {
+    /// Reads a drive, calibrated if that is asked for.
+    fn recording(&self, file: &Path) -> Result<Recording, Box<dyn std::error::Error>> {
+        let mut recording = Recording::read(file)?;
+        if let Some(path) = &self.calibration {
+            let map = unit_file::read_for(path, self.networks.weights()?.blob()?.crc)?;
+            for row in &mut recording.rows {
+                row.sample.angular_rate = map.rate(row.sample.angular_rate);
+            }
+        }
+        Ok(recording)
+    }
 }
 
 /// Runs the subcommand.
@@ -51,7 +70,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let mut drives = Vec::new();
     for file in &args.files {
-        let recording = Recording::read(file)?;
+        let recording = args.recording(file)?;
         let rates = args.networks.rates(&recording, common)?;
         drives.push(DriveErrors::new(&recording, &rates)?);
     }
@@ -77,7 +96,7 @@ fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
     for file in &args.files {
-        let recording = Recording::read(file)?;
+        let recording = args.recording(file)?;
         let bar = progress::bar(common, variants.len() * recording.rows.len(), recording.name());
         let scores = ablation::run(&recording, &mut network, variants, || bar.inc(1));
         bar.finish_and_clear();

@@ -1,4 +1,4 @@
-//! What a method costs: its multiplications and its delay, from the structure of each.
+//! The cost of a method is its multiplications and its delay, computed from its structure.
 
 use super::fir::LowPass;
 use super::methods::Method;

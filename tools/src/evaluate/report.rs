@@ -67,7 +67,7 @@ pub struct Row {
     pub cost: Cost,
 }
 
-/// What the columns of [`columns`] say.
+/// The legend of the columns of [`columns`].
 pub const COLUMNS: [&str; 10] = [
     "heading error, rad",
     "in 1 s",

@@ -18,6 +18,8 @@ pub enum What {
     Mounting,
     /// Store the gain and mounting that `gyronet calibrate` found; wants --file.
     Unit,
+    /// Remove the stored gain and mounting.
+    NoUnit,
     /// Print the calibration.
     Show,
     /// Stop without a result.
@@ -40,6 +42,10 @@ pub fn run(
         What::Unit => {
             let path = file.ok_or("give the file of `gyronet calibrate` with --file")?;
             device.ask(&Request::Calibrate(Calibrate::SetUnit(Some(unit_file::read(path)?))))?;
+            None
+        }
+        What::NoUnit => {
+            device.ask(&Request::Calibrate(Calibrate::SetUnit(None)))?;
             None
         }
         What::Cancel => {

@@ -201,10 +201,10 @@ fn rivals(set: &[&SequenceErrors]) -> Table {
     }
 }
 
-/// How our FoGNet departs from the paper's.
+/// The differences of our FoGNet from the paper's.
 const FOGNET_SIGN: &str = "Our FoGNet gives what the gyro has erred by, which is taken off; the paper's gives the prediction less the \
                            measurement, which is added.";
-/// What the weights of the table's FoGNet were trained on.
+/// The training data of the weights of the table's FoGNet.
 const WEIGHTS: &str = "The bundled weights were trained on simulated sequences of KAIST's layout.";
 
 fn pairs<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
