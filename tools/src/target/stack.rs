@@ -11,9 +11,12 @@
 //! The result is an upper bound. It trusts the symbol table: code that no symbol covers, or
 //! addresses computed at run time, would escape it; the images have neither.
 
+mod barrier;
 mod code;
 mod priority;
 mod thumb;
+
+pub use barrier::handlers_without_barrier;
 
 use code::Code;
 use std::collections::{BTreeMap, HashMap};

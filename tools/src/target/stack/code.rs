@@ -1,7 +1,7 @@
 //! The functions of an image: the stack that each needs, and its calls.
 
 use super::priority::{self, Vectors};
-use super::thumb::{self, Effect};
+use super::thumb::{self, Effect, Instruction};
 use super::{MASKED, StackError};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -12,6 +12,8 @@ pub struct Function {
     own: u32,
     calls: BTreeSet<u32>,
     pub indirect: usize,
+    pub size: u32,
+    pub instructions: Vec<Instruction>,
 }
 
 #[derive(Debug, Default)]
@@ -79,27 +81,24 @@ impl Code {
         is_data: impl Fn(u32) -> bool,
         begins: impl Fn(u32) -> Option<u32>,
     ) -> Result<Function, StackError> {
-        let mut function = Function { name: name.to_owned(), own: 0, calls: BTreeSet::new(), indirect: 0 };
-        let end = address + body.len() as u32;
-        let halfword = |at: u32| {
-            let bytes = body.get((at - address) as usize..)?.first_chunk::<2>()?;
-            Some(u16::from_le_bytes(*bytes))
+        let mut function = Function {
+            name: name.to_owned(),
+            own: 0,
+            calls: BTreeSet::new(),
+            indirect: 0,
+            size: body.len() as u32,
+            instructions: thumb::instructions(body, address, is_data),
         };
-        let (mut at, mut low, mut aligned) = (address, [0u32; 16], [0u32; 16]);
+        let end = address + function.size;
+        let (mut low, mut aligned) = ([0u32; 16], [0u32; 16]);
         // A function's address that the instruction before has put together. The linker's way from flash
         // to RAM jumps there at once: a call. Anything else takes the address.
         let mut made: Option<(u8, u32)> = None;
-        while let Some(first) = halfword(at) {
-            if is_data(at) {
-                at += 2;
-                continue;
-            }
-            let second = thumb::is_wide(first).then(|| halfword(at + 2)).flatten();
+        for (at, first, second) in function.instructions.iter().copied() {
             let effect = thumb::effect(first, second, at);
             match (made.take(), effect) {
                 (Some((register, target)), Effect::Indirect { register: to }) if register == to => {
                     function.calls.insert(target);
-                    at += 2;
                     continue;
                 }
                 (Some((_, target)), _) => {
@@ -128,7 +127,6 @@ impl Code {
                     made = target.map(|target| (register, target));
                 }
             }
-            at += if second.is_some() { 4 } else { 2 };
         }
         self.taken.extend(made.map(|(_, target)| target));
         Ok(function)

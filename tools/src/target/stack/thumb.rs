@@ -38,6 +38,28 @@ pub const fn is_wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }
 
+/// An instruction: its address, its first halfword and, where it is wide, its second one.
+pub type Instruction = (u32, u16, Option<u16>);
+
+/// Returns the instructions of a function that begins at an address, without the data between them.
+pub fn instructions(body: &[u8], start: u32, is_data: impl Fn(u32) -> bool) -> Vec<Instruction> {
+    let halfword = |at: u32| {
+        let bytes = body.get((at - start) as usize..)?.first_chunk()?;
+        Some(u16::from_le_bytes(*bytes))
+    };
+    let (mut at, mut instructions) = (start, Vec::new());
+    while let Some(first) = halfword(at) {
+        if is_data(at) {
+            at += 2;
+            continue;
+        }
+        let second = is_wide(first).then(|| halfword(at + 2)).flatten();
+        instructions.push((at, first, second));
+        at += if second.is_some() { 4 } else { 2 };
+    }
+    instructions
+}
+
 /// The effect of the instruction at an address.
 pub fn effect(first: u16, second: Option<u16>, address: u32) -> Effect {
     match second {
