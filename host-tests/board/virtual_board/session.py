@@ -188,6 +188,7 @@ class Session:
             "accesses_left": board.bus.left,
             "powered": board.powered,
             "locked_up": board.locked_up,
+            "can_filtered": board.peripherals["CAN1"].filtered,
         }
 
     def snapshot(self, name: str) -> None:

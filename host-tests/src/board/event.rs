@@ -54,6 +54,8 @@ pub struct Counts {
     pub powered: bool,
     /// True once the core has locked up after a fault in a fault handler.
     pub locked_up: bool,
+    /// Frames of other nodes that the controller's filters have stopped.
+    pub frames_filtered: u64,
     /// Accesses to the flash that [`super::Board::cut_after`] still waits for.
     pub accesses_left: usize,
 }
@@ -66,6 +68,7 @@ impl Counts {
             asleep: super::duration(&answer["asleep_us"]),
             powered: answer["powered"] == true,
             locked_up: answer["locked_up"] == true,
+            frames_filtered: answer["can_filtered"].as_u64().expect("the model counts"),
             accesses_left: answer["accesses_left"].as_u64().expect("the model counts") as usize,
         }
     }

@@ -144,6 +144,8 @@ fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
         board.can_send(&wheel(0xAB));
         board.run(SAMPLE);
     }
+    let stopped = board.counts().frames_filtered;
+    assert!(stopped >= 200, "{stopped} of 220 frames of the neighbour are stopped by the filters");
     let counters = counters(&mut board);
     assert_eq!((counters.lines.frames_lost, counters.lines.unsent), (0, 0));
     let sent = frames(&board.can_frames());
