@@ -14,6 +14,7 @@ use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{image, qemu, replay};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
+use gyronet_tools::target::bench;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -111,6 +112,17 @@ fn frames_of_a_real_drive_equal_the_hosts() {
 fn frames_of_the_simulated_drive_equal_the_hosts() {
     const NAME: &str = "frames_of_the_simulated_drive_equal_the_hosts";
     let Some(elf) = coprocessor(NAME) else { return };
+    compare(NAME, &elf, &[], &replay::simulated_drive(0..SAMPLES).concat());
+}
+
+#[test]
+fn frames_of_the_olimex_board_equal_the_hosts() {
+    const NAME: &str = "frames_of_the_olimex_board_equal_the_hosts";
+    let board = ("olimex-stm32-h405", bench::TARGET);
+    let elf = qemu::available(NAME)
+        .and_then(|()| image::firmware_for(board, NAME, env!("CARGO_TARGET_TMPDIR"), "coprocessor"));
+    let Some(elf) = elf else { return };
+    // QEMU has this machine from version 8 on; the other board has the same part, and QEMU models no pins.
     compare(NAME, &elf, &[], &replay::simulated_drive(0..SAMPLES).concat());
 }
 
