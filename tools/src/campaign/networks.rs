@@ -1,7 +1,7 @@
 //! Both networks of the board, with a memory of their answers to an undamaged drive.
 
-use gyronet::fog::seconds::{Second, SecondsWindow};
 use gyronet::model::fognet::{FogEstimate, FogNetState, MinuteNetwork};
+use gyronet::model::seconds::{Second, SecondsWindow};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, FogBlob, FogNet, GyroNet, SCALE_MIN, WindowNetwork, weights};
 use gyronet::units::{Angle, AngularRate};

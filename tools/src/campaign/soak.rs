@@ -1,5 +1,6 @@
-//! Hours of a simulated drive through all stages, as fast as the host can: bytes of an MTi go in, frames come out as
-//! SLCAN text, and a receiver reads them.
+//! Hours of a simulated drive through the coprocessor, as fast as the host can: bytes of an MTi and of a DSP-1760 and
+//! wheel frames go in, frames come out as SLCAN text, and a receiver reads them. As on the board, the coprocessor is
+//! asked every millisecond whether a sensor is silent.
 //!
 //! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
 //! 32-bit microseconds begin half the drive before their end, packet counters and the counters
@@ -11,6 +12,7 @@ use crate::drive::wheel_frames;
 use crate::simulate::{Config as Simulated, Sample, Simulation};
 use gyronet::can::slcan::emit_stamped;
 use gyronet::coprocessor::{Config, Coprocessor};
+use gyronet::fog::FogCounters;
 use gyronet::health::{Counters, MonitorCounters, Status};
 use gyronet::model::WindowNetwork;
 use gyronet::sample::{PERIOD_US, RATE_HZ, WHEELS};
@@ -25,8 +27,13 @@ use std::fmt;
 const TICKS: u32 = (PERIOD_US / 100) as u32;
 /// Self-test passed, filter valid.
 const GOOD: u32 = 3;
-/// Frames of a sample with the messages of [`Config::DEFAULT`].
+/// Frames of a sample with the messages of [`Config::DEFAULT`], and of a step of the fibre-optic gyro.
 const FRAMES: u64 = 6;
+const FOG_FRAMES: u64 = 3;
+/// Steps of the fibre-optic gyro that the ends of the drive may cost.
+const FOG_ENDS: u64 = 3;
+/// The board looks at its inputs every millisecond.
+const LOOK_US: u64 = 1_000;
 /// Samples until the first one that is corrected, with something to spare.
 const INITIALISED: u32 = 100 * RATE_HZ;
 /// Half a least bit of the angle message, and one of each value that is summed, deg.
@@ -44,6 +51,8 @@ pub struct Soak {
     pub pipeline: Counters,
     /// The sensor monitor's counters.
     pub watch: MonitorCounters,
+    /// The fibre-optic gyro's counters.
+    pub fog: FogCounters,
     /// The receiver's counters.
     pub receiver: Counts,
     /// Samples with each status: initialising, degraded, ready.
@@ -145,9 +154,15 @@ impl Drive {
         let received = self.mti.next_sample().and_then(Result::ok).expect("a message of our own");
         let sent = u64::from(self.starts[0]) * 100 + u64::from(k) * PERIOD_US;
         self.clock_error_us = received.time.0 as i64 - sent as i64;
-        self.gyro(k, sample);
 
-        let now = Micros(u64::from(self.starts[1]) + u64::from(k) * PERIOD_US + 1_000);
+        let now = Micros(u64::from(self.starts[1]) + u64::from(k) * PERIOD_US + LOOK_US);
+        if k > 0 {
+            for look in (now.0 - PERIOD_US + LOOK_US..now.0).step_by(LOOK_US as usize) {
+                let silent = self.coprocessor.poll(Micros(look)).expect("time goes on");
+                assert!(silent.is_none(), "the sensor is not silent");
+            }
+        }
+        self.gyro(k, sample, now);
         let wheels = wheel_frames::frame([Some(3.6 * sample.speed); WHEELS]).expect("four speeds");
         self.coprocessor.can(&wheels, now).expect("a good wheel frame");
         let vehicle = self.coprocessor.imu(received, now).expect("a place on the grid").vehicle;
@@ -177,11 +192,13 @@ impl Drive {
         self.turned += sample.reference[2].abs() / f64::from(RATE_HZ);
     }
 
-    /// The fibre-optic gyro beside it: 100 messages a second with its own 32-bit microseconds.
-    fn gyro(&mut self, k: u32, sample: &Sample) {
+    /// Sends the fibre-optic gyro's message: 100 a second with its own 32-bit microseconds.
+    fn gyro(&mut self, k: u32, sample: &Sample, now: Micros) {
         let time = self.starts[2].wrapping_add(k.wrapping_mul(PERIOD_US as u32));
+        // A gyro flickers; equal increments are those of a stuck one. The mean of three is zero.
+        let flicker = (f64::from(k % 3) - 1.0) * 1e-7;
         let message = Message {
-            rotation: sample.reference.map(|rate| (rate / f64::from(RATE_HZ)) as f32),
+            rotation: sample.reference.map(|rate| (rate / f64::from(RATE_HZ) + flicker) as f32),
             acceleration: [0.0; 3],
             extra: Extra::Timed { time, temperature: 25 },
             validity: Validity::GYRO,
@@ -194,6 +211,7 @@ impl Drive {
                     self.gyro_lost += received.lost;
                     let sent = u64::from(self.starts[2]) + u64::from(k) * PERIOD_US;
                     self.gyro_clock_error_us = received.time.0 as i64 - sent as i64;
+                    self.coprocessor.fog(received, now).expect("in order");
                 }
                 Err(_) => self.gyro_lost += 1,
             }
@@ -208,6 +226,7 @@ impl Drive {
             samples,
             pipeline: *self.coprocessor.pipeline().counters(),
             watch: *self.coprocessor.monitor_counters(),
+            fog: *self.coprocessor.fog_counters(),
             receiver: self.monitor.counts,
             statuses: self.statuses,
             clock_error_us: self.clock_error_us,
@@ -231,6 +250,8 @@ impl Soak {
         let Counters { missing, misplaced, clock_jumps, late, .. } = self.pipeline;
         let Counts { foreign, lost, repeated, out_of_sequence, damaged, unreadable, frames } = self.receiver;
         let MonitorCounters { silences, stuck, .. } = self.watch;
+        let fog_frames = frames.saturating_sub(FRAMES * samples);
+        let fog_steps = samples - FOG_ENDS..=samples;
         let yaw = self.yaw_error_deg.abs() <= YAW_TOLERANCE;
         let memory = self.memory_kib.is_none_or(|[early, late]| late <= early + 64);
         let [init, ..] = self.statuses;
@@ -238,7 +259,12 @@ impl Soak {
             ("samples of the pipeline", u64::from(self.pipeline.samples) == samples),
             ("missing, misplaced or late", [missing, misplaced, clock_jumps, late] == [0; 4]),
             ("silent or stuck", [silences, stuck] == [0; 2]),
-            ("frames at the receiver", frames == FRAMES * samples),
+            ("fibre-optic gyro's samples", u64::from(self.fog.samples) == samples),
+            ("fibre-optic gyro's gaps", (self.fog.gaps, self.fog.misplaced) == (0, 0)),
+            (
+                "frames at the receiver",
+                fog_frames.is_multiple_of(FOG_FRAMES) && fog_steps.contains(&(fog_frames / FOG_FRAMES)),
+            ),
             (
                 "loss at the receiver",
                 [foreign, lost, repeated, out_of_sequence, damaged, unreadable] == [0; 6],
@@ -263,12 +289,14 @@ impl fmt::Display for Soak {
         let Counters { samples, windows, missing, misplaced, clock_jumps, late, .. } = self.pipeline;
         let Counts { frames, lost, repeated, out_of_sequence, damaged, .. } = self.receiver;
         let ([init, degraded, ready], [ticks, board, gyro]) = (self.statuses, self.wraps);
+        let FogCounters { samples: fog, gaps, stuck, .. } = self.fog;
         writeln!(f, "{hours:.2} simulated hours, {:.0} turns of the car", self.turns)?;
         writeln!(
             f,
             "pipeline: {samples} samples, {windows} windows, {missing} missing, {misplaced} misplaced, \
              {clock_jumps} clock jumps, {late} late"
         )?;
+        writeln!(f, "fibre-optic gyro: {fog} samples, {gaps} gaps, {stuck} times stuck")?;
         writeln!(f, "status: {init} initialising, {degraded} degraded, {ready} ready")?;
         writeln!(
             f,

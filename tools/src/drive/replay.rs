@@ -9,9 +9,15 @@ use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::health::{Counters, Status};
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::Standstill;
 use gyronet::units::{AngularRate, Micros, Yaw};
 use std::io::{self, Write};
 use std::ops::Range;
+
+/// The board looks at its inputs every millisecond.
+const LOOK_US: u64 = 1_000;
+/// The part of a gap in which the board's messages of a silent sensor are replayed; beyond it time jumps.
+const SILENCE_US: u64 = 60_000_000;
 
 /// The error of a recording that gives no corrected rate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,6 +48,8 @@ pub struct Step {
     pub row: usize,
     /// The sample's time stamp.
     pub time: Micros,
+    /// Whether the vehicle stands, by its wheels.
+    pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
     /// The navigation rate of this row's sample, which was sent some samples later; `None` before static
@@ -50,7 +58,7 @@ pub struct Step {
     /// Gyro less static bias less the best estimate of the network, known some samples later;
     /// the prompt rate where no such came.
     pub settled: AngularRate,
-    /// The frames that were sent.
+    /// The frames that were sent with this row, and until the next one where the sensor was silent.
     pub frames: Vec<TimedFrame>,
 }
 
@@ -95,6 +103,14 @@ impl Replay {
         for (index, row) in recording.rows.iter().enumerate() {
             tick();
             let time = row.sample.time;
+            if let Some(last) = steps.last_mut() {
+                let until = time.0.min(now.0 + SILENCE_US);
+                for look in (now.0 + LOOK_US..until).step_by(LOOK_US as usize) {
+                    // Time goes on. A silent sensor is reported, and its messages come before this row's.
+                    let _ = coprocessor.poll(Micros(look));
+                    last.frames.extend(std::iter::from_fn(|| coprocessor.next_frame()));
+                }
+            }
             now = now.max(time);
             if let Some(frame) = wheels.as_mut().and_then(|wheels| wheels.next(row)) {
                 // A speed that no frame can hold is not valid, and counted.
@@ -116,7 +132,8 @@ impl Replay {
                 start = Some(steps.len());
             }
             let settled = vehicle.prompt.rate;
-            steps.push(Step { row: index, time, vehicle, navigation: None, settled, frames });
+            let standstill = observation.wheels;
+            steps.push(Step { row: index, time, standstill, vehicle, navigation: None, settled, frames });
             if vehicle.navigation.status != Status::Init
                 && let Some(step) = earlier(&mut steps, vehicle.navigation.tick)
             {
@@ -240,6 +257,21 @@ mod tests {
         let recording = recording(1_000, |_| 0.01, 700);
         let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
         assert_eq!((drive.counters.missing, recording.missing), (1, 1));
+    }
+
+    #[test]
+    fn silence_in_a_gap_is_reported_as_the_board_does() {
+        // Row 700 comes 100 ms late: sets without a rate from 25 ms after the last sample on, one each 10 ms.
+        let mut recording = recording(1_000, |_| 0.01, usize::MAX);
+        for row in &mut recording.rows[700..] {
+            row.sample.time.0 += 90_000;
+        }
+        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
+        let frames = |row: usize| drive.steps[row].frames.len();
+        let set = frames(600);
+        let sets = frames(699) / set;
+        assert!((8..=9).contains(&sets) && frames(699).is_multiple_of(set), "{sets} sets");
+        assert!(drive.steps.iter().enumerate().all(|(row, _)| row == 699 || frames(row) == set));
     }
 
     #[test]

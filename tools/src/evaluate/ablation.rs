@@ -2,8 +2,8 @@
 //! board can run.
 
 use crate::drive::recording::Recording;
-use crate::drive::replay::{Replay, ReplayError};
-use crate::drive::wheel_frames::{self, WheelFrames};
+use crate::drive::replay::{Replay, ReplayError, Step};
+use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::metrics::{WINDOW, YawError};
 use gyronet::compensate::{CompensateConfig, Lag, Mode};
 use gyronet::estimate::YawEstimate;
@@ -164,19 +164,14 @@ pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
     (0..first.len()).map(of).collect()
 }
 
-/// The reference while the wheels stand; `None` without wheels, or where they never do.
+/// Returns the reference while the wheels stand; `None` without wheels, or where they never do.
 #[must_use]
 pub fn floor(recording: &Recording) -> Option<Floor> {
-    let (mut frames, mut receiver) = (WheelFrames::new(recording)?, wheel_frames::receiver());
-    let still = recording.rows.iter().map(|row| {
-        let now = row.sample.time;
-        if let Some(frame) = frames.next(row) {
-            let _ = receiver.decode(&frame, now);
-        }
-        let stands = receiver.poll(now).is_some_and(|wheels| wheels.standstill == Standstill::Still);
-        row.reference.filter(|_| stands)
-    });
-    let still: Vec<Option<f64>> = still.collect();
+    let wheels = Some(WheelFrames::new(recording)?);
+    let drive = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, &mut Uncorrected, || {}).ok()?;
+    let reference =
+        |step: &Step| recording.rows[step.row].reference.filter(|_| step.standstill == Standstill::Still);
+    let still: Vec<Option<f64>> = drive.steps.iter().map(reference).collect();
     let whole =
         still.chunks_exact(WINDOW).filter_map(|second| second.iter().copied().collect::<Option<Vec<_>>>());
     let means: Vec<f64> = whole.map(|second| second.iter().sum::<f64>() / WINDOW as f64).collect();

@@ -1,15 +1,16 @@
-//! A sequence through the lane of a fibre-optic gyro: the turns that the board would send, computed from the gyro's
-//! increments, by default and with FoGNet.
+//! A sequence through the coprocessor: the turns that the board sends by default; and through FoGNet alone, as in the
+//! paper, on the gyro as it is.
 
 use crate::drive::DT;
 use crate::drive::wheel_frames;
 use crate::paper::sequence::{Sequence, Step};
 use crate::simulate::layout::Layout;
 use gyronet::bias::Latitude;
+use gyronet::coprocessor::{Config, Coprocessor};
 use gyronet::estimate::YawEstimate;
-use gyronet::fog::seconds::FogFrame;
-use gyronet::fog::{FogConfig, FogCorrector, FogCounters, FogErrors, FogPipeline};
+use gyronet::fog::{FogConfig, FogCorrector, FogCounters, FogErrors};
 use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::seconds::FogFrame;
 use gyronet::model::window::Features;
 use gyronet::sample::{FogSample, PERIOD_US, RATE_HZ};
 use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
@@ -82,13 +83,16 @@ pub fn default_config(sequence: &Sequence) -> FogConfig {
     FogConfig { errors, latitude, ..FogConfig::DEFAULT }
 }
 
-/// Runs a sequence without FoGNet, wheels by frames as the board receives them; returns what is sent for each step (zero
-/// for the first, of which only the end is heard), and the events.
+/// Runs a sequence through the coprocessor without FoGNet, wheels by frames as the board receives them; returns the rate
+/// that is sent for each step (zero for the first, whose beginning no sample has), and the counters.
 #[must_use]
 pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>, FogCounters) {
-    let mut fog = FogPipeline::new(config, false);
-    fog.configure(config, false);
-    let mut wheels = wheel_frames::receiver();
+    let mut coprocessor = Coprocessor::new(Config {
+        fog: config,
+        wheels: Some(wheel_frames::receiver()),
+        has_fognet: false,
+        ..Config::DEFAULT
+    });
     let mut way = [0.0; 2];
     let mut sent = vec![YawEstimate::default(); sequence.steps.len()];
     for (number, step) in sequence.steps.iter().enumerate() {
@@ -101,21 +105,21 @@ pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>,
             way = [0.0; 2];
             if let Some(frame) = wheel_frames::frame([left, right, left, right]) {
                 // A speed that no frame can carry is not valid, and the wheels fall silent.
-                let _ = wheels.decode(&frame, time);
+                let _ = coprocessor.can(&frame, time);
             }
         }
         let increment = [None, None, Some(angle(step.fog))];
         let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
         // Times are in order.
-        let _ = fog.add(time, sample);
-        let wheels = wheels.poll(time);
-        while let Some(estimate) = fog.next_step(time, None, wheels.as_ref()) {
+        let _ = coprocessor.fog(sample, time);
+        while coprocessor.next_frame().is_some() {
+            let Some(estimate) = coprocessor.fog_estimate() else { continue };
             // Grid step 1 is that of the first row.
             let place = (estimate.tick as usize).checked_sub(1).and_then(|row| sent.get_mut(row));
-            place.into_iter().for_each(|place| *place = estimate);
+            place.into_iter().for_each(|place| *place = *estimate);
         }
     }
-    (sent, *fog.counters())
+    (sent, *coprocessor.fog_counters())
 }
 
 /// The inertial sensor's features of each step, its gyro less its mean over the first 3 s; none
@@ -149,8 +153,8 @@ fn angle(rad: f64) -> Angle {
 mod tests {
     use super::*;
     use crate::simulate::layout::{self, Layout, Spec};
-    use gyronet::fog::seconds::SecondsWindow;
     use gyronet::model::fognet::FogEstimate;
+    use gyronet::model::seconds::SecondsWindow;
 
     /// Says that a constant bias and nothing else is wrong.
     struct Bias;
