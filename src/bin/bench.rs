@@ -34,6 +34,9 @@ mod firmware {
     use crate::support::random_model;
     use core::hint::black_box;
     use cortex_m_semihosting::{debug, hprintln};
+    use embedded_can::{Frame, StandardId};
+    use gyronet::can::DataFrame;
+    use gyronet::can::wheel::{WheelReceiver, WheelSettings};
     use gyronet::model::blob::Shape;
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::window::{FEATURES, Features, WINDOW};
@@ -41,9 +44,9 @@ mod firmware {
     use gyronet::nn::Aligned;
     use gyronet::nn::dense::Dense;
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
-    use gyronet::pipeline::{Pipeline, PipelineConfig};
-    use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
-    use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
+    use gyronet::sample::{ImuSample, PERIOD_US, Validity};
+    use gyronet::units::{AngularRate, Micros, SpecificForce};
+    use gyronet::{Config, Coprocessor};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
     use stm32f4::stm32f405 as _;
@@ -65,7 +68,7 @@ mod firmware {
     fn run(meter: &mut Meter) {
         meter.run("empty", || {});
         gyronet(meter);
-        pipeline(meter);
+        coprocessor(meter);
         kernels(meter);
         crate::parsers::run(meter);
         hprintln!("gyronet/state bytes={}", size_of::<GyroNetState>());
@@ -141,16 +144,22 @@ mod firmware {
         }
     }
 
-    /// Counts what the pipeline adds to the network: five samples with wheels that stand, one of which
-    /// takes an estimate back and hands out the next window.
-    fn pipeline(meter: &mut Meter) {
-        let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+    /// Counts what the coprocessor does beside the network: five samples, each with a frame of wheels that stand and the
+    /// message set that it gives; one of them takes an estimate and hands out the next window.
+    fn coprocessor(meter: &mut Meter) {
+        let Some(coprocessor) = cortex_m::singleton!(: Coprocessor = Coprocessor::START) else { return };
+        let wheels = WheelReceiver::new(WheelSettings::TOYOTA).ok();
+        coprocessor.configure(&Config { wheels, ..Config::DEFAULT });
+        // -67.67 + 0.01 x 6767 km/h.
+        let Some(standing) = StandardId::new(0xAA)
+            .and_then(|id| DataFrame::new(id, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]))
+        else {
+            return;
+        };
         let mut numbers = Numbers::new(3);
         let mut five_samples = |from: u32| {
             for tick in from..from + 5 {
                 let time = Micros(u64::from(tick) * PERIOD_US);
-                let speeds = [Some(WheelSpeed(0)); WHEELS];
-                pipeline.wheels(WheelSample { time, speeds, standstill: Standstill::Still });
                 let sample = ImuSample {
                     time,
                     specific_force: [
@@ -162,21 +171,24 @@ mod firmware {
                     temperature: None,
                     validity: Validity::Good,
                 };
-                if let Ok(output) = black_box(pipeline.correct(black_box(sample)))
-                    && let Some(due) = output.window
-                {
+                let _ = black_box(coprocessor.can(black_box(&standing), time));
+                let _ = black_box(coprocessor.imu(black_box(sample), time));
+                while let Some(sent) = coprocessor.next_frame() {
+                    black_box(sent);
+                }
+                if let Some(due) = coprocessor.window() {
                     let estimate = Estimate {
                         corrections: [AngularRate(1_000); WINDOW],
                         scale: SCALE_MIN,
                         ..Estimate::NONE
                     };
-                    pipeline.deliver(due.end, estimate);
+                    let _ = coprocessor.deliver(due.end, estimate);
                 }
             }
         };
         // Past static initialisation and the first windows.
         (0..80).for_each(|n| five_samples(5 * n));
-        meter.run("pipeline/five_samples", || five_samples(400));
+        meter.run("coprocessor/five_samples", || five_samples(400));
     }
 
     fn kernels(meter: &mut Meter) {
