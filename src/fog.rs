@@ -27,7 +27,6 @@ mod part;
 mod pipeline;
 mod rate;
 mod rest;
-pub mod seconds;
 mod trial;
 
 pub use lane::{Lane, Tilt};
@@ -38,8 +37,10 @@ pub use rest::{RestOutcome, RestReading};
 
 use crate::bias::Latitude;
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
+use crate::model::seconds::{
+    FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow,
+};
 use crate::units::Angle;
-use seconds::{FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow};
 
 /// Frames that a window's correction is spread over.
 const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;

@@ -102,9 +102,8 @@
 //! | `serde` | `Serialize` and `Deserialize` for configuration and counters |
 //! | `defmt` | `defmt::Format` for the public types |
 //!
-//! `stm32f405`,
-//! `netduino-plus-2`, `olimex-stm32-h405` and `rtt` build the images of the repository; a user of the
-//! library needs none of them.
+//! `stm32f405`, `netduino-plus-2`, `olimex-stm32-h405`, `rtt`, `small-core`, `microbit` and `lm3s6965evb` build the
+//! images of the repository; a user of the library needs none of them.
 //!
 //! Unsafe code is denied but for one kernel file for Cortex-M with the DSP extension
 //! (`src/nn/simd`), whose results equal those of portable code to the last bit.

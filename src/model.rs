@@ -16,6 +16,8 @@ pub mod gyronet;
 #[doc(hidden)]
 pub mod gyronet_f32;
 mod input;
+#[doc(hidden)]
+pub mod seconds;
 pub mod weights;
 #[doc(hidden)]
 pub mod window;

@@ -24,8 +24,8 @@ mod firmware {
     use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
     use gyronet::fog::FogCorrector;
-    use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
     use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+    use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
     use gyronet::model::{FogBlob, FogNet, weights};
     use gyronet::units::Angle;
     use panic_semihosting as _;

@@ -19,9 +19,9 @@ mod firmware {
     use core::cell::RefCell;
     use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
-    use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
     use gyronet::model::fognet::{FogNetState, MinuteNetwork};
     use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
     use gyronet::model::window::{FEATURES, Features, WINDOW};
     use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};

@@ -22,7 +22,6 @@
 //! Increments are compared as the gyro sends them, not as they are summed: on the grid one that straddles two
 //! steps is split, and the rounding of that makes sums differ that come from equal increments.
 
-use super::seconds::{FogFrame, SecondsWindow};
 use super::trial::Trial;
 use super::{FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, Lane, RestOutcome};
 use crate::align::clock::ClockError;
@@ -31,6 +30,7 @@ use crate::bias::Latitude;
 use crate::estimate::YawEstimate;
 use crate::health::{Faults, Quality, Source, Status, count};
 use crate::model::fognet::FogEstimate;
+use crate::model::seconds::{FogFrame, SecondsWindow};
 use crate::model::window::Features;
 use crate::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
 use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};

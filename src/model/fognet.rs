@@ -17,7 +17,7 @@
 
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
 use super::input::load_step;
-use crate::fog::seconds::{STEPS, SecondsWindow};
+use crate::model::seconds::{STEPS, SecondsWindow};
 use crate::nn::bilstm::{self, Direction, Layer, Pass, Run};
 use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};

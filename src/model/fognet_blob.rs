@@ -15,7 +15,7 @@
 pub use super::file::{BlobError, FOGNET, Normalisation, Topology};
 
 use super::file::{Header, Reader, check_dense, check_rows, dense_len, header_len, layers_len};
-use crate::fog::seconds::{self, STEPS};
+use crate::model::seconds::{self, STEPS};
 use crate::nn::{bilstm::Layer, dense::Dense};
 use crate::units::Angle;
 
@@ -23,7 +23,7 @@ use crate::units::Angle;
 pub const HIDDEN1: usize = 90;
 /// Units of LSTM2 a direction: "N units".
 pub const HIDDEN2: usize = STEPS;
-/// Features of a step: those of [`crate::fog::seconds`], and the gyro's increment.
+/// Features of a step: those of [`crate::model::seconds`], and the gyro's increment.
 pub const INPUTS: usize = seconds::FEATURES + 1;
 /// Columns of LSTM1's input: the features, and one that is zero to make them even.
 pub const COLUMNS: usize = INPUTS + 1;

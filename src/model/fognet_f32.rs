@@ -2,7 +2,7 @@
 
 use super::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
 use super::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
-use crate::fog::seconds::{STEPS, SecondsWindow};
+use crate::model::seconds::{STEPS, SecondsWindow};
 use crate::nn::reference::{LstmWeights, dense, lstm};
 use crate::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 

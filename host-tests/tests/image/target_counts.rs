@@ -3,8 +3,8 @@
 //! compiler is found (QEMU plugin), else good to six; modelled cycles need the compiler, and a
 //! test without one says that it left them out.
 
-use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::units::Angle;

@@ -1,8 +1,8 @@
 //! FoGNet's corrections on the way out: seconds, padding, the rule and its exact sum.
 
-use gyronet::fog::seconds::{FogFrame, Incomplete, Minute, Padding, STEPS, Second, SecondSums};
 use gyronet::fog::{FogConfig, FogCorrector, FogOutput, IncrementRate, PseudoFog};
 use gyronet::model::fognet::FogEstimate;
+use gyronet::model::seconds::{FogFrame, Incomplete, Minute, Padding, STEPS, Second, SecondSums};
 use gyronet::units::{Angle, AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 

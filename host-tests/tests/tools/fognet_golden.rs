@@ -1,8 +1,8 @@
 //! The f32 FoGNet against PyTorch: the same checkpoint, the same windows, every layer.
 
-use gyronet::fog::seconds::STEPS;
 use gyronet::model::fognet_blob::{HIDDEN2, INPUTS};
 use gyronet::model::fognet_f32::FogLayerOutputs;
+use gyronet::model::seconds::STEPS;
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_tools::network::checkpoint::{Checkpoint, FogNet};

@@ -1,10 +1,10 @@
 //! The integer FoGNet against the f32 one on the golden windows, in the part of the correction that is not
 //! linear in the gyro's turns: the linear one is exact, and so large that it hides the other.
 
-use gyronet::fog::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::fognet_blob::INPUTS;
 use gyronet::model::fognet_f32::FogNetF32;
+use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 use gyronet_host_tests::golden::{Golden, WINDOWS};

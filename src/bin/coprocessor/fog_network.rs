@@ -1,9 +1,9 @@
 //! FoGNet in idle time: a piece of its window with every turn.
 
 use gyronet::coprocessor::Coprocessor;
-use gyronet::fog::seconds::WindowCopy;
 use gyronet::model::FogNet;
 use gyronet::model::fognet::FogEstimate;
+use gyronet::model::seconds::WindowCopy;
 
 /// The network with its working memory.
 pub struct FogParts {

@@ -1,7 +1,7 @@
 //! The error that quantisation adds: the integer network is compared with the f32 network, window by window.
 
-use gyronet::fog::seconds::SecondsWindow;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
+use gyronet::model::seconds::SecondsWindow;
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate, WindowNetwork};
 
