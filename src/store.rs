@@ -2,7 +2,7 @@
 //!
 //! | what | where | written as | after an interrupted write |
 //! |---|---|---|---|
-//! | [`Configuration`], [`Calibration`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
+//! | [`Configuration`], [`WheelSettings`](crate::can::wheel::WheelSettings), [`Calibration`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
 //! | weight files | two 128 KiB sectors, [`slots`] | the slot that is not in use | the slot in use |
 //!
 //! Records are found by key and protected by CRC-32; each carries the version of its layout, and
@@ -18,6 +18,7 @@ pub mod layout;
 mod record;
 #[doc(hidden)]
 pub mod slots;
+mod wheels;
 
 pub use calibration::{BiasPoint, Calibration, Level, UnitMap};
 pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};

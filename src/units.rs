@@ -153,6 +153,7 @@ impl Length {
 
 /// Speed of a wheel over ground, signed 32 bit, LSB 2^-16 m/s, range +-32768 m/s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSpeed(pub i32);
 
@@ -194,6 +195,7 @@ impl Micros {
 
 /// A duration in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Duration(pub u64);
 

@@ -58,6 +58,7 @@ pub enum Fault {
 
 /// One of the profiles with its identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Profile {
     /// Profile 1.
@@ -77,6 +78,17 @@ impl Profile {
         match self {
             Self::P01(_) | Self::P02(_) | Self::P11(_) => 2,
             Self::P05(_) => 3,
+        }
+    }
+
+    /// Returns the bits of the frame that belong to the header: bit `8 * byte + bit` of the frame is that bit here.
+    #[must_use]
+    pub const fn header_mask(&self) -> u64 {
+        match self {
+            Self::P01(P01 { mode: DataIdMode::Nibble, .. })
+            | Self::P11(P11 { mode: P11Mode::Nibble, .. }) => 0xFFFF,
+            Self::P01(_) | Self::P02(_) | Self::P11(_) => 0x0FFF,
+            Self::P05(_) => 0x00FF_FFFF,
         }
     }
 

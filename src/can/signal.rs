@@ -24,6 +24,8 @@ pub struct OutsideFrame {
 
 /// Bits of a frame that are one value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Place", into = "Place"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BitField {
     /// Bits to the right of the value, in the order of the bytes.
@@ -61,6 +63,40 @@ impl BitField {
         Ok(Self { shift, len, order, signed, bytes: end.div_ceil(8) })
     }
 
+    /// Returns the start bit, as a DBC file gives it.
+    #[must_use]
+    pub const fn start(&self) -> u8 {
+        match self.order {
+            ByteOrder::Intel => self.shift,
+            ByteOrder::Motorola => {
+                let before = 64 - self.shift - self.len;
+                before / 8 * 8 + 7 - before % 8
+            }
+        }
+    }
+
+    /// Returns the order of the value's bytes.
+    #[must_use]
+    pub const fn order(&self) -> ByteOrder {
+        self.order
+    }
+
+    /// Returns whether the value has a sign.
+    #[must_use]
+    pub const fn is_signed(&self) -> bool {
+        self.signed
+    }
+
+    /// Returns the bits of the frame that the value takes: bit `8 * byte + bit` of the frame is that bit here.
+    #[must_use]
+    pub const fn mask(&self) -> u64 {
+        let mask = ((1 << self.len) - 1) << self.shift;
+        match self.order {
+            ByteOrder::Intel => mask,
+            ByteOrder::Motorola => u64::swap_bytes(mask),
+        }
+    }
+
     /// Returns the number of bits of the value, 1 to 32.
     #[must_use]
     pub const fn bits(&self) -> u8 {
@@ -90,5 +126,31 @@ impl BitField {
         let raw = i64::from(self.raw(data)?);
         let negative = self.signed && raw >> (self.len - 1) & 1 == 1;
         Some(if negative { raw - (1 << self.len) } else { raw })
+    }
+}
+
+/// A field as it is stored: the numbers of a DBC file, which are checked when they are read.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Place {
+    start: u8,
+    bits: u8,
+    order: ByteOrder,
+    signed: bool,
+}
+
+#[cfg(feature = "serde")]
+impl From<BitField> for Place {
+    fn from(field: BitField) -> Self {
+        Self { start: field.start(), bits: field.len, order: field.order, signed: field.signed }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Place> for BitField {
+    type Error = OutsideFrame;
+
+    fn try_from(Place { start, bits, order, signed }: Place) -> Result<Self, OutsideFrame> {
+        Self::new(start, bits, order, signed)
     }
 }

@@ -16,6 +16,7 @@ use super::message::{
     Request,
 };
 use super::standstill::StandstillGate;
+use crate::can::wheel::WheelSettings;
 use crate::health::{Status, count};
 use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
@@ -48,6 +49,7 @@ pub struct Device<R: NorFlash, W> {
     refused: bool,
     configuration: Configuration,
     configuration_origin: Origin,
+    wheels: WheelSettings,
     calibration: Calibration,
     calibration_origin: Origin,
     calibrator: Option<Calibrator>,
@@ -82,6 +84,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             refused: false,
             configuration: Configuration::DEFAULT,
             configuration_origin: Origin::BuiltIn,
+            wheels: WheelSettings::TOYOTA,
             calibration: Calibration::NONE,
             calibration_origin: Origin::BuiltIn,
             calibrator: None,
@@ -106,6 +109,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[must_use]
     pub fn configuration(&self) -> &Configuration {
         &self.configuration
+    }
+
+    /// Returns the wheel frames that the image receives.
+    #[must_use]
+    pub fn wheels(&self) -> &WheelSettings {
+        &self.wheels
     }
 
     /// Returns the calibration.

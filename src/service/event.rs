@@ -67,6 +67,8 @@ pub enum EventKind {
     Crashed(Crash),
     /// The stored configuration is not used; the defaults are.
     ConfigurationRefused(StoreError),
+    /// The stored wheel settings are not used; the built-in ones are.
+    WheelsRefused(StoreError),
     /// The stored calibration is not used.
     CalibrationRefused(StoreError),
     /// The record of accepted weights is not used.

@@ -83,6 +83,9 @@ impl Display for EventKind {
         match self {
             Self::Started(cause) => write!(f, "started by {cause}"),
             Self::Crashed(crash) => write!(f, "crashed before: {crash}"),
+            Self::WheelsRefused(error) => {
+                write!(f, "wheel settings not used: {error}; the built-in ones are")
+            }
             Self::ConfigurationRefused(error) => {
                 write!(f, "stored configuration refused, defaults used: {error}")
             }

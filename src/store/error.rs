@@ -2,6 +2,7 @@
 
 use crate::can::config::ConfigError;
 use crate::can::latitude::LatitudeConfigError;
+use crate::can::wheel::WheelConfigError;
 use serde::{Deserialize, Serialize};
 
 /// A value of the configuration or calibration that has a range.
@@ -85,6 +86,9 @@ pub enum FieldError {
     /// The place of the latitude on the bus is no configuration.
     #[error("fog_lane.latitude_frame: {0}")]
     Latitude(LatitudeConfigError),
+    /// The wheel frames are no configuration.
+    #[error("wheels: {0}")]
+    Wheels(WheelConfigError),
     /// This firmware image does not drive the part.
     #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,

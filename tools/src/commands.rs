@@ -19,6 +19,7 @@ pub mod size;
 pub mod soak;
 pub mod tables;
 mod weights;
+pub mod wheels;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.

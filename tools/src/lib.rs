@@ -8,7 +8,7 @@
 //! drive <- parts <- campaign -> plot, client, simulate
 //! drive <- calibrate
 //! drive <- evaluate <- paper -> plot, simulate
-//! target -> simulate      network      client
+//! target -> simulate      network      client      wheels
 //! demo -> everything above
 //! ```
 
@@ -26,3 +26,4 @@ pub mod plot;
 mod random;
 pub mod simulate;
 pub mod target;
+pub mod wheels;

@@ -44,7 +44,7 @@ pub fn wheels(mut data: &[u8]) {
     let checksum = match choice % 8 {
         0 => Checksum::J1850 { at: 0 },
         1 => Checksum::Xor { at: 1 },
-        2 => Checksum::Sum { at: 7 },
+        2 => Checksum::Sum { at: 2 },
         3..=6 => Checksum::E2e(PROFILES[usize::from(choice % 8 - 3)]),
         _ => Checksum::None,
     };

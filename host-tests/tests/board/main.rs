@@ -12,3 +12,4 @@ mod power_cut;
 mod service;
 mod stored;
 mod supply;
+mod wheels;

@@ -1,7 +1,11 @@
 //! Records: ranges, versions, damage, and where they lie.
 
+use embedded_can::ExtendedId;
 use embedded_storage::nor_flash::NorFlash;
 use gyronet::can::config::{ConfigError, YawSettings};
+use gyronet::can::e2e::{P02, Profile};
+use gyronet::can::signal::{BitField, ByteOrder};
+use gyronet::can::wheel::{Checksum, WheelConfigError, WheelFrame, WheelSettings, WheelSignal};
 use gyronet::model::blob::CRC;
 use gyronet::sample::RATE_HZ;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
@@ -9,7 +13,7 @@ use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
     Accepted, Calibration, Configuration, Field, FieldError, Level, Mounting, Record, Slot, Store, StoreError,
 };
-use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet::units::{AngularRate, CentiCelsius, Duration, WheelSpeed};
 use gyronet_host_tests::flash::{F405, Region};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;
@@ -26,6 +30,43 @@ fn region(flash: &Flash) -> Region<RECORD_SECTOR> {
 
 fn open(flash: &Flash) -> Store<Region<RECORD_SECTOR>> {
     Store::open(region(flash), 0, false).expect("the flash answers")
+}
+
+/// Four frames with 29 bits of identifier, a protection and the largest numbers each: the longest record.
+fn largest_wheels() -> WheelSettings {
+    let frame = |wheel: usize| {
+        let signal = WheelSignal {
+            wheel,
+            field: BitField::new(39, 32, ByteOrder::Motorola, true).expect("inside a frame"),
+            factor_q16: i32::MIN,
+            offset: WheelSpeed(i32::MIN),
+            invalid: Some(u32::MAX),
+        };
+        Some(WheelFrame {
+            id: ExtendedId::new(0x1FFF_FFF0 + wheel as u32).expect("29 bits").into(),
+            signals: [Some(signal), None, None, None],
+            counter: Some(BitField::new(24, 8, ByteOrder::Intel, false).expect("inside a frame")),
+            checksum: Checksum::E2e(Profile::P02(P02 { data_ids: [0xFF; 16] })),
+        })
+    };
+    let time = Duration(10_000_000);
+    let still_speed = WheelSpeed(i32::MAX);
+    WheelSettings { frames: [0, 1, 2, 3].map(frame), timeout: time, still_speed, still_for: time }
+}
+
+#[test]
+fn wheel_settings_are_kept() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut store = open(&flash);
+    assert_eq!(store.get::<WheelSettings>(), Ok(None));
+    for settings in [WheelSettings::TOYOTA, largest_wheels()] {
+        store.set(&settings).expect("it is stored");
+        assert_eq!(open(&flash).get(), Ok(Some(settings)));
+    }
+    let none = WheelSettings { frames: [None; 4], ..WheelSettings::TOYOTA };
+    let refused = StoreError::Field(FieldError::Wheels(WheelConfigError::Wheels(0)));
+    assert_eq!(store.set(&none), Err(refused));
+    assert_eq!(open(&flash).get(), Ok(Some(largest_wheels())), "the one before stays");
 }
 
 #[test]

@@ -218,6 +218,17 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Checksum(8));
     let twice = WheelSettings { frames: [Some(car()), Some(car()), None, None], ..settings(car()) };
     assert_eq!(WheelReceiver::new(twice).err(), Some(WheelConfigError::DuplicateIdentifier(0xAA)));
+    // The counter and the protection lie over a speed.
+    let counter = Some(intel(8, 4));
+    assert_eq!(refused(WheelFrame { counter, ..car() }), WheelConfigError::Overlap(0xAA));
+    let checksum = Checksum::Xor { at: 7 };
+    assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Overlap(0xAA));
+    let checksum = Checksum::E2e(Profile::P01(P01 { data_id: 1, mode: DataIdMode::Both }));
+    assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Overlap(0xAA));
+    let flat = first.map(|signal| WheelSignal { factor_q16: 0, ..signal });
+    assert_eq!(refused(with([flat, second, None, None])), WheelConfigError::Factor(1));
+    let endless = WheelSettings { still_for: Duration(10_000_001), ..settings(car()) };
+    assert_eq!(WheelReceiver::new(endless).err(), Some(WheelConfigError::Time(10_000_001)));
     for (start, len) in [(0, 0), (0, 33), (64, 1), (63, 2), (255, 1)] {
         let field = BitField::new(start, len, ByteOrder::Intel, false);
         assert_eq!(field, Err(OutsideFrame { start, len }));
@@ -273,6 +284,19 @@ proptest! {
     }
 
     #[test]
+    fn a_field_s_mask_is_the_bits_that_its_value_depends_on(
+        start in 0u8..64, len in 1u8..=32, motorola: bool, signed: bool, data: [u8; 8], bit in 0usize..64
+    ) {
+        let order = if motorola { ByteOrder::Motorola } else { ByteOrder::Intel };
+        let Ok(field) = BitField::new(start, len, order, signed) else { return Ok(()) };
+        let mut changed = data;
+        changed[bit / 8] ^= 1 << (bit % 8);
+        prop_assert_eq!(field.raw(&changed) != field.raw(&data), field.mask() >> bit & 1 == 1);
+        let again = BitField::new(field.start(), field.bits(), field.order(), field.is_signed());
+        prop_assert_eq!(again, Ok(field));
+    }
+
+    #[test]
     fn any_frame_is_taken_without_panic(
         data in proptest::collection::vec(any::<u8>(), 0..=8), now in any::<u64>(), kind in 0..4,
     ) {
@@ -280,7 +304,7 @@ proptest! {
             0 => Checksum::None,
             1 => Checksum::J1850 { at: 7 },
             2 => Checksum::Xor { at: 0 },
-            _ => Checksum::Sum { at: 3 },
+            _ => Checksum::Sum { at: 1 },
         };
         let mut receiver = WheelReceiver::new(settings(two_wheels(checksum))).expect("checked");
         let _ = receiver.decode(&frame(OTHER, &data), Micros(now));

@@ -24,12 +24,9 @@ const DRIVES: SupportedHardware = SupportedHardware {
     fogs: &[FogPart::Dsp1760],
     bits_per_second: &[BITS_PER_SECOND],
 };
-/// The maker whose wheel frames are understood.
-pub const WHEELS: WheelSettings = WheelSettings::TOYOTA;
-
 /// Has CAN receive the frames that the configuration names.
-fn receive(board: &Board, config: &Config) {
-    let wheels = WHEELS.frames.into_iter().flatten().map(|frame| frame.id);
+fn receive(board: &Board, wheels: &WheelSettings, config: &Config) {
+    let wheels = wheels.frames.into_iter().flatten().map(|frame| frame.id);
     let latitude = config.latitude.map(|latitude| latitude.id());
     if let Some(can) = &board.can {
         can.receive_only(wheels.chain(latitude));
@@ -63,7 +60,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
     let fog_network = fog_network();
     let config = Config {
-        wheels: WheelReceiver::new(WHEELS).ok(),
+        wheels: WheelReceiver::new(*device.wheels()).ok(),
         has_gyronet: blob.is_some(),
         has_fognet: fog_network.is_some(),
         clock: if board.emulated { Clock::Sensor } else { Clock::Outside },
@@ -74,7 +71,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
         },
         ..configuration.coprocessor(device.calibration(), weights)
     };
-    receive(board, &config);
+    receive(board, device.wheels(), &config);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
         output: OutputParts { part, bits_per_second },

@@ -42,6 +42,7 @@ pub enum DataIdMode {
 
 /// Profile 1 of one message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P01 {
     /// Identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.

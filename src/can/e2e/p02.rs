@@ -14,6 +14,7 @@ const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS }
 
 /// Profile 2 of one message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P02 {
     /// Identifier for each counter value.

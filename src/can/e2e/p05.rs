@@ -11,6 +11,7 @@ const MAX_LEN: usize = 64;
 
 /// Profile 5 of one message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P05 {
     /// Identifier, known to both sides; it enters the CRC last, low byte first.

@@ -16,6 +16,7 @@ pub enum P11Mode {
 
 /// Profile 11 of one message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P11 {
     /// Identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.

@@ -9,6 +9,7 @@ use embedded_can::{Id, StandardId};
 
 /// One wheel's speed in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSignal {
     /// The wheel: 0 front left, 1 front right, 2 rear left, 3 rear right.
@@ -44,6 +45,7 @@ impl WheelSignal {
 
 /// The protection of a frame of wheel speeds, if it has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Checksum {
     /// The frame is not protected.
@@ -69,8 +71,10 @@ pub enum Checksum {
 
 /// One frame that carries wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelFrame {
     /// Its identifier.
+    #[cfg_attr(feature = "serde", serde(with = "stored_id"))]
     pub id: Id,
     /// The wheels in it.
     pub signals: [Option<WheelSignal>; WHEELS],
@@ -102,6 +106,32 @@ const fn toyota(wheel: usize, start: u8) -> Option<WheelSignal> {
     }
 }
 
+/// Stores an identifier as a number; bit 31 marks one of 29 bits.
+#[cfg(feature = "serde")]
+mod stored_id {
+    use embedded_can::{ExtendedId, Id, StandardId};
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    const EXTENDED: u32 = 1 << 31;
+
+    pub fn serialize<S: Serializer>(id: &Id, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_u32(match id {
+            Id::Standard(id) => id.as_raw().into(),
+            Id::Extended(id) => id.as_raw() | EXTENDED,
+        })
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Id, D::Error> {
+        let raw = u32::deserialize(deserializer)?;
+        let id = if raw & EXTENDED != 0 {
+            ExtendedId::new(raw & !EXTENDED).map(Id::Extended)
+        } else {
+            u16::try_from(raw).ok().and_then(StandardId::new).map(Id::Standard)
+        };
+        id.ok_or_else(|| D::Error::custom("no identifier"))
+    }
+}
+
 /// The reason why a frame gives no wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -128,6 +158,24 @@ pub enum WheelError {
 }
 
 impl WheelFrame {
+    /// Returns whether two of the frame's values have bits in common: its speeds, its counter and its protection.
+    pub(super) fn overlaps(&self) -> bool {
+        let byte = |at: usize| 0xFF << (8 * at.min(7));
+        let protection = match self.checksum {
+            Checksum::None => 0,
+            Checksum::J1850 { at } | Checksum::Xor { at } | Checksum::Sum { at } => byte(at),
+            Checksum::E2e(profile) => profile.header_mask(),
+        };
+        let signals = self.signals.iter().flatten().map(|signal| signal.field.mask());
+        let counter = self.counter.map(|counter| counter.mask());
+        let mut taken = protection;
+        signals.chain(counter).any(|mask| {
+            let overlaps = taken & mask != 0;
+            taken |= mask;
+            overlaps
+        })
+    }
+
     /// Returns the number of values of the frame's counter.
     pub(super) fn counters(&self) -> u16 {
         match (self.checksum, self.counter) {

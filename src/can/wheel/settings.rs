@@ -8,8 +8,12 @@ use embedded_can::Id;
 /// Most frames that wheel speeds may be spread over.
 pub const MAX_FRAMES: usize = WHEELS;
 
+/// The longest time-out and standing time.
+const LONGEST_US: u64 = 10_000_000;
+
 /// Everything that can be set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelSettings {
     /// The frames.
     pub frames: [Option<WheelFrame>; MAX_FRAMES],
@@ -23,6 +27,7 @@ pub struct WheelSettings {
 
 /// The reason why wheel settings are no configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelConfigError {
@@ -41,6 +46,15 @@ pub enum WheelConfigError {
     /// A checksum beyond byte 7.
     #[error("wheel checksum in byte {0}, beyond 7")]
     Checksum(usize),
+    /// Two of a frame's speeds, its counter and its protection have bits in common.
+    #[error("wheel frame {0:x}: two values overlap")]
+    Overlap(u32),
+    /// A factor of zero.
+    #[error("wheel {0}: every code is the same speed")]
+    Factor(usize),
+    /// A time-out or a standing time of zero, or above 10 s.
+    #[error("wheel times: {0} us is not above 0 and at most 10 s")]
+    Time(u64),
 }
 
 impl WheelSettings {
@@ -56,6 +70,11 @@ impl WheelSettings {
 
     /// Returns the wheels that the settings name, each in one signal.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
+        for time in [self.timeout, self.still_for] {
+            if time.0 == 0 || time.0 > LONGEST_US {
+                return Err(WheelConfigError::Time(time.0));
+            }
+        }
         let mut expected = [false; WHEELS];
         let frames = || self.frames.iter().flatten();
         for (k, frame) in frames().enumerate() {
@@ -73,10 +92,16 @@ impl WheelSettings {
                 return Err(WheelConfigError::Checksum(at));
             }
             for signal in frame.signals.iter().flatten() {
+                if signal.factor_q16 == 0 {
+                    return Err(WheelConfigError::Factor(signal.wheel));
+                }
                 match expected.get_mut(signal.wheel) {
                     Some(seen @ false) => *seen = true,
                     _ => return Err(WheelConfigError::Wheel(signal.wheel)),
                 }
+            }
+            if frame.overlaps() {
+                return Err(WheelConfigError::Overlap(raw_id(frame.id)));
             }
         }
         match expected.iter().filter(|seen| **seen).count() {

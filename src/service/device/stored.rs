@@ -1,6 +1,7 @@
 //! Configuration, calibration and the choice of weights are read at the start and stored on request.
 
 use super::{Device, MappedSlots, SupportedHardware};
+use crate::can::wheel::WheelSettings;
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError, UnitMap};
@@ -56,6 +57,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let (configuration, origin) = self.take(found, EventKind::ConfigurationRefused);
         (self.configuration, self.configuration_origin) =
             (configuration.unwrap_or(Configuration::DEFAULT), origin);
+        let (wheels, _) = self.take(store.get(), EventKind::WheelsRefused);
+        self.wheels = wheels.unwrap_or(WheelSettings::TOYOTA);
         let (calibration, origin) = self.take(store.get(), EventKind::CalibrationRefused);
         (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
         let (accepted, _) = self.take(store.get(), EventKind::AcceptedRefused);

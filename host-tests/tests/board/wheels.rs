@@ -1,0 +1,98 @@
+//! Wheel frames of another maker: from a DBC file to the record in the board's flash, and on the bus.
+
+use crate::common::{self, SAMPLE, START, drive, frames};
+use embedded_can::{ExtendedId, Frame, Id};
+use gyronet::can::DataFrame;
+use gyronet::can::yaw::AngleMessage;
+use gyronet::health::Faults;
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::stored::Stored;
+use gyronet_tools::wheels::{WheelFile, from_dbc};
+
+/// Two axles in two frames with 29 bits of identifier, little-endian, m/s.
+const DBC: &str = r#"VERSION ""
+NS_ :
+BS_:
+BU_: ABS
+BO_ 2566844926 AxleFront: 8 ABS
+ SG_ SpeedFrontLeft : 8|13@1+ (0.03125,0) [0|255] "m/s" ABS
+ SG_ SpeedFrontRight : 24|13@1+ (0.03125,0) [0|255] "m/s" ABS
+BO_ 2566845182 AxleRear: 8 ABS
+ SG_ SpeedRearLeft : 8|13@1+ (0.03125,0) [0|255] "m/s" ABS
+ SG_ SpeedRearRight : 24|13@1+ (0.03125,0) [0|255] "m/s" ABS
+"#;
+const FRAMES: [u32; 2] = [2_566_844_926 - (1 << 31), 2_566_845_182 - (1 << 31)];
+/// What the DBC file does not say: a counter in byte 6, and the exclusive or in byte 7.
+const PROTECTION: &str = "checksum = { kind = \"xor\", byte = 7 }\n\
+                          counter = { start_bit = 48, bits = 4, order = \"intel\" }\n";
+
+/// The frame of an axle whose wheels turn at this many thirty-seconds of a metre per second.
+fn axle(id: u32, code: u16, counter: u8) -> DataFrame {
+    let [low, high] = code.to_le_bytes();
+    let mut data = [0, low, high, low, high, 0, counter & 0xF, 0];
+    data[7] = data.iter().fold(0, |sum, byte| sum ^ byte);
+    let id = Id::Extended(ExtendedId::new(id).expect("29 bits"));
+    DataFrame::new(id, &data).expect("eight bytes")
+}
+
+fn settings() -> gyronet::can::wheel::WheelSettings {
+    let signals = ["SpeedFrontLeft", "SpeedFrontRight", "SpeedRearLeft", "SpeedRearRight"].map(Some);
+    let file = from_dbc("other.dbc", DBC, signals).expect("four signals");
+    let text = toml::to_string(&file).expect("it is TOML");
+    let edited = text.replace("[[frame]]\n", &format!("[[frame]]\n{PROTECTION}"));
+    WheelFile::parse("wheels.toml", &edited).and_then(|file| file.settings("wheels.toml")).expect("settings")
+}
+
+/// The angle messages' fault bits.
+fn faults(board: &mut Board) -> Vec<Faults> {
+    let sent = frames(&board.can_frames());
+    let angles = sent.iter().filter_map(|frame| {
+        let is_angle = matches!(frame.id(), Id::Standard(id) if id.as_raw() == 0x1A1);
+        is_angle.then(|| AngleMessage::parse(frame.data()).expect("eight bytes").faults)
+    });
+    angles.collect()
+}
+
+#[test]
+fn another_maker_s_frames_are_understood_without_a_new_image() {
+    let Some(mut board) = common::unpowered("another_maker_s_frames_are_understood_without_a_new_image")
+    else {
+        return;
+    };
+    Stored::default().record(&settings()).lay(&mut board);
+    board.power_on();
+    common::send(&mut board, &drive(200), START);
+    board.run(START);
+    // They stand for a second, then they turn, each frame with its counter.
+    for row in 0..200u16 {
+        let code = if row < 100 { 0 } else { 320 };
+        for id in FRAMES {
+            board.can_send(&axle(id, code, row as u8));
+        }
+        board.run(SAMPLE);
+    }
+    let known = faults(&mut board);
+    let without = known.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
+    let stored = known.iter().filter(|faults| faults.0 & Faults::STORED.0 != 0).count();
+    println!("{} sets, {without} without wheels", known.len());
+    assert!(known.len() >= 190 && without < 3 && stored == 0, "{without}, {stored} of {}", known.len());
+    let counters = common::counters(&mut board);
+    assert_eq!((counters.lines.frames_lost, counters.inputs.wheel_errors), (0, 0));
+
+    // A damaged frame is refused and counted; without good ones the wheels are silent after 100 ms.
+    let now = board.counts().time;
+    common::send(&mut board, &drive(260)[200..], now);
+    for row in 0..30u8 {
+        for id in FRAMES {
+            let good = axle(id, 320, row);
+            let mut data: [u8; 8] = good.data().try_into().expect("eight bytes");
+            data[7] ^= 0x40;
+            board.can_send(&DataFrame::new(good.id(), &data).expect("eight bytes"));
+        }
+        board.run(SAMPLE);
+    }
+    let silent = faults(&mut board);
+    let without = silent.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
+    assert!(without > 10, "{without} of {} sets report the wheels", silent.len());
+    assert_eq!(common::counters(&mut board).inputs.wheel_errors, 60);
+}
