@@ -18,6 +18,8 @@
 //! | `Info` | `Info` | versions, part, reset, clock, what is stored and whether it can be, weights, status |
 //! | `GetConfiguration` | `Configuration` | whole, with its layout version and where it comes from |
 //! | `SetConfiguration` | `Done` | checked, stored whole; holds from the next start on |
+//! | `GetWheels` | `Wheels` | the wheel frames that are received, and where they come from |
+//! | `SetWheels` | `Done` | checked, stored whole; holds from the next start on |
 //! | `GetCalibration` | `Calibration` | what is known, and how a calibration goes |
 //! | `Calibrate` | `Done` | start `Static` or `Mounting` (3 s at rest), `Cancel`, `Store` |
 //! | `Log` | `Log` | events after a number, eight at most; how many were lost |

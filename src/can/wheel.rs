@@ -6,6 +6,8 @@ mod settings;
 mod standstill;
 
 pub use layout::{Checksum, WheelError, WheelFrame, WheelSignal};
+#[cfg(feature = "service")]
+pub(crate) use settings::raw_id;
 pub use settings::{MAX_FRAMES, WheelConfigError, WheelSettings};
 
 use super::e2e::{Sequence, Verdict};
@@ -89,9 +91,10 @@ impl WheelReceiver {
             }
         }
         let mut result = Ok(());
-        for signal in layout.signals.iter().flatten() {
-            let speed = signal.speed(data);
-            self.wheels.set(signal.wheel, speed.ok(), now);
+        for (wheel, signal) in self.settings.signals.iter().enumerate() {
+            let Some(signal) = signal.filter(|signal| usize::from(signal.frame) == index) else { continue };
+            let speed = signal.speed(wheel, data);
+            self.wheels.set(wheel, speed.ok(), now);
             result = result.and(speed.map(drop));
         }
         result

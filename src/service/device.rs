@@ -50,6 +50,7 @@ pub struct Device<R: NorFlash, W> {
     configuration: Configuration,
     configuration_origin: Origin,
     wheels: WheelSettings,
+    wheels_origin: Origin,
     calibration: Calibration,
     calibration_origin: Origin,
     calibrator: Option<Calibrator>,
@@ -85,6 +86,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             configuration: Configuration::DEFAULT,
             configuration_origin: Origin::BuiltIn,
             wheels: WheelSettings::TOYOTA,
+            wheels_origin: Origin::BuiltIn,
             calibration: Calibration::NONE,
             calibration_origin: Origin::BuiltIn,
             calibrator: None,
@@ -197,6 +199,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 origin: self.configuration_origin,
                 configuration: self.configuration,
             },
+            Request::GetWheels => Reply::Wheels { origin: self.wheels_origin, wheels: self.wheels },
             Request::GetCalibration => Reply::Calibration {
                 version: Calibration::VERSION,
                 origin: self.calibration_origin,
@@ -223,6 +226,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Request::SetConfiguration { version, configuration } => {
                 self.set_configuration(*version, configuration)
             }
+            Request::SetWheels(wheels) => self.set_wheels(wheels),
             Request::Calibrate(what) => self.calibrate(*what),
             Request::WeightsBegin { length } => self.weights_begin(*length),
             Request::WeightsBlock { offset, bytes } => self.weights_block(*offset, bytes),
@@ -234,6 +238,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             }
             Request::Info
             | Request::GetConfiguration
+            | Request::GetWheels
             | Request::GetCalibration
             | Request::Log { .. }
             | Request::Counters => Ok(()),

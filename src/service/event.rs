@@ -81,6 +81,8 @@ pub enum EventKind {
     Status(Status),
     /// A configuration was stored.
     ConfigurationStored,
+    /// Wheel settings were stored.
+    WheelsStored,
     /// A calibration was stored.
     CalibrationStored,
     /// A calibration ended; with why it found nothing.

@@ -2,6 +2,7 @@
 
 use super::calibrate::{State, Task};
 use super::event::{CanFault, ClockFault, Crash, LogPage, ResetCause, SensorFault};
+use crate::can::wheel::WheelSettings;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::slots::{SlotError, WeightSource};
@@ -10,7 +11,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// The version of the messages; it is raised when one changes.
-pub const PROTOCOL: u8 = 6;
+pub const PROTOCOL: u8 = 7;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -58,6 +59,10 @@ pub enum Request {
     WeightsActivate,
     /// Reset.
     Restart,
+    /// The wheel frames that the board receives.
+    GetWheels,
+    /// Other wheel frames.
+    SetWheels(WheelSettings),
 }
 
 impl Request {
@@ -66,6 +71,7 @@ impl Request {
     pub const fn interrupts(&self) -> bool {
         match self {
             Self::SetConfiguration { .. }
+            | Self::SetWheels(_)
             | Self::Calibrate(Calibrate::Store | Calibrate::SetUnit(_))
             | Self::WeightsBegin { .. }
             | Self::WeightsBlock { .. }
@@ -73,6 +79,7 @@ impl Request {
             | Self::Restart => true,
             Self::Info
             | Self::GetConfiguration
+            | Self::GetWheels
             | Self::GetCalibration
             | Self::Calibrate(Calibrate::Start(_) | Calibrate::Cancel)
             | Self::Log { .. }
@@ -111,7 +118,7 @@ pub enum Reply {
     Configuration {
         /// The version of its layout.
         version: u8,
-        /// The origin of the rate.
+        /// Where it comes from.
         origin: Origin,
         /// The configuration that the board was started with.
         configuration: Configuration,
@@ -120,7 +127,7 @@ pub enum Reply {
     Calibration {
         /// The version of its layout.
         version: u8,
-        /// The origin of the rate.
+        /// Where it comes from.
         origin: Origin,
         /// The progress of a calibration.
         state: State,
@@ -144,6 +151,13 @@ pub enum Reply {
     Done,
     /// It is not, and nothing has changed.
     Refused(Refusal),
+    /// The answer to `GetWheels`.
+    Wheels {
+        /// The origin of the settings.
+        origin: Origin,
+        /// The settings that the board was started with.
+        wheels: WheelSettings,
+    },
 }
 
 /// The reason why a request is refused.

@@ -95,6 +95,7 @@ impl Display for EventKind {
             Self::NoWeights => f.write_str("no good weights: the network is off"),
             Self::Status(status) => write!(f, "status: {status}"),
             Self::ConfigurationStored => f.write_str("configuration stored"),
+            Self::WheelsStored => f.write_str("wheel settings stored"),
             Self::CalibrationStored => f.write_str("calibration stored"),
             Self::Calibrated(None) => f.write_str("calibration done"),
             Self::Calibrated(Some(fault)) => write!(f, "calibration found nothing: {fault}"),

@@ -136,6 +136,13 @@ impl Configuration {
         self.latitude_deg.and_then(Latitude::from_degrees)
     }
 
+    /// Returns the first of these identifiers that one of the board's own messages has.
+    pub(crate) fn own_identifier(&self, mut ids: impl Iterator<Item = Id>) -> Option<Id> {
+        let can = Config::new(self.can).ok()?;
+        let fog = self.fog_ids.map(|id| StandardId::new(id).map(Id::Standard));
+        ids.find(|id| can.sends(*id) || fog.contains(&Some(*id)))
+    }
+
     fn fog(&self) -> FogConfig {
         FogConfig {
             errors: match self.fog {
@@ -195,12 +202,11 @@ impl Record for Configuration {
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;
         config.check_further(self.fog_ids).map_err(FieldError::Can)?;
-        if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)? {
-            let fog = |id: u16| StandardId::new(id).map(Id::Standard) == Some(receiver.id());
-            if config.sends(receiver.id()) || self.fog_ids.into_iter().any(fog) {
-                let id = self.fog_lane.latitude_frame.map_or(0, |frame| frame.id);
-                return Err(FieldError::Latitude(LatitudeConfigError::Own(id)));
-            }
+        if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)?
+            && self.own_identifier([receiver.id()].into_iter()).is_some()
+        {
+            let id = self.fog_lane.latitude_frame.map_or(0, |frame| frame.id);
+            return Err(FieldError::Latitude(LatitudeConfigError::Own(id)));
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;

@@ -22,17 +22,24 @@ const PROFILES: [Profile; 4] = [
 ];
 
 /// The settings of two signed wheels from byte 3 on, with a counter in byte 7's upper half.
-fn two_wheels(id: Id, checksum: Checksum) -> WheelFrame {
+fn two_wheels(checksum: Checksum) -> WheelSettings {
     let field = |start, len, signed| BitField::new(start, len, ByteOrder::Intel, signed).expect("inside");
-    let signal = |wheel, start| {
+    let signal = |start| {
         let (factor_q16, offset) = (WheelSignal::per_bit_kmh(0.036), WheelSpeed(0));
-        Some(WheelSignal { wheel, field: field(start, 16, true), factor_q16, offset, invalid: Some(0x8000) })
+        Some(WheelSignal {
+            frame: 0,
+            field: field(start, 16, true),
+            factor_q16,
+            offset,
+            invalid: Some(0x8000),
+        })
     };
-    WheelFrame {
-        id,
-        signals: [signal(2, 24), signal(3, 40), None, None],
-        counter: Some(field(60, 4, false)),
-        checksum,
+    WheelSettings {
+        frames: [Some(WheelFrame { id: ID, counter: Some(field(60, 4, false)), checksum }), None, None, None],
+        signals: [None, None, signal(24), signal(40)],
+        timeout: Duration(50_000),
+        still_speed: WheelSpeed(655),
+        still_for: Duration(200_000),
     }
 }
 
@@ -48,14 +55,7 @@ pub fn wheels(mut data: &[u8]) {
         3..=6 => Checksum::E2e(PROFILES[usize::from(choice % 8 - 3)]),
         _ => Checksum::None,
     };
-    let own = two_wheels(ID, checksum);
-    let settings = WheelSettings {
-        frames: [Some(own), None, None, None],
-        timeout: Duration(50_000),
-        still_speed: WheelSpeed(655),
-        still_for: Duration(200_000),
-    };
-    let settings = if choice & 0x80 == 0 { settings } else { WheelSettings::TOYOTA };
+    let settings = if choice & 0x80 == 0 { two_wheels(checksum) } else { WheelSettings::TOYOTA };
     let mut receiver = WheelReceiver::new(settings).expect("settings of ours");
     let mut now = 0;
     while !data.is_empty() {

@@ -1,12 +1,13 @@
 //! Wheel frames of another maker: from a DBC file to the record in the board's flash, and on the bus.
 
 use crate::common::{self, SAMPLE, START, drive, frames};
+use crate::service::ask;
 use embedded_can::{ExtendedId, Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::yaw::AngleMessage;
 use gyronet::health::Faults;
+use gyronet::service::{Reply, Request};
 use gyronet_host_tests::board::Board;
-use gyronet_host_tests::stored::Stored;
 use gyronet_tools::wheels::{WheelFile, from_dbc};
 
 /// Two axles in two frames with 29 bits of identifier, little-endian, m/s.
@@ -55,14 +56,14 @@ fn faults(board: &mut Board) -> Vec<Faults> {
 
 #[test]
 fn another_maker_s_frames_are_understood_without_a_new_image() {
-    let Some(mut board) = common::unpowered("another_maker_s_frames_are_understood_without_a_new_image")
-    else {
-        return;
-    };
-    Stored::default().record(&settings()).lay(&mut board);
-    board.power_on();
-    common::send(&mut board, &drive(200), START);
+    const TEST: &str = "another_maker_s_frames_are_understood_without_a_new_image";
+    let Some(mut board) = common::boot(TEST) else { return };
     board.run(START);
+    assert_eq!(ask(&mut board, &Request::SetWheels(settings())), Ok(Reply::Done));
+    assert_eq!(ask(&mut board, &Request::Restart), Ok(Reply::Done));
+    board.run(START);
+    let now = board.counts().time;
+    common::send(&mut board, &drive(200), now);
     // They stand for a second, then they turn, each frame with its counter.
     for row in 0..200u16 {
         let code = if row < 100 { 0 } else { 320 };

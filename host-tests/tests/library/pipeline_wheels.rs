@@ -20,16 +20,12 @@ fn receiver() -> WheelReceiver {
     let signal = |wheel: u8| {
         let field = BitField::new(16 * wheel, 16, ByteOrder::Intel, false).expect("inside the frame");
         let factor_q16 = WheelSignal::per_bit_kmh(0.01);
-        Some(WheelSignal { wheel: wheel.into(), field, factor_q16, offset: WheelSpeed(0), invalid: None })
+        Some(WheelSignal { frame: 0, field, factor_q16, offset: WheelSpeed(0), invalid: None })
     };
-    let frame = WheelFrame {
-        id: ID.into(),
-        signals: [signal(0), signal(1), None, None],
-        counter: None,
-        checksum: Checksum::None,
-    };
+    let frame = WheelFrame { id: ID.into(), counter: None, checksum: Checksum::None };
     WheelReceiver::new(WheelSettings {
         frames: [Some(frame), None, None, None],
+        signals: [signal(0), signal(1), None, None],
         timeout: Duration(TIMEOUT),
         still_speed: WheelSpeed(0),
         still_for: Duration(500_000),

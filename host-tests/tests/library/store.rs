@@ -34,24 +34,30 @@ fn open(flash: &Flash) -> Store<Region<RECORD_SECTOR>> {
 
 /// Four frames with 29 bits of identifier, a protection and the largest numbers each: the longest record.
 fn largest_wheels() -> WheelSettings {
-    let frame = |wheel: usize| {
-        let signal = WheelSignal {
-            wheel,
-            field: BitField::new(39, 32, ByteOrder::Motorola, true).expect("inside a frame"),
-            factor_q16: i32::MIN,
-            offset: WheelSpeed(i32::MIN),
-            invalid: Some(u32::MAX),
-        };
+    let frame = |number: u8| {
         Some(WheelFrame {
-            id: ExtendedId::new(0x1FFF_FFF0 + wheel as u32).expect("29 bits").into(),
-            signals: [Some(signal), None, None, None],
+            id: ExtendedId::new(0x1FFF_FFF0 + u32::from(number)).expect("29 bits").into(),
             counter: Some(BitField::new(24, 8, ByteOrder::Intel, false).expect("inside a frame")),
             checksum: Checksum::E2e(Profile::P02(P02 { data_ids: [0xFF; 16] })),
         })
     };
-    let time = Duration(10_000_000);
-    let still_speed = WheelSpeed(i32::MAX);
-    WheelSettings { frames: [0, 1, 2, 3].map(frame), timeout: time, still_speed, still_for: time }
+    let signal = |frame: u8| {
+        Some(WheelSignal {
+            frame,
+            field: BitField::new(39, 32, ByteOrder::Motorola, true).expect("inside a frame"),
+            factor_q16: i32::MIN,
+            offset: WheelSpeed(i32::MIN),
+            invalid: Some(u32::MAX),
+        })
+    };
+    let (longest, still_speed) = (Duration(10_000_000), WheelSpeed(i32::MAX));
+    WheelSettings {
+        frames: [0, 1, 2, 3].map(frame),
+        signals: [0, 1, 2, 3].map(signal),
+        timeout: longest,
+        still_speed,
+        still_for: longest,
+    }
 }
 
 #[test]
@@ -63,7 +69,7 @@ fn wheel_settings_are_kept() {
         store.set(&settings).expect("it is stored");
         assert_eq!(open(&flash).get(), Ok(Some(settings)));
     }
-    let none = WheelSettings { frames: [None; 4], ..WheelSettings::TOYOTA };
+    let none = WheelSettings { signals: [None; 4], ..WheelSettings::TOYOTA };
     let refused = StoreError::Field(FieldError::Wheels(WheelConfigError::Wheels(0)));
     assert_eq!(store.set(&none), Err(refused));
     assert_eq!(open(&flash).get(), Ok(Some(largest_wheels())), "the one before stays");

@@ -25,27 +25,24 @@ fn car() -> WheelFrame {
 }
 
 /// Two wheels, little-endian, signed, a counter in byte 6, byte 7 left for a checksum.
-fn two_wheels(checksum: Checksum) -> WheelFrame {
-    let signal = |wheel, start| {
+fn two_wheels(checksum: Checksum) -> WheelSettings {
+    let signal = |start| {
         Some(WheelSignal {
-            wheel,
+            frame: 0,
             field: BitField::new(start, 16, ByteOrder::Intel, true).expect("inside a frame"),
             factor_q16: WheelSignal::per_bit_kmh(0.036),
             offset: WheelSpeed(0),
             invalid: None,
         })
     };
-    WheelFrame {
-        id: OTHER,
-        signals: [signal(2, 16), signal(3, 32), None, None],
-        counter: Some(intel(48, 4)),
-        checksum,
-    }
+    let frame = WheelFrame { id: OTHER, counter: Some(intel(48, 4)), checksum };
+    WheelSettings { signals: [None, None, signal(16), signal(32)], ..settings(frame) }
 }
 
 fn settings(frame: WheelFrame) -> WheelSettings {
     WheelSettings {
         frames: [Some(frame), None, None, None],
+        signals: WheelSettings::TOYOTA.signals,
         timeout: Duration(50 * MS),
         still_speed: WheelSpeed(655),
         still_for: Duration(200 * MS),
@@ -131,11 +128,15 @@ fn one_wheel_that_is_not_valid_ends_standing() {
 
 #[test]
 fn wheels_may_be_spread_over_frames() {
-    let [front_right, front_left, rear_right, rear_left] = car().signals;
     let id = |raw| Id::Standard(StandardId::new(raw).expect("11 bits"));
-    let front = WheelFrame { id: id(0x100), signals: [front_right, front_left, None, None], ..car() };
-    let rear = WheelFrame { id: id(0x101), signals: [None, None, rear_right, rear_left], ..car() };
-    let spread = WheelSettings { frames: [Some(front), None, Some(rear), None], ..settings(car()) };
+    let frame_of = |raw| Some(WheelFrame { id: id(raw), ..car() });
+    let [front_left, front_right, rear_left, rear_right] = settings(car()).signals;
+    let behind = |signal: Option<WheelSignal>| signal.map(|signal| WheelSignal { frame: 2, ..signal });
+    let spread = WheelSettings {
+        frames: [frame_of(0x100), None, frame_of(0x101), None],
+        signals: [front_left, front_right, behind(rear_left), behind(rear_right)],
+        ..settings(car())
+    };
     let mut receiver = WheelReceiver::new(spread).expect("checked");
     let still = at_kmh(0.0);
     for k in 0..20 {
@@ -164,7 +165,7 @@ fn wrong_checksums_and_counters_are_refused() {
         (Checksum::Sum { at: 7 }, sum),
     ];
     for (checksum, compute) in kinds {
-        let mut receiver = WheelReceiver::new(settings(two_wheels(checksum))).expect("checked");
+        let mut receiver = WheelReceiver::new(two_wheels(checksum)).expect("checked");
         let mut send = |counter: u8, damage: u8| {
             // -100 and 300 bits of 0.01 m/s.
             let mut data = [0x55, 0xAA, 0x9C, 0xFF, 0x2C, 0x01, counter, 0];
@@ -189,8 +190,9 @@ fn wrong_checksums_and_counters_are_refused() {
 #[test]
 fn e2e_protected_frames_are_checked() {
     let profile = Profile::P01(P01 { data_id: 0x321, mode: DataIdMode::Nibble });
-    let layout = WheelFrame { counter: None, ..two_wheels(Checksum::E2e(profile)) };
-    let mut receiver = WheelReceiver::new(settings(layout)).expect("checked");
+    let two_wheels = two_wheels(Checksum::E2e(profile));
+    let frames = two_wheels.frames.map(|frame| frame.map(|frame| WheelFrame { counter: None, ..frame }));
+    let mut receiver = WheelReceiver::new(WheelSettings { frames, ..two_wheels }).expect("checked");
     let mut data = [0; 8];
     profile.protect(&mut data, 3).expect("eight bytes");
     assert!(receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame").is_ok());
@@ -204,14 +206,17 @@ fn e2e_protected_frames_are_checked() {
 #[test]
 fn settings_that_cannot_be_are_refused() {
     let refused = |frame| WheelReceiver::new(settings(frame)).expect_err("refused");
-    let [first, second, third, _] = car().signals;
-    let with = |signals| WheelFrame { signals, ..car() };
-    assert_eq!(refused(with([first, None, None, None])), WheelConfigError::Wheels(1));
-    assert_eq!(refused(with([first, second, third, None])), WheelConfigError::Wheels(3));
-    assert_eq!(refused(with([None; 4])), WheelConfigError::Wheels(0));
-    assert_eq!(refused(with([first, first, None, None])), WheelConfigError::Wheel(1));
-    let fifth = first.map(|signal| WheelSignal { wheel: 4, ..signal });
-    assert_eq!(refused(with([fifth, None, None, None])), WheelConfigError::Wheel(4));
+    let [first, second, third, _] = settings(car()).signals;
+    let with =
+        |signals| WheelReceiver::new(WheelSettings { signals, ..settings(car()) }).expect_err("refused");
+    assert_eq!(with([first, None, None, None]), WheelConfigError::Wheels(1));
+    assert_eq!(with([first, second, third, None]), WheelConfigError::Wheels(3));
+    assert_eq!(with([None; 4]), WheelConfigError::Wheels(0));
+    assert_eq!(with([first, first, None, None]), WheelConfigError::Overlap(0xAA));
+    for frame in [1, 4] {
+        let elsewhere = second.map(|signal| WheelSignal { frame, ..signal });
+        assert_eq!(with([first, elsewhere, None, None]), WheelConfigError::Wheel(1));
+    }
     let counter = Some(intel(0, 9));
     assert_eq!(refused(WheelFrame { counter, ..car() }), WheelConfigError::Counter(9));
     let checksum = Checksum::Sum { at: 8 };
@@ -226,7 +231,7 @@ fn settings_that_cannot_be_are_refused() {
     let checksum = Checksum::E2e(Profile::P01(P01 { data_id: 1, mode: DataIdMode::Both }));
     assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Overlap(0xAA));
     let flat = first.map(|signal| WheelSignal { factor_q16: 0, ..signal });
-    assert_eq!(refused(with([flat, second, None, None])), WheelConfigError::Factor(1));
+    assert_eq!(with([flat, second, None, None]), WheelConfigError::Factor(0));
     let endless = WheelSettings { still_for: Duration(10_000_001), ..settings(car()) };
     assert_eq!(WheelReceiver::new(endless).err(), Some(WheelConfigError::Time(10_000_001)));
     for (start, len) in [(0, 0), (0, 33), (64, 1), (63, 2), (255, 1)] {
@@ -306,7 +311,7 @@ proptest! {
             2 => Checksum::Xor { at: 0 },
             _ => Checksum::Sum { at: 1 },
         };
-        let mut receiver = WheelReceiver::new(settings(two_wheels(checksum))).expect("checked");
+        let mut receiver = WheelReceiver::new(two_wheels(checksum)).expect("checked");
         let _ = receiver.decode(&frame(OTHER, &data), Micros(now));
         let _ = receiver.poll(Micros(now.wrapping_mul(3)));
     }

@@ -2,18 +2,17 @@
 
 use crate::can::bosch;
 use crate::can::e2e::{Fault, Profile};
-use crate::can::signal::{BitField, ByteOrder};
-use crate::sample::WHEELS;
+use crate::can::signal::BitField;
 use crate::units::WheelSpeed;
-use embedded_can::{Id, StandardId};
+use embedded_can::Id;
 
 /// One wheel's speed in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSignal {
-    /// The wheel: 0 front left, 1 front right, 2 rear left, 3 rear right.
-    pub wheel: usize,
+    /// The frame that carries it: its place in [`WheelSettings::frames`](super::WheelSettings::frames).
+    pub frame: u8,
     /// The place of its bits.
     pub field: BitField,
     /// Speed codes (2^-16 m/s) for one bit, times 2^16: see [`WheelSignal::per_bit_kmh`].
@@ -31,15 +30,15 @@ impl WheelSignal {
         (factor / 3.6 * 4_294_967_296.0) as i32
     }
 
-    pub(super) fn speed(&self, data: &[u8]) -> Result<WheelSpeed, WheelError> {
+    pub(super) fn speed(&self, wheel: usize, data: &[u8]) -> Result<WheelSpeed, WheelError> {
         let short = WheelError::Short(data.len());
         if self.invalid.is_some() && self.field.raw(data) == self.invalid {
-            return Err(WheelError::Invalid { wheel: self.wheel });
+            return Err(WheelError::Invalid { wheel });
         }
         let value = self.field.value(data).ok_or(short)?;
         // 2^32 x 2^31 at most, and the offset.
         let code = ((value * i64::from(self.factor_q16)) >> 16) + i64::from(self.offset.0);
-        i32::try_from(code).map(WheelSpeed).map_err(|_| WheelError::Invalid { wheel: self.wheel })
+        i32::try_from(code).map(WheelSpeed).map_err(|_| WheelError::Invalid { wheel })
     }
 }
 
@@ -76,34 +75,10 @@ pub struct WheelFrame {
     /// Its identifier.
     #[cfg_attr(feature = "serde", serde(with = "stored_id"))]
     pub id: Id,
-    /// The wheels in it.
-    pub signals: [Option<WheelSignal>; WHEELS],
     /// A message counter of up to 8 bits, cycling through all values.
     pub counter: Option<BitField>,
     /// Its protection.
     pub checksum: Checksum,
-}
-
-impl WheelFrame {
-    pub(super) const TOYOTA: Self = Self {
-        id: Id::Standard(StandardId::new(0xAA).unwrap()),
-        signals: [toyota(1, 7), toyota(0, 23), toyota(3, 39), toyota(2, 55)],
-        counter: None,
-        checksum: Checksum::None,
-    };
-}
-
-const fn toyota(wheel: usize, start: u8) -> Option<WheelSignal> {
-    match BitField::new(start, 16, ByteOrder::Motorola, false) {
-        Ok(field) => Some(WheelSignal {
-            wheel,
-            field,
-            factor_q16: WheelSignal::per_bit_kmh(0.01),
-            offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
-            invalid: Some(0xFFFF),
-        }),
-        Err(_) => None,
-    }
 }
 
 /// Stores an identifier as a number; bit 31 marks one of 29 bits.
@@ -158,22 +133,14 @@ pub enum WheelError {
 }
 
 impl WheelFrame {
-    /// Returns whether two of the frame's values have bits in common: its speeds, its counter and its protection.
-    pub(super) fn overlaps(&self) -> bool {
-        let byte = |at: usize| 0xFF << (8 * at.min(7));
-        let protection = match self.checksum {
+    /// Returns the bits of the frame that its protection takes.
+    pub(super) fn protected_mask(&self) -> u64 {
+        match self.checksum {
             Checksum::None => 0,
-            Checksum::J1850 { at } | Checksum::Xor { at } | Checksum::Sum { at } => byte(at),
+            // At most 7: checked with the settings.
+            Checksum::J1850 { at } | Checksum::Xor { at } | Checksum::Sum { at } => 0xFF << (8 * at.min(7)),
             Checksum::E2e(profile) => profile.header_mask(),
-        };
-        let signals = self.signals.iter().flatten().map(|signal| signal.field.mask());
-        let counter = self.counter.map(|counter| counter.mask());
-        let mut taken = protection;
-        signals.chain(counter).any(|mask| {
-            let overlaps = taken & mask != 0;
-            taken |= mask;
-            overlaps
-        })
+        }
     }
 
     /// Returns the number of values of the frame's counter.

@@ -1,9 +1,10 @@
 //! The settings name the frames that carry the wheel speeds.
 
-use super::layout::{Checksum, WheelFrame};
+use super::layout::{Checksum, WheelFrame, WheelSignal};
+use crate::can::signal::{BitField, ByteOrder};
 use crate::sample::WHEELS;
 use crate::units::{Duration, WheelSpeed};
-use embedded_can::Id;
+use embedded_can::{Id, StandardId};
 
 /// Most frames that wheel speeds may be spread over.
 pub const MAX_FRAMES: usize = WHEELS;
@@ -17,6 +18,8 @@ const LONGEST_US: u64 = 10_000_000;
 pub struct WheelSettings {
     /// The frames.
     pub frames: [Option<WheelFrame>; MAX_FRAMES],
+    /// The signal of each wheel: front left, front right, rear left, rear right.
+    pub signals: [Option<WheelSignal>; WHEELS],
     /// A speed that is older says nothing.
     pub timeout: Duration,
     /// Up to this speed a wheel may stand still.
@@ -34,8 +37,8 @@ pub enum WheelConfigError {
     /// There are not two or four wheels.
     #[error("{0} wheels instead of two or four")]
     Wheels(usize),
-    /// A wheel that does not exist, or is in two signals.
-    #[error("wheel {0} does not exist or is there twice")]
+    /// The signal of a wheel is in a frame that is not there.
+    #[error("wheel {0} is in a frame that is not there")]
     Wheel(usize),
     /// Two frames under one identifier.
     #[error("wheel frame {0:x} is there twice")]
@@ -49,6 +52,9 @@ pub enum WheelConfigError {
     /// Two of a frame's speeds, its counter and its protection have bits in common.
     #[error("wheel frame {0:x}: two values overlap")]
     Overlap(u32),
+    /// One of the board's own messages has the identifier.
+    #[error("wheel frame {0:x} is one of our own messages")]
+    Own(u32),
     /// A factor of zero.
     #[error("wheel {0}: every code is the same speed")]
     Factor(usize),
@@ -62,20 +68,20 @@ impl WheelSettings {
     /// values of 0.01 km/h from -67.67, front right, front left, rear right, rear left (opendbc,
     /// `WHEEL_SPEEDS`). Still below 0.1 km/h for half a second, silent after 0.1 s.
     pub const TOYOTA: Self = Self {
-        frames: [Some(WheelFrame::TOYOTA), None, None, None],
+        frames: [Some(TOYOTA), None, None, None],
+        signals: [toyota(23), toyota(7), toyota(55), toyota(39)],
         timeout: Duration::from_millis(100),
         still_speed: WheelSpeed(1_820),
         still_for: Duration::from_millis(500),
     };
 
-    /// Returns the wheels that the settings name, each in one signal.
+    /// Checks the settings, and returns the wheels that they name.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
         for time in [self.timeout, self.still_for] {
             if time.0 == 0 || time.0 > LONGEST_US {
                 return Err(WheelConfigError::Time(time.0));
             }
         }
-        let mut expected = [false; WHEELS];
         let frames = || self.frames.iter().flatten();
         for (k, frame) in frames().enumerate() {
             if frames().take(k).any(|earlier| earlier.id == frame.id) {
@@ -91,27 +97,58 @@ impl WheelSettings {
             {
                 return Err(WheelConfigError::Checksum(at));
             }
-            for signal in frame.signals.iter().flatten() {
-                if signal.factor_q16 == 0 {
-                    return Err(WheelConfigError::Factor(signal.wheel));
-                }
-                match expected.get_mut(signal.wheel) {
-                    Some(seen @ false) => *seen = true,
-                    _ => return Err(WheelConfigError::Wheel(signal.wheel)),
-                }
-            }
-            if frame.overlaps() {
-                return Err(WheelConfigError::Overlap(raw_id(frame.id)));
+        }
+        let mut taken = self.frames.map(|frame| frame.map_or(0, |frame| frame.protected_mask()));
+        let counters = self.frames.iter().map(|frame| frame.and_then(|frame| frame.counter));
+        for ((taken, frame), counter) in taken.iter_mut().zip(&self.frames).zip(counters) {
+            take(taken, counter.map_or(0, |counter| counter.mask()), *frame)?;
+        }
+        for (wheel, signal) in self.signals.iter().enumerate() {
+            let Some(signal) = signal else { continue };
+            let place = usize::from(signal.frame);
+            let (Some(frame @ Some(_)), Some(taken)) = (self.frames.get(place), taken.get_mut(place)) else {
+                return Err(WheelConfigError::Wheel(wheel));
+            };
+            take(taken, signal.field.mask(), *frame)?;
+            if signal.factor_q16 == 0 {
+                return Err(WheelConfigError::Factor(wheel));
             }
         }
-        match expected.iter().filter(|seen| **seen).count() {
-            2 | 4 => Ok(expected),
+        match self.signals.iter().flatten().count() {
+            2 | 4 => Ok(self.signals.map(|signal| signal.is_some())),
             count => Err(WheelConfigError::Wheels(count)),
         }
     }
 }
 
-fn raw_id(id: Id) -> u32 {
+/// Takes bits of a frame for a value.
+fn take(taken: &mut u64, mask: u64, frame: Option<WheelFrame>) -> Result<(), WheelConfigError> {
+    if *taken & mask != 0 {
+        return Err(WheelConfigError::Overlap(frame.map_or(0, |frame| raw_id(frame.id))));
+    }
+    *taken |= mask;
+    Ok(())
+}
+
+const TOYOTA: WheelFrame =
+    WheelFrame { id: Id::Standard(StandardId::new(0xAA).unwrap()), counter: None, checksum: Checksum::None };
+
+const fn toyota(start: u8) -> Option<WheelSignal> {
+    match BitField::new(start, 16, ByteOrder::Motorola, false) {
+        Ok(field) => Some(WheelSignal {
+            frame: 0,
+            field,
+            factor_q16: WheelSignal::per_bit_kmh(0.01),
+            offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
+            invalid: Some(0xFFFF),
+        }),
+        Err(_) => None,
+    }
+}
+
+/// Returns an identifier as a number.
+#[must_use]
+pub(crate) fn raw_id(id: Id) -> u32 {
     match id {
         Id::Standard(id) => id.as_raw().into(),
         Id::Extended(id) => id.as_raw(),

@@ -1,7 +1,7 @@
 //! Configuration, calibration and the choice of weights are read at the start and stored on request.
 
 use super::{Device, MappedSlots, SupportedHardware};
-use crate::can::wheel::WheelSettings;
+use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError, UnitMap};
@@ -57,8 +57,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let (configuration, origin) = self.take(found, EventKind::ConfigurationRefused);
         (self.configuration, self.configuration_origin) =
             (configuration.unwrap_or(Configuration::DEFAULT), origin);
-        let (wheels, _) = self.take(store.get(), EventKind::WheelsRefused);
-        self.wheels = wheels.unwrap_or(WheelSettings::TOYOTA);
+        let (wheels, origin) = self.take(store.get(), EventKind::WheelsRefused);
+        (self.wheels, self.wheels_origin) = (wheels.unwrap_or(WheelSettings::TOYOTA), origin);
         let (calibration, origin) = self.take(store.get(), EventKind::CalibrationRefused);
         (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
         let (accepted, _) = self.take(store.get(), EventKind::AcceptedRefused);
@@ -114,6 +114,18 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.drivable(configuration)?;
         self.store()?.set(configuration)?;
         self.note(EventKind::ConfigurationStored);
+        Ok(())
+    }
+
+    pub(super) fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<(), Refusal> {
+        wheels.check().map_err(StoreError::from)?;
+        let own = self.configuration.own_identifier(wheels.frames.iter().flatten().map(|frame| frame.id));
+        if let Some(id) = own {
+            let error = WheelConfigError::Own(raw_id(id));
+            return Err(StoreError::Field(FieldError::Wheels(error)).into());
+        }
+        self.store()?.set(wheels)?;
+        self.note(EventKind::WheelsStored);
         Ok(())
     }
 

@@ -39,14 +39,16 @@ enum Action {
     Info,
     /// Print the configuration.
     Get,
-    /// Change the configuration: NAME=VALUE as `get` prints them, or a whole file.
+    /// Change the configuration: NAME=VALUE as `get` prints them, or a whole file; or the wheel frames (a .toml file).
     Set {
         /// Settings, for example `latitude_deg=48.1 mounting.roll_deg=1.5`; values are as in JSON.
         settings: Vec<String>,
-        /// A whole configuration, as `get --json` prints it.
-        #[arg(long)]
+        /// A whole configuration, as `get --json` prints it; or wheel frames, as `gyronet wheels` and `wheels` print them.
+        #[arg(long, value_name = "FILE.json|FILE.toml")]
         file: Option<PathBuf>,
     },
+    /// Print the wheel frames that the board receives, as a file for `set --file`.
+    Wheels,
     /// Calibrate the sensor while the vehicle stands still (3 s), and print the result.
     Calibrate {
         /// The task, or `show` for the calibration that is stored.
@@ -89,6 +91,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         Action::Get => settings::print(&settings::get(&mut device)?, json)?,
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
+        Action::Wheels => settings::print_wheels(&mut device, json)?,
         Action::Calibrate { task, file, store } => {
             calibration::run(&mut device, *task, file.as_deref(), *store, json)?;
         }

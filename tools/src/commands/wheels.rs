@@ -6,7 +6,15 @@ use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 
 /// Make or check the settings of a vehicle's wheel frames.
+///
+/// The board receives the wheel speeds of one maker's cars (identifier 0xAA). For another vehicle, make a file of settings
+/// and give it to the board: `gyronet device set --file wheels.toml`.
 #[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet wheels from-dbc car.dbc --front-left FL --front-right FR --rear-left RL --rear-right RR --out wheels.toml
+  gyronet wheels check wheels.toml
+  gyronet device --port /dev/ttyUSB1 set --file wheels.toml")]
 pub struct Args {
     #[command(subcommand)]
     action: Action,
@@ -19,7 +27,7 @@ enum Action {
     /// A DBC file does not say how a frame is protected: add checksum and counter by hand. What else can be set stands in
     /// the page of the tools.
     #[command(after_help = "\
-Example:
+Examples:
   gyronet wheels from-dbc car.dbc --front-left WHL_SPD_FL --front-right WHL_SPD_FR \\
       --rear-left WHL_SPD_RL --rear-right WHL_SPD_RR --out wheels.toml")]
     FromDbc {

@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 
 /// Speed codes for one km/h.
 const CODES_PER_KMH: f64 = 65_536.0 / 3.6;
+/// [`WheelSignal::factor_q16`] of one km/h.
+const FACTORS_PER_KMH: f64 = CODES_PER_KMH * 65_536.0;
 
 /// The error of a file of wheel settings.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +44,14 @@ pub enum WheelFileError {
         id: u32,
         /// It is said to have 29 bits.
         extended: bool,
+    },
+    /// A wheel has two signals.
+    #[error("{path}: {wheel:?} has two signals")]
+    Twice {
+        /// The file.
+        path: String,
+        /// The wheel.
+        wheel: Wheel,
     },
     /// A value does not lie in a frame of eight bytes.
     #[error("{path}: frame {id:#x}: {source}")]
@@ -238,6 +248,20 @@ impl WheelFile {
             .map_err(|source| WheelFileError::Toml { path: path.to_owned(), source: Box::new(source) })
     }
 
+    /// Returns the file of settings, as a board has them.
+    #[must_use]
+    pub fn of(settings: &WheelSettings) -> Self {
+        let frames = (0..).zip(&settings.frames);
+        let frames = frames.filter_map(|(k, frame)| Some(Frame::of(settings, k, frame.as_ref()?)));
+        let millis = |Duration(micros)| u32::try_from(micros / 1_000).unwrap_or(u32::MAX);
+        Self {
+            timeout_ms: millis(settings.timeout),
+            still_speed_kmh: kmh(settings.still_speed),
+            still_for_ms: millis(settings.still_for),
+            frame: frames.collect(),
+        }
+    }
+
     /// Returns the settings of the board, checked as the board checks them.
     ///
     /// # Errors
@@ -247,12 +271,20 @@ impl WheelFile {
         if found > MAX_FRAMES {
             return Err(WheelFileError::Frames { path: path.to_owned(), found });
         }
-        let mut frames = [None; MAX_FRAMES];
-        for (place, frame) in frames.iter_mut().zip(&self.frame) {
+        let (mut frames, mut signals) = ([None; MAX_FRAMES], [None; WHEELS]);
+        for ((number, place), frame) in (0..).zip(&mut frames).zip(&self.frame) {
             *place = Some(frame.settings(path)?);
+            for signal in &frame.signal {
+                let place = &mut signals[signal.wheel as usize];
+                if place.is_some() {
+                    return Err(WheelFileError::Twice { path: path.to_owned(), wheel: signal.wheel });
+                }
+                *place = Some(signal.settings(path, frame.id, number)?);
+            }
         }
         let settings = WheelSettings {
             frames,
+            signals,
             timeout: Duration::from_millis(self.timeout_ms),
             still_speed: speed(path, "still_speed_kmh", self.still_speed_kmh)?,
             still_for: Duration::from_millis(self.still_for_ms),
@@ -265,6 +297,24 @@ impl WheelFile {
 }
 
 impl Frame {
+    fn of(settings: &WheelSettings, number: u8, frame: &WheelFrame) -> Self {
+        let wheels = [Wheel::FrontLeft, Wheel::FrontRight, Wheel::RearLeft, Wheel::RearRight];
+        let signals = wheels.into_iter().zip(settings.signals);
+        let own = signals.filter_map(|(wheel, signal)| Some((wheel, signal?)));
+        let own = own.filter(|(_, signal)| signal.frame == number);
+        let (id, extended) = match frame.id {
+            Id::Standard(id) => (id.as_raw().into(), false),
+            Id::Extended(id) => (id.as_raw(), true),
+        };
+        Self {
+            id,
+            extended,
+            checksum: Protection::of(frame.checksum),
+            counter: frame.counter.as_ref().map(Place::of),
+            signal: own.map(|(wheel, signal)| Signal::of(wheel, &signal)).collect(),
+        }
+    }
+
     fn settings(&self, path: &str) -> Result<WheelFrame, WheelFileError> {
         let Self { id, extended, .. } = *self;
         let identifier = if extended {
@@ -273,35 +323,50 @@ impl Frame {
             u16::try_from(id).ok().and_then(StandardId::new).map(Id::Standard)
         };
         let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
-        let mut signals = [None; WHEELS];
-        // More signals than wheels: one wheel is there twice, which the library's check names.
-        for (slot, signal) in signals.iter_mut().zip(&self.signal) {
-            *slot = Some(WheelSignal {
-                wheel: signal.wheel as usize,
-                field: signal.place.field().map_err(place)?,
-                factor_q16: factor(path, signal.factor_kmh)?,
-                offset: speed(path, "offset_kmh", signal.offset_kmh)?,
-                invalid: signal.invalid,
-            });
-        }
-        if let Some(twice) = self.signal.get(WHEELS) {
-            let source = WheelConfigError::Wheel(twice.wheel as usize);
-            return Err(WheelFileError::Settings { path: path.to_owned(), source });
-        }
         Ok(WheelFrame {
             id: identifier.ok_or_else(|| WheelFileError::Identifier {
                 path: path.to_owned(),
                 id,
                 extended,
             })?,
-            signals,
             counter: self.counter.map(|counter| counter.field()).transpose().map_err(place)?,
             checksum: self.checksum.as_ref().map_or(Checksum::None, Protection::checksum),
         })
     }
 }
 
+impl Signal {
+    fn settings(&self, path: &str, id: u32, frame: u8) -> Result<WheelSignal, WheelFileError> {
+        let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
+        Ok(WheelSignal {
+            frame,
+            field: self.place.field().map_err(place)?,
+            factor_q16: factor(path, self.factor_kmh)?,
+            offset: speed(path, "offset_kmh", self.offset_kmh)?,
+            invalid: self.invalid,
+        })
+    }
+
+    fn of(wheel: Wheel, signal: &WheelSignal) -> Self {
+        Self {
+            wheel,
+            place: Place::of(&signal.field),
+            factor_kmh: f64::from(signal.factor_q16) / FACTORS_PER_KMH,
+            offset_kmh: kmh(signal.offset),
+            invalid: signal.invalid,
+        }
+    }
+}
+
 impl Place {
+    fn of(field: &BitField) -> Self {
+        let order = match field.order() {
+            ByteOrder::Intel => Order::Intel,
+            ByteOrder::Motorola => Order::Motorola,
+        };
+        Self { start_bit: field.start(), bits: field.bits(), order, signed: field.is_signed() }
+    }
+
     fn field(&self) -> Result<BitField, OutsideFrame> {
         let order = match self.order {
             Order::Intel => ByteOrder::Intel,
@@ -312,6 +377,19 @@ impl Place {
 }
 
 impl Protection {
+    fn of(checksum: Checksum) -> Option<Self> {
+        Some(match checksum {
+            Checksum::None => return None,
+            Checksum::J1850 { at } => Self::J1850 { byte: at },
+            Checksum::Xor { at } => Self::Xor { byte: at },
+            Checksum::Sum { at } => Self::Sum { byte: at },
+            Checksum::E2e(Profile::P01(P01 { data_id, mode })) => Self::P01 { data_id, mode },
+            Checksum::E2e(Profile::P02(P02 { data_ids })) => Self::P02 { data_ids },
+            Checksum::E2e(Profile::P05(P05 { data_id })) => Self::P05 { data_id },
+            Checksum::E2e(Profile::P11(P11 { data_id, mode })) => Self::P11 { data_id, mode },
+        })
+    }
+
     fn checksum(&self) -> Checksum {
         match *self {
             Self::J1850 { byte } => Checksum::J1850 { at: byte },
@@ -327,12 +405,16 @@ impl Protection {
 
 /// The library's factor; below 100 km/h for one bit, and such that the code is not zero.
 fn factor(path: &str, kmh: f64) -> Result<i32, WheelFileError> {
-    let code = WheelSignal::per_bit_kmh(kmh);
+    let code = (kmh * FACTORS_PER_KMH).round() as i32;
     if kmh.abs() < 100.0 && code != 0 {
         return Ok(code);
     }
     let range = "below 100 and not 0";
     Err(WheelFileError::Range { path: path.to_owned(), key: "factor_kmh", value: kmh, range })
+}
+
+fn kmh(speed: WheelSpeed) -> f64 {
+    f64::from(speed.0) / CODES_PER_KMH
 }
 
 fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFileError> {
@@ -366,11 +448,19 @@ signal = [
     #[test]
     fn the_built_in_settings_as_a_file() {
         let settings = WheelFile::parse("car.toml", TOYOTA).unwrap().settings("car.toml").unwrap();
-        let offset = |settings: &WheelSettings| settings.frames[0].unwrap().signals[0].unwrap().offset.0;
+        let offset = |settings: &WheelSettings| settings.signals[0].unwrap().offset.0;
         // One rounds and the other truncates: 0.00006 km/h.
         assert_eq!(offset(&settings), offset(&WheelSettings::TOYOTA) - 1);
         assert_eq!(settings.still_speed, WheelSpeed(1_820));
         assert_eq!((settings.timeout, settings.still_for), (Duration(100_000), Duration(500_000)));
+    }
+
+    #[test]
+    fn settings_survive_the_way_over_the_file() {
+        let file = WheelFile::of(&WheelSettings::TOYOTA);
+        let text = toml::to_string(&file).unwrap();
+        let again = WheelFile::parse("car.toml", &text).unwrap().settings("car.toml").unwrap();
+        assert_eq!(again, WheelSettings::TOYOTA);
     }
 
     #[test]
@@ -381,7 +471,9 @@ signal = [
             error(&TOYOTA.replace("start_bit = 55", "start_bit = 63")).contains("do not lie inside a frame")
         );
         assert!(error(&TOYOTA.replace("0xAA", "0x800")).ends_with("frame 0x800: no identifier of 11 bits"));
-        assert!(error(&TOYOTA.replace("\"rear-left\"", "\"rear-right\"")).ends_with("is there twice"));
+        assert!(
+            error(&TOYOTA.replace("\"rear-left\"", "\"rear-right\"")).ends_with("RearRight has two signals")
+        );
         assert!(
             error(&TOYOTA.replace("0.01", "0.0")).contains("factor_kmh = 0: must be below 100 and not 0")
         );

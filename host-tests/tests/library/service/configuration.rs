@@ -1,7 +1,9 @@
 //! The configuration is stored whole, at standstill alone, and refused where it is wrong.
 
 use super::{Board, DRIVES, IDENTITY, ask, bare, info, sample, set, start};
+use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
+use gyronet::can::wheel::{WheelConfigError, WheelFrame, WheelSettings};
 use gyronet::health::Status;
 use gyronet::sample::Standstill;
 use gyronet::service::event::EventKind;
@@ -52,6 +54,30 @@ fn configuration_is_kept_whole() {
     let request = Request::SetConfiguration { version: 9, configuration: wanted };
     assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 3 }));
     assert_eq!(*start(&flash).configuration(), wanted);
+}
+
+#[test]
+fn wheel_frames_are_kept_and_none_may_be_the_board_s_own() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = start(&flash);
+    let built_in = Reply::Wheels { origin: Origin::BuiltIn, wheels: WheelSettings::TOYOTA };
+    assert_eq!(ask(&mut board, &Request::GetWheels), built_in);
+    let with_id = |id: u16| {
+        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+        let frame = WheelSettings::TOYOTA.frames[0].map(|frame| WheelFrame { id, ..frame });
+        WheelSettings { frames: [frame, None, None, None], ..WheelSettings::TOYOTA }
+    };
+    assert_eq!(ask(&mut board, &Request::SetWheels(with_id(0xAB))), Reply::Done);
+    for own in [0x1A0, Configuration::DEFAULT.fog_ids[1]] {
+        let error = FieldError::Wheels(WheelConfigError::Own(own.into()));
+        let refused = Reply::Refused(Refusal::Store(StoreError::Field(error)));
+        assert_eq!(ask(&mut board, &Request::SetWheels(with_id(own))), refused);
+    }
+    assert_eq!(ask(&mut board, &Request::GetWheels), built_in, "from the next start on");
+    let mut board = start(&flash);
+    let stored = Reply::Wheels { origin: Origin::Stored, wheels: with_id(0xAB) };
+    assert_eq!(ask(&mut board, &Request::GetWheels), stored);
+    assert_eq!(*board.wheels(), with_id(0xAB));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::{Board, done, mismatch};
 use gyronet::service::{Reply, Request};
 use gyronet::store::{Configuration, Record};
 use gyronet_tools::client::device::settings::{assign, from_value, to_value};
+use gyronet_tools::wheels::WheelFile;
 use std::path::Path;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -29,6 +30,16 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
     if settings.is_empty() && file.is_none() {
         return Err("nothing to set: give NAME=VALUE, or --file".into());
     }
+    if let Some(path) = file.filter(|path| path.extension().is_some_and(|end| end == "toml")) {
+        if !settings.is_empty() {
+            return Err("NAME=VALUE beside a file of wheel frames: set one, then the other".into());
+        }
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{name}: {e}"))?;
+        let wheels = WheelFile::parse(&name, &text)?.settings(&name)?;
+        device.ask(&Request::SetWheels(wheels))?;
+        return Ok(done(json, "stored; it takes effect after a restart")?);
+    }
     let mut wanted = match file {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -43,4 +54,14 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
     configuration.check()?;
     device.ask(&Request::SetConfiguration { version: Configuration::VERSION, configuration })?;
     Ok(done(json, "stored; it takes effect after a restart")?)
+}
+
+/// Prints the wheel frames as the file that sets them.
+pub fn print_wheels(device: &mut Board, json: bool) -> Result<()> {
+    let Reply::Wheels { wheels, .. } = device.ask(&Request::GetWheels)? else { return mismatch() };
+    let file = WheelFile::of(&wheels);
+    if json {
+        return super::print_json(&file);
+    }
+    Ok(std::io::Write::write_all(&mut std::io::stdout().lock(), toml::to_string(&file)?.as_bytes())?)
 }
