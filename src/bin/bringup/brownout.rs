@@ -1,4 +1,4 @@
-//! The brown-out reset's level, an option byte (RM0090 3.6, 3.9.6).
+//! This module handles the brown-out reset's level, an option byte (RM0090 3.6, 3.9.6).
 //!
 //! Below the level the chip is held in reset, so nothing runs or is programmed at a supply that it was not made
 //! for. A new chip has the lowest level, 1.8 V. The option byte is read when power comes on.

@@ -130,7 +130,7 @@ fn assign_pins() {
     }
 }
 
-/// The version of the package.
+/// Returns the version of the package.
 fn version() -> [u8; 3] {
     let number = |text: &str| text.bytes().fold(0, |number: u8, digit| number * 10 + (digit - b'0'));
     [

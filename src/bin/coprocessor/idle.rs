@@ -23,7 +23,7 @@ const RETRY_MS: u32 = 1_000;
 /// The time that one pass over the weights takes.
 const CHECK_MS: usize = 10_000;
 
-/// The output task's report of a sample.
+/// Reports a sample from the output task to idle.
 pub struct Observation {
     /// `None`: the sensor is silent.
     pub sample: Option<ImuSample>,
@@ -37,7 +37,7 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
     // SAFETY: the output task writes, idle reads.
     unsafe { Ring::new() };
 
-/// The idle task.
+/// Holds the state of the idle task.
 pub struct Idle {
     device: &'static mut Device<Records, Slots>,
     check: Option<BackgroundCheck<'static>>,

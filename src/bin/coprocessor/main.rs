@@ -67,8 +67,8 @@ mod start;
 #[path = "../stm32f405/mod.rs"]
 mod stm32f405;
 
-/// Vector and priority of each task below: RTIC has them in instructions alone, the bound of the
-/// stack wants them as data. A test holds them against the running image.
+/// Lists the vector and priority of each task below as data, because the analysis of the stack reads them there
+/// and RTIC encodes them only in instructions. A test compares them with the running image.
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "a section that is not loaded")]
 #[used]

@@ -26,7 +26,7 @@ pub struct OutputParts {
     pub bits_per_second: u32,
 }
 
-/// The output task.
+/// Holds the state of the output task.
 pub struct Output {
     imu: Imu,
     fog: serial::Port,
@@ -56,17 +56,17 @@ impl OutputParts {
     }
 }
 
-// What the coprocessor refuses it has counted, so its results are not looked at here.
+// The coprocessor counts the inputs that it refuses, so the task ignores errors from it.
 impl Output {
     /// Runs one turn of the output task.
     #[inline(never)]
     pub fn turn(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
-        // A part's bytes come one by one. All else is looked at with the next tick, or before the sample
-        // that they make; but for the CAN controller, which takes three frames at a time.
+        // A turn may follow each received byte. Other inputs are polled once in a tick of 1 ms, and again before a
+        // sample is used.
         let now = Micros(timer::micros());
         let tick = (now.0 / 1_000) as u32;
         if !core::mem::replace(&mut self.joined, true) {
-            // From here on received frames are taken, and every task reports in time.
+            // From here on, this task takes received frames, and every task reports to the watchdog in time.
             self.outgoing.join();
             watchdog::set(watchdog::Limit::Short);
         }

@@ -6,21 +6,22 @@
 use crate::stm32f405::timer;
 use core::sync::atomic::{AtomicU8, Ordering};
 
-/// Rates are sent.
+/// In this state, the output task sends rates.
 const RUNNING: u8 = 0;
-/// Idle waits for the announcement.
+/// In this state, idle waits for the announcement.
 const REQUESTED: u8 = 1;
-/// A message set without a rate has been queued.
+/// In this state, a message set without a rate has been queued.
 const ANNOUNCED: u8 = 2;
-/// Time in which the output task announces, and in which the frames leave: six take 1.7 ms, us.
+/// Limits how long idle waits for the output task's announcement, us.
 const ANNOUNCE_US: u64 = 20_000;
+/// Gives the frames time to leave, us; six frames take 1.7 ms.
 const LEAVE_US: u64 = 5_000;
-/// Looks at the time before a wait is given up, should it stand still.
+/// Limits how often a wait reads the timer, so that it ends even if the timer stands still.
 const LOOKS: u32 = 1_000_000;
 
 static STATE: AtomicU8 = AtomicU8::new(RUNNING);
 
-/// Does something that silences the buses, once that is announced. For idle.
+/// Announces that the buses will fall silent, then runs `work`, which silences them. Idle calls it.
 pub fn announced<T>(work: impl FnOnce() -> T) -> T {
     STATE.store(REQUESTED, Ordering::Relaxed);
     wait(ANNOUNCE_US, || STATE.load(Ordering::Relaxed) == ANNOUNCED);
@@ -30,17 +31,17 @@ pub fn announced<T>(work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Returns whether rates are withheld now. For the output task, which sends a message set without a rate first.
+/// Returns whether rates are withheld now. The output task asks, and sends a message set without a rate first.
 pub fn is_requested() -> bool {
     STATE.load(Ordering::Relaxed) != RUNNING
 }
 
-/// Reports to idle that the announcement is on its way. For the output task.
+/// Reports to idle that the announcement has been queued. The output task calls it.
 pub fn announce() {
     let _ = STATE.compare_exchange(REQUESTED, ANNOUNCED, Ordering::Relaxed, Ordering::Relaxed);
 }
 
-/// Waits for something, up to a time.
+/// Waits until `over` returns true, or `us` microseconds have passed.
 fn wait(us: u64, over: impl Fn() -> bool) {
     let until = timer::micros() + us;
     let _ = (0..LOOKS).any(|_| over() || timer::micros() >= until);

@@ -1,4 +1,4 @@
-//! bxCAN (RM0090 32) at 500 kbit/s.
+//! This module drives bxCAN (RM0090 32) at 500 kbit/s.
 //!
 //! Nothing here waits except for initialisation mode, with a limit. A frame that a mailbox could not
 //! send within [`STALE_MS`] is aborted, so a bus that comes back does not get old values. After bus-off
@@ -68,7 +68,7 @@ enum Recovery {
     Restarts,
 }
 
-/// The sending half of the controller.
+/// Sends frames through the controller.
 pub struct Can {
     registers: pac::CAN1,
     /// When each mailbox got its frame, ms.

@@ -1,4 +1,4 @@
-//! The reason of the last reset (RM0090 7.3.21).
+//! This module reads the reason of the last reset (RM0090 7.3.21).
 
 use super::pac;
 use gyronet::service::event::ResetCause;

@@ -1,5 +1,5 @@
-//! A line's interrupt. On the chip it counts damaged bytes, since DMA moves them; in the emulator, which has no DMA, it
-//! moves each byte between the USART and the rings.
+//! This module handles a line's interrupt. On the chip, DMA moves the bytes, and the handler counts the damaged ones.
+//! In the emulator, which has no DMA, the handler also moves each byte between the USART and the rings.
 #![allow(unsafe_code, reason = "the interrupt mask; the block says why it is sound")]
 
 use super::{RECEIVED, SENDING};
