@@ -79,7 +79,7 @@ pub struct Aligner {
 }
 
 impl Aligner {
-    /// The aligner before the first sample.
+    /// Is the state before the first sample.
     pub const START: Self = Self { last: None };
 
     /// Places a sample on the grid.

@@ -83,7 +83,7 @@ impl ClockCounters {
     }
 }
 
-/// A sample's time by the board's clock.
+/// Gives a sample's time by the board's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardTime {
@@ -93,7 +93,7 @@ pub struct BoardTime {
     pub jumped: bool,
 }
 
-/// The translation of a part's clock to the board's.
+/// Translates a part's clock to the board's.
 #[derive(Debug, Clone, Default)]
 pub struct PartClock {
     /// Last time stamp, its board time, and board minus part time, all microseconds.
@@ -104,7 +104,7 @@ pub struct PartClock {
 }
 
 impl PartClock {
-    /// The clock before the first sample.
+    /// Is the state before the first sample.
     pub const START: Self = Self { last: None, late_since: None, counters: ClockCounters::NONE };
 
     /// Takes a sample's time stamp and when it arrived.

@@ -25,7 +25,7 @@ pub const MAX_GAP_US: u64 = 100_000;
 /// Samples kept: what a 500 Hz part sends in the 20 ms that a step can be waited for.
 pub const KEPT: usize = 16;
 
-/// The origin of a value on the grid.
+/// Says where a value on the grid comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Quality {

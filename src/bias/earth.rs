@@ -48,7 +48,7 @@ impl Latitude {
     }
 }
 
-/// The treatment of the Earth's rotation.
+/// Says how the Earth's rotation is treated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EarthRate {

@@ -36,7 +36,7 @@ impl QuietConfig {
 /// Six axes, gyro first: values in rad/s and m/s^2.
 type Axes = [f32; 6];
 
-/// The judgement under way.
+/// Holds the judgement under way.
 #[derive(Debug, Clone)]
 pub struct QuietDetector {
     std: Axes,

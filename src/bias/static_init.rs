@@ -11,7 +11,7 @@ use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
-/// Samples of the static initialisation: 3 s.
+/// Counts the samples of the static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
@@ -34,7 +34,7 @@ pub struct StaticConfig {
 }
 
 impl StaticConfig {
-    /// Limits for a MEMS part on a car.
+    /// Sets the limits for a MEMS part on a car.
     pub const DEFAULT: Self =
         Self { gyro_std: 0.05, accel_std: 1.5, gyro_drift: 0.004, accel_drift: 0.12, gyro_bias: 0.0873 };
 }
@@ -141,7 +141,7 @@ pub struct Rest {
     pub accel_std: [f32; 3],
 }
 
-/// Static initialisation under way.
+/// Collects the samples of a static initialisation.
 #[derive(Debug, Clone)]
 pub struct StaticInit {
     config: StaticConfig,

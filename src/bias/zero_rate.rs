@@ -1,22 +1,23 @@
-//! Zero-rate updates estimate the part of the yaw rate that the network leaves over while the vehicle stands.
+//! Zero-rate updates estimate, while the vehicle stands, the error of the yaw rate that the network has not removed.
 //!
-//! A Kalman filter of two states, fed with one-second means of gyro less static bias less
+//! A Kalman filter estimates two states from one-second means of the gyro, less its static bias and its
 //! settled correction:
 //!
-//! - the **bias** b that matters when driving: it walks, faster when the temperature changes;
-//! - the **offset** s of this one standstill: an idling engine shakes the sensor otherwise than
-//!   a road does, and gyro and network answer with a mean of their own. It is another one at each
-//!   stop, and does not average out while that lasts: without it, a minute at a traffic light
-//!   would make the filter sure of something that does not hold on the road.
+//! - the **bias** b also holds while driving: it is a random walk, faster when the temperature changes;
+//! - the **offset** s holds for one standstill only: an idling engine shakes the sensor differently from
+//!   a road, which shifts the mean of gyro and network. The shift differs from stop to stop and does not
+//!   average out during a stop: without this state, a minute at a traffic light would make the filter
+//!   too certain of a bias that does not hold on the road.
 //!
-//! A second is measured as z = b + s + noise, its noise from its own spread. It counts when the
-//! second after it was still too, for wheel sensors show a car that pulls away late.
+//! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread within that
+//! second. A second counts only if the vehicle also stands in the next one, because wheel sensors show late
+//! that a car pulls away.
 
 use super::spread::Spread;
 use crate::sample::RATE_HZ;
 use crate::units::{AngularRate, CentiCelsius};
 
-/// The noise model of part and vehicle. All values are 1 sigma.
+/// Describes the noise of part and vehicle. All values are 1 sigma.
 #[derive(Debug, Clone, Copy)]
 pub struct ZeroRateConfig {
     /// Bias left by static initialisation, rad/s.
@@ -37,7 +38,7 @@ pub struct ZeroRateConfig {
 }
 
 impl ZeroRateConfig {
-    /// A MEMS part on a car. The walk is the one published for an Xsens MTi-100 (OpenVINS,
+    /// Holds the noise of a MEMS part on a car. The walk is the one published for an Xsens MTi-100 (OpenVINS,
     /// `config/kaist`); the noise is that part's 1.7e-4 rad/s/sqrt(Hz) over a second, less than
     /// half of it to let a better part show; 0.005 deg/s per kelvin is typical of the class. The
     /// offset is measured: between standing and driving the mean error of the corrected rate
@@ -70,7 +71,7 @@ pub enum StandstillSource {
     Inertial,
 }
 
-/// The outcome of a whole second of standing.
+/// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroRateOutcome {
@@ -82,7 +83,7 @@ pub enum ZeroRateOutcome {
     Refused,
 }
 
-/// Mean and variance of the mean of a second.
+/// Holds the mean of a second and the variance of that mean.
 #[derive(Debug, Clone, Copy)]
 struct Measurement {
     mean: f32,
