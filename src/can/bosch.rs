@@ -130,7 +130,7 @@ impl Tx1 {
     }
 }
 
-/// The yaw rate's rounding residual.
+/// Carries the yaw rate's rounding residual from message to message.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct YawRateSignal {
     /// Owed to the receiver, 1e-9 deg/s x 2^-20: fine enough that nothing is ever rounded away.

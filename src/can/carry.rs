@@ -1,13 +1,13 @@
-//! A coarser scale loses nothing in the sum, because the rounding residual of one message goes into the next one.
+//! A coarser scale loses nothing in the sum, because each message's rounding residual is added to the next value.
 //!
 //! Rounded one by one, the messages of a parked car with a constant rate are all wrong in the
-//! same direction. With the residual carried, the sum of what was sent is never off by more than
-//! half an LSB from the sum of what should have been sent. The arithmetic is exact: the scale
+//! same direction. With the residual carried, the sum of the rates sent differs from the sum of the
+//! exact rates by at most half an LSB. The arithmetic is exact: the scale
 //! is a fixed-point constant, and products are kept to their last bit.
 
 use crate::units::AngularRate;
 
-/// The rule that makes a signal's code of a rate code (LSB 2^-27 rad/s).
+/// Converts a rate code (LSB 2^-27 rad/s) to the code of a CAN signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scale {
     /// Signal LSBs per rate code, times 2^32. At most 2^31: a signal finer than twice the rate
@@ -18,9 +18,9 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// 1e-6 deg/s, from 180 / pi / 2^27 / 1e-6; 2.3e-10 too small.
+    /// Scales to 1e-6 deg/s: 180 / pi / 2^27 / 1e-6, too small by 2.3e-10.
     pub const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944, zero_q32: 0 };
-    /// 2e-4 deg/s.
+    /// Scales to 2e-4 deg/s.
     pub const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325, zero_q32: 0 };
 }
 

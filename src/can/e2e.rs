@@ -154,7 +154,7 @@ impl Protector {
     }
 }
 
-/// The receiving side of one message.
+/// Checks one message on the receiving side.
 #[derive(Debug, Clone, Copy)]
 pub struct Checker {
     profile: Profile,

@@ -10,7 +10,7 @@ use crate::estimate::YawEstimate;
 use embedded_can::{Id, StandardId};
 use heapless::Vec;
 
-/// The encoder of rate, angle and detail for each step, under E2E profile 1. Each message's identifier is its
+/// Encodes rate, angle and detail for each step, under E2E profile 1. Each message's identifier is its
 /// data identifier too.
 #[derive(Debug, Clone, Copy)]
 pub struct FogEncoder {

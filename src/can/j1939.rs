@@ -18,7 +18,7 @@ use embedded_can::{ExtendedId, Frame};
 
 /// Parameter group number of VDC2.
 pub const VDC2_PGN: u32 = 61_449;
-/// Its default priority.
+/// Is the default priority of VDC2 on the bus.
 pub const VDC2_PRIORITY: u8 = 6;
 /// Largest code that is a value.
 const MAX_CODE: i64 = 0xFAFF;
@@ -41,7 +41,7 @@ pub const fn broadcast_id(pgn: u32, priority: u8, source: u8) -> Option<Extended
     ExtendedId::new((priority as u32) << 26 | pgn << 8 | source as u32)
 }
 
-/// VDC2 as codes, without the signals that we have not.
+/// Holds the signals of VDC2 that the coprocessor measures, as codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vdc2 {
@@ -99,7 +99,7 @@ impl Vdc2 {
     }
 }
 
-/// The validity of the rate.
+/// Says whether the rate is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {
@@ -111,7 +111,7 @@ pub enum Validity {
     Error,
 }
 
-/// The yaw rate's rounding residual.
+/// Carries the yaw rate's rounding residual from message to message.
 #[derive(Debug, Clone, Copy)]
 #[doc(hidden)]
 pub struct Vdc2Encoder {

@@ -116,7 +116,7 @@ pub struct ReceivedLatitude {
     pub moved: bool,
 }
 
-/// Frames in, latitude out.
+/// Receives CAN frames and decodes the latitude from them.
 #[derive(Debug, Clone, Copy)]
 pub struct LatitudeReceiver {
     settings: LatitudeSettings,

@@ -40,7 +40,7 @@ pub enum DataIdMode {
     Nibble,
 }
 
-/// Profile 1 of one message.
+/// Protects one message with profile 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

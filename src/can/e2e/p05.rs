@@ -9,7 +9,7 @@ pub(super) const COUNTERS: u16 = 256;
 /// The specification's limit, 4096 bytes, is one bit more than the CRC covers; CAN needs 64.
 const MAX_LEN: usize = 64;
 
-/// Profile 5 of one message.
+/// Protects one message with profile 5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

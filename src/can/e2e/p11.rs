@@ -14,7 +14,7 @@ pub enum P11Mode {
     Nibble,
 }
 
-/// Profile 11 of one message.
+/// Protects one message with profile 11.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -27,7 +27,7 @@ impl Verdict {
     }
 }
 
-/// The counter of the last message.
+/// Remembers the counter of the last message.
 #[derive(Debug, Clone, Copy)]
 pub struct Sequence {
     counters: u16,

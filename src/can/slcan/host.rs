@@ -43,12 +43,12 @@ impl StatusFlags {
     pub const BUS_ERROR: Self = Self(1 << 7);
 }
 
-/// The effect of a line of the host.
+/// Says what a line from the host did.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reaction {
     /// The answer to send before the next frame.
     pub answer: Answer,
-    /// A frame from the host, for whoever wants it (wheel speeds on a bench).
+    /// A frame from the host, which the caller may use (wheel speeds on a bench).
     pub frame: Option<DataFrame>,
 }
 
