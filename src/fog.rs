@@ -4,23 +4,23 @@
 //! # FoGNet
 //!
 //! A window covers a minute, and there is a new one every second, so 60 windows cover each
-//! second. The estimate of the newest window is used in the second after next: whoever has time
-//! runs it meanwhile ([`FogOutput::due`], [`FogCorrector::deliver`]), and fast and slow machines
-//! emit the same.
+//! second. The estimate of the newest window is used in the second after next. The caller runs the
+//! network in the meantime ([`FogOutput::due`], [`FogCorrector::deliver`]), so fast and slow machines
+//! give the same output.
 //!
-//! Which part of a window's correction belongs to which of its seconds the network says for what
-//! is linear in the gyro's increments, and for nothing else. So, with d a frame's increment, g the
-//! mean factor of the linear part, C the correction and L its linear part:
+//! Only the part of a window's correction that is linear in the gyro's increments can be assigned to the
+//! seconds of the window. So, with d a frame's increment, g the mean factor of the linear part, C the
+//! correction and L its linear part:
 //!
 //! `corrected = d - g d - (C - L) / 6000`
 //!
-//! The linear part (the error of the gyro's scale) is taken off the very frame that it belongs to.
+//! The linear part (the error of the gyro's scale) is subtracted from the frame that it belongs to.
 //! The rest is spread evenly over a window's length: 60 windows with a sixtieth of it each. Both
-//! divisions carry their remainders, so that the sum of what goes out is exact.
+//! divisions carry their remainders, so that the sum of the output is exact.
 //!
-//! Spreading all of C evenly would come to the same sum, but after a turn half a minute late.
-//! Taking differences of overlapping windows instead (what the newest window has and the one
-//! before it had not) makes 60 interleaved sums of single estimates, each with its own error.
+//! Spreading all of C evenly would give the same sum, but half a minute late after a turn.
+//! Using differences between overlapping windows instead would give 60 interleaved sums of
+//! single estimates, each with its own error.
 
 mod lane;
 mod part;
@@ -79,8 +79,8 @@ pub struct FogConfig {
 }
 
 impl FogConfig {
-    /// A level DSP-1760 on a car, without a latitude and without FoGNet. The shaking is that of the simulated car on its
-    /// training drives. A correction by FoGNet of 0.02 rad a minute is
+    /// Configures a level DSP-1760 on a car, without a latitude and without FoGNet. The shaking is that of
+    /// the simulated car on its training drives. A correction by FoGNet of 0.02 rad a minute is
     /// four times what Earth's rate can add to it, and leaves room for 0.1 % of scale error over two full turns.
     pub const DEFAULT: Self = Self {
         errors: FogErrors::DSP1760,

@@ -36,7 +36,7 @@ impl Tilt {
     }
 }
 
-/// The state of the correction.
+/// Holds the state of the correction.
 #[derive(Debug, Clone)]
 pub struct Lane {
     tilt: Tilt,

@@ -1,10 +1,9 @@
 //! The pipeline computes the rate that is sent every 10 ms from a fibre-optic gyro's samples.
 //!
-//! The gyro's increments are summed on the grid of the time that the caller gives ([`Streams`]). The newest
-//! readings of inertial sensor and wheels stand for those of the step: they are a step or two old, which is
-//! nothing to their means over a second. FoGNet, where it is asked for, runs beside that, as GyroNet does:
-//! [`FogPipeline::window`] is the window that is due, whoever has time runs it, [`FogPipeline::deliver`] takes the
-//! estimate.
+//! The gyro's increments are summed over steps of the caller's time ([`Streams`]). Each step uses the newest
+//! readings of inertial sensor and wheels. They are a step or two old, which hardly changes their means over a
+//! second. If FoGNet is configured, it runs outside the pipeline, as GyroNet does: [`FogPipeline::window`] returns
+//! the window that is due, the caller runs the network on it, and [`FogPipeline::deliver`] takes the estimate.
 //!
 //! | state | rate | source | quality | faults |
 //! |---|---|---|---|---|

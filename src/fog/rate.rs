@@ -7,7 +7,7 @@ use crate::units::{Angle, AngularRate};
 const CODES: i64 = 1 << (Angle::FRACTION_BITS - AngularRate::FRACTION_BITS);
 const FRAMES: i64 = RATE_HZ as i64;
 
-/// The mean rate of each frame. What rounding takes from one frame the next ones get: the sum of
+/// Computes the mean rate of each frame. Rounding residuals are carried to the next frames: the sum of
 /// the rates times 10 ms is within one code of the sum of the turns.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct IncrementRate {

@@ -32,7 +32,7 @@ const MEMORY: u8 = 64;
 /// The largest square of a difference that is believed, in variances: a turn that begins is not noise.
 const LARGEST: f32 = 9.0;
 
-/// The outcome of a second at standstill.
+/// Says how a second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RestOutcome {
