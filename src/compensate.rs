@@ -84,7 +84,7 @@ const HELD_QUARTERS: usize = 5;
 /// Samples that are kept: the newest, and as many before it as a window can still change.
 const KEPT: usize = Lag::MAX.samples() + 1;
 
-/// One sample and the best estimate for it so far.
+/// Holds one sample and the best estimate for it so far.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     tick: u32,

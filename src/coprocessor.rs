@@ -82,7 +82,7 @@ struct Bus {
     reported: u32,
 }
 
-/// The coprocessor of one vehicle.
+/// Runs the coprocessor of one vehicle.
 #[derive(Debug, Clone)]
 pub struct Coprocessor {
     clock: Clock,

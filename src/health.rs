@@ -55,7 +55,7 @@ impl core::fmt::Display for Status {
     }
 }
 
-/// The origin of a rate.
+/// Says where a rate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -73,7 +73,7 @@ pub enum Source {
     EarthRate = 4,
 }
 
-/// The quality of a rate.
+/// Says how far a rate can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]

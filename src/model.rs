@@ -31,7 +31,7 @@ pub use window::{FEATURES, Features, WINDOW};
 use crate::nn::linear::Linear;
 use crate::units::AngularRate;
 
-/// Estimates of the yaw gyro's error, one for each sample of a window, oldest first.
+/// Holds estimates of the yaw gyro's error, one for each sample of a window, oldest first.
 pub type Corrections = [AngularRate; WINDOW];
 
 /// The smallest [`Estimate::scale`]: 2^-20 rad/s (0.2 deg/h), far below what a window can tell.

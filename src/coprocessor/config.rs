@@ -34,16 +34,16 @@ pub struct StorageFaults {
     pub configuration_lost: bool,
 }
 
-/// The configuration of a coprocessor. It holds from the start on.
+/// Configures a coprocessor, from its start on.
 #[derive(Debug, Clone, Copy)]
 pub struct Config {
-    /// The way from samples to rates.
+    /// Settings of the pipeline that turns inertial samples into rates.
     pub pipeline: PipelineConfig,
     /// The messages that are sent for each sample.
     pub can: can::config::Config,
     /// The receiver of the vehicle's wheel speeds; `None` where there are none.
     pub wheels: Option<WheelReceiver>,
-    /// The way from the fibre-optic gyro's samples to its rate.
+    /// Settings of the pipeline that turns the fibre-optic gyro's samples into rates.
     pub fog: FogConfig,
     /// The receiver of the vehicle's latitude, for the Earth's rate; `None` where none is sent.
     pub latitude: Option<LatitudeReceiver>,

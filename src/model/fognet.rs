@@ -30,7 +30,7 @@ const ANGLE_TO_RATE: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
 /// Fraction bits of [`FogBlob::gains`].
 pub const GAIN_FRACTION_BITS: u32 = 31;
 
-/// The result of a FoGNet window.
+/// Holds the result of a FoGNet window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogEstimate {
@@ -64,7 +64,7 @@ enum Stage {
 
 type Scratch2 = Scratch<HIDDEN2, { HIDDEN2 / 2 }>;
 
-/// Working memory of one window. Both LSTMs share it: they run one after the other.
+/// Holds the working memory of one window. Both LSTMs share it: they run one after the other.
 #[derive(Debug, Clone)]
 pub struct FogNetState {
     input: [u32; STEPS * COLUMNS / 2],

@@ -35,7 +35,7 @@ impl<'w> Linear<'w> {
     #[must_use]
     pub fn output(row: &[i32], inputs: &[i32]) -> i32 {
         let start = 1 << (Self::FRACTION_BITS - 1);
-        // At most (2^32 - 1) 2^31 and the half in magnitude, which 2^63 is more than.
+        // The magnitude is at most (2^32 - 1) 2^31 plus one half, which is below 2^63.
         let products = row.iter().zip(inputs).map(|(weight, input)| i64::from(*weight) * i64::from(*input));
         let sum = products.fold(start, i64::wrapping_add) >> Self::FRACTION_BITS;
         sum.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32

@@ -73,15 +73,15 @@ impl Calibration {
     /// The calibration of an unknown sensor.
     pub const NONE: Self = Self { gyro_bias: None, temperature_table: Vec::new(), level: None, unit: None };
 
-    /// Returns the map for a board that runs these weights; `None` where there is none or it belongs to others.
+    /// Returns the map for a board that runs these weights; `None` if no map is stored, or one for other weights.
     #[must_use]
     pub fn gyro_map(&self, weights: u32) -> Option<GyroMap> {
         self.unit.filter(|unit| unit.weights == weights).map(|unit| unit.gyro_map)
     }
 
-    /// Takes over the bias of a static calibration, and into the table where the part gives its
-    /// temperature: instead of a point that is nearer than 5 deg C, else as a new one. A full
-    /// table gives up its nearest point.
+    /// Stores the bias of a static calibration, and adds it to the table if the part reports its
+    /// temperature. The new point replaces points that are nearer than 5 deg C; if there are none and
+    /// the table is full, it replaces the nearest points.
     pub fn add_bias(&mut self, gyro_bias: [AngularRate; 3], temperature: Option<CentiCelsius>) {
         self.gyro_bias = Some(gyro_bias);
         let Some(temperature) = temperature else { return };
