@@ -67,7 +67,7 @@ impl Input {
         delivered
     }
 
-    /// Intact frames' opposites, as far as the parsers count them.
+    /// Returns the number of damaged or lost frames that the parsers have counted.
     #[must_use]
     pub fn bad_frames(&self) -> u32 {
         match self {

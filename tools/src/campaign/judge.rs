@@ -27,11 +27,11 @@ impl Limits {
     pub const FIBRE_OPTIC: Self = Self { moved: 1e-4, mean: 1e-4, largest: 2e-4, inside_sigma: [0.0, 1.0] };
 }
 
-/// The rows after the last report in which the estimate of a sample that was not good is made up for.
+/// Counts the rows after a report that are not judged, because they still make up for estimates of bad samples.
 const PAID: usize = 20;
 const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
 
-/// The messages of the undamaged run, row by row.
+/// Holds the messages of the undamaged run, row by row.
 #[derive(Debug, Clone)]
 pub struct Baseline {
     rows: Vec<Row>,

@@ -1,11 +1,11 @@
-//! Hours of a simulated drive through the coprocessor, as fast as the host can: bytes of an MTi and of a DSP-1760 and
-//! wheel frames go in, frames come out as SLCAN text, and a receiver reads them. As on the board, the coprocessor is
-//! asked every millisecond whether a sensor is silent.
+//! This module runs hours of a simulated drive through the coprocessor, as fast as the host can: bytes of an
+//! MTi and of a DSP-1760 and wheel frames go in, frames come out as SLCAN text, and a receiver reads them. As on the board, the coprocessor is
+//! polled every millisecond, to notice a silent sensor.
 //!
 //! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
 //! 32-bit microseconds begin half the drive before their end, packet counters and the counters
-//! of the messages go round, SLCAN's stamps restart each minute, the accumulated yaw passes a
-//! turn again and again. What goes in is known to the sample, so what comes out is.
+//! of the messages wrap, SLCAN's stamps restart each minute, and the accumulated yaw passes a
+//! turn many times. Every input sample is known, so every output can be checked.
 
 use crate::client::monitor::{Counts, Monitor};
 use crate::drive::wheel_frames;
