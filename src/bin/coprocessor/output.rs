@@ -61,8 +61,8 @@ impl Output {
     /// Runs one turn of the output task.
     #[inline(never)]
     pub fn turn(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
-        // A turn may follow each received byte. Other inputs are polled once in a tick of 1 ms, and again before a
-        // sample is used.
+        // A turn may follow each received byte. Other inputs are read once a tick (1 ms), or before a new sample is
+        // used. The CAN controller is refilled in every turn, because it takes only three frames at a time.
         let now = Micros(timer::micros());
         let tick = (now.0 / 1_000) as u32;
         if !core::mem::replace(&mut self.joined, true) {
