@@ -1,6 +1,6 @@
-//! This module runs hours of a simulated drive through the coprocessor, as fast as the host can: bytes of an
-//! MTi and of a DSP-1760 and wheel frames go in, frames come out as SLCAN text, and a receiver reads them. As on the board, the coprocessor is
-//! polled every millisecond, to notice a silent sensor.
+//! This module runs hours of a simulated drive through the coprocessor, as fast as the host can: bytes of an MTi
+//! and of a DSP-1760 and wheel frames go in, frames come out as SLCAN text, and a receiver reads them. As on the
+//! board, the coprocessor is polled every millisecond, to notice a silent sensor.
 //!
 //! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
 //! 32-bit microseconds begin half the drive before their end, packet counters and the counters
