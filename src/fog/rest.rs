@@ -23,6 +23,8 @@ use crate::units::Angle;
 
 /// Steps of a second.
 const STEPS: i64 = RATE_HZ as i64;
+/// Largest code of a step, 2,900 deg/s: a second's sums stay within 58 bits.
+const LARGEST_CODE: i64 = 1 << 43;
 /// Uncertainty of the gyro's reading before it has stood still, rad/s: more than any latitude and bias.
 const UNKNOWN: f32 = 1e-2;
 /// Sigmas by which a standing gyro may differ from what is expected.
@@ -63,9 +65,10 @@ impl Second {
     /// The second has no step.
     pub const EMPTY: Self = Self { steps: 0, sum: 0, rising: 0 };
 
-    /// Adds a step. What saturates here, 0.7 deg/s, no standing vehicle turns by.
+    /// Adds a step. It saturates far above any gyro's range: an engine shakes a standing vehicle by half a degree a second,
+    /// and a limit that cuts its peaks cuts the same share of the Earth's rate.
     pub fn add(&mut self, turn: Angle) {
-        let code = turn.0.clamp(i32::MIN.into(), i32::MAX.into());
+        let code = turn.0.clamp(-LARGEST_CODE, LARGEST_CODE);
         self.sum += code;
         self.rising += code * (2 * i64::from(self.steps) + 1);
         self.steps += 1;
@@ -279,6 +282,20 @@ mod tests {
         }
         assert!((rest.reading() - 2e-6).abs() < 0.05 * DEG_PER_HOUR, "{}", rest.reading() / DEG_PER_HOUR);
         assert!(!rest.is_contradicted());
+    }
+
+    #[test]
+    fn strong_shaking_takes_nothing_from_the_earths_rate() {
+        let mut rest = RestReading::new(FogErrors::DSP1760);
+        rest.set_earth(Some(9.0 * DEG_PER_HOUR), false);
+        for step in 0..60 * RATE_HZ {
+            // 1.2 deg/s at 10 Hz: a second holds whole periods.
+            let shake = 1.2f64.to_radians() * libm::sin(f64::from(step) * 0.1 * core::f64::consts::TAU);
+            let turn = (f64::from(9.0 * DEG_PER_HOUR) + shake) * 0.01 * f64::from(Angle::PER_RAD);
+            rest.observe(Some(Angle(turn as i64)), Standstill::Still);
+        }
+        let mean = rest.measured.mean / DEG_PER_HOUR;
+        assert!((mean - 9.0).abs() < 0.01, "{mean}");
     }
 
     #[test]

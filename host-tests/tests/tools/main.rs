@@ -5,6 +5,7 @@ mod campaign;
 mod course_reference;
 mod fir_choice;
 mod fog_default;
+mod fog_kingston;
 mod fognet_golden;
 mod fognet_integer;
 mod fognet_simulated;
