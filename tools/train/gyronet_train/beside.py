@@ -1,0 +1,187 @@
+"""python -m gyronet_train.beside DATA --out FOLDER: the model that the library ships, a linear part and a small Bi-LSTM.
+
+The linear part is the filter of linear.py without mounting and gain: differences of neighbouring samples, which
+belong to the kind of vibration and add nothing for an input that does not change. So another vehicle gets no constant and
+no gain from it; `gyronet calibrate` finds those of a unit. Beside it a Bi-LSTM states the expected error of each window.
+What it could add to the correction is measured here too, each drive by the models of the others, and is not shipped
+unless it gains more than its spread over drives.
+
+The input is kept from telling level and turn: both are added at random (`disturb`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import statistics
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from .augment import turn
+from .export import export
+from .linear import HOP, PARTS, fit, ratio, rows, sums, window_error
+from .model import GyroNet
+from .recordings import STATIC_SAMPLES, WINDOW, Drive, load_drive, mean_1s_error, windows
+
+DIFFERENCES = ("low pass", "accelerometer")
+TILT = 0.5  # m/s^2, 1 sigma: 3 degrees of mounting or street
+BATCH = 512
+LR = 0.004
+LIKELIHOOD_WEIGHT = 0.1
+
+
+def linear_part(made: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray) -> np.ndarray:
+    """The outputs of a window, fitted to the sums of some drives."""
+    return rows(fit(made, basis))
+
+
+def disturb(x: torch.Tensor) -> torch.Tensor:
+    """Adds a turn and a level to each window, which say nothing of the gyro's error."""
+    tilted = turn(x).clone()
+    tilted[..., :3] += TILT * torch.randn(len(x), 1, 3)
+    return tilted
+
+
+class Windows:
+    """All windows of some drives after the static phase, and what the linear part leaves of the gyro's error."""
+
+    def __init__(self, drives: list[Drive], outputs: np.ndarray):
+        linear = torch.from_numpy(outputs.reshape(WINDOW, -1)).float()
+        cut = lambda series: torch.from_numpy(np.ascontiguousarray(windows(series)[STATIC_SAMPLES:]))
+        self.x = torch.cat([cut(drive.features) for drive in drives])
+        self.left = torch.cat([cut(drive.gyro_error) for drive in drives]) - self.x.flatten(1) @ linear.T
+
+
+def train(drives: list[Drive], outputs: np.ndarray, units: int, epochs: int, seed: int, correct: bool) -> GyroNet:
+    """Trains a Bi-LSTM beside a linear part; with `correct` it adds to the correction, too."""
+    torch.manual_seed(seed)
+    data = Windows(drives, outputs)
+    features = np.concatenate([drive.features for drive in drives])
+    mean, std = (torch.from_numpy(of) for of in (features.mean(axis=0), features.std(axis=0)))
+    unit = window_error(outputs, drives)
+    model = GyroNet(mean, std, unit, units, torch.from_numpy(outputs.reshape(WINDOW, -1)))
+    with torch.no_grad():
+        model.fc.weight.zero_()
+        model.fc.bias.zero_()
+    trained = [value for name, value in model.named_parameters() if not name.startswith("linear")]
+    optimiser = torch.optim.Adam(trained, lr=LR)
+    steps = epochs * (len(data.x) // BATCH)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, LR, total_steps=steps)
+    for _ in range(epochs):
+        for batch in torch.randperm(len(data.x)).split(BATCH)[: len(data.x) // BATCH]:
+            x = data.x[batch]
+            # The linear part's output is the undisturbed window's: by construction neither turn nor level changes it.
+            correction, scale = model(disturb(x))
+            by_network = correction - model.linear(x.flatten(1)) if correct else torch.zeros_like(correction)
+            error = by_network - data.left[batch]
+            likelihood = (error.detach().mean(1).abs() / scale + torch.log(scale / unit)).mean()
+            loss = LIKELIHOOD_WEIGHT * likelihood + (error.abs().mean() / unit if correct else 0.0)
+            optimiser.zero_grad()
+            loss.backward()
+            if not correct:
+                model.fc.weight.grad[0] = 0.0
+                model.fc.bias.grad[0] = 0.0
+            optimiser.step()
+            schedule.step()
+    return model.eval()
+
+
+@torch.no_grad()
+def estimates(model: GyroNet, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
+    """Corrections (W, N) and scales (W,) of the windows HOP apart."""
+    x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::HOP]))
+    correction, scale = zip(*(model(part) for part in x.split(4096)))
+    return torch.cat(correction).numpy(), torch.cat(scale).numpy()
+
+
+def corrected_ratio(model: GyroNet, drive: Drive) -> float:
+    """The 1 s error over static initialisation's."""
+    corrections, _ = estimates(model, drive)
+    total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
+    for k in range(WINDOW):
+        samples = np.arange(len(corrections)) * HOP + k
+        np.add.at(total, samples, corrections[:, k])
+        np.add.at(count, samples, 1)
+    error = drive.gyro_error - total / np.maximum(count, 1)
+    return mean_1s_error(error) / mean_1s_error(drive.gyro_error)
+
+
+def log_loss(model: GyroNet | None, outputs: np.ndarray, drive: Drive, unit: float) -> float:
+    """The mean negative log likelihood of the windows' mean errors, in units of the training drives' mean error;
+    without a model, that of one scale for all."""
+    data = Windows([drive], outputs)
+    error = data.left.mean(1).abs().numpy()[::HOP] / unit
+    if model is None:
+        return float(error.mean())
+    scale = estimates(model, drive)[1][STATIC_SAMPLES // HOP :][: len(error)] / unit
+    return float((error[: len(scale)] / scale + np.log(scale)).mean())
+
+
+def report(drives: list[Drive], basis: np.ndarray, sizes: list[int], epochs: int, seed: int) -> dict:
+    """Each drive by the models of the others: mean and standard deviation of what each part gains."""
+    made = [sums(drive, basis) for drive in drives]
+    rows_of: dict[str, list[float]] = {}
+    add = lambda name, value: rows_of.setdefault(name, []).append(value)
+    for k, drive in enumerate(drives):
+        others = drives[:k] + drives[k + 1 :]
+        outputs = linear_part(made[:k] + made[k + 1 :], basis)
+        unit = window_error(outputs, others)
+        add("linear: ratio", ratio(outputs, drive))
+        add("one scale: log loss", log_loss(None, outputs, drive, unit))
+        for units in sizes:
+            model = train(others, outputs, units, epochs, seed, correct=False)
+            add(f"{units} units: log loss", log_loss(model, outputs, drive, unit))
+            model = train(others, outputs, units, epochs, seed, correct=True)
+            add(f"{units} units, correcting: ratio", corrected_ratio(model, drive))
+        print(f"{drive.name}: " + ", ".join(f"{name} {each[-1]:.3f}" for name, each in rows_of.items()), flush=True)
+    return {name: [round(statistics.mean(v), 4), round(statistics.stdev(v), 4)] for name, v in rows_of.items()}
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="gyronet_train.beside", description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of trialNN_100hz.csv drives")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
+    parser.add_argument("--stem", default="default", help="name of the files")
+    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
+    parser.add_argument("--units", type=int, default=4, help="of the Bi-LSTM that is written, a multiple of 4")
+    parser.add_argument("--parts", nargs="+", default=DIFFERENCES, choices=list(PARTS), help="of the linear part")
+    parser.add_argument("--correct", action="store_true", help="the Bi-LSTM adds to the correction, too")
+    parser.add_argument("--report", type=int, nargs="*", default=[4, 8, 16], metavar="UNITS", help="sizes to compare")
+    parser.add_argument("--epochs", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=1)
+    return parser.parse_args()
+
+
+def main() -> None:
+    args = arguments()
+    started = time.monotonic()
+    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in args.train]
+    basis = np.concatenate([PARTS[part] for part in args.parts])
+    found = report(drives, basis, args.report, args.epochs, args.seed) if args.report else {}
+    for name, (mean, deviation) in found.items():
+        print(f"{name}: {mean:.3f}, standard deviation over drives {deviation:.3f}")
+    outputs = linear_part([sums(drive, basis) for drive in drives], basis)
+    model = train(drives, outputs, args.units, args.epochs, args.seed, args.correct)
+    provenance = {
+        "network": "gyronet",
+        "parts": "linear differences, expected error by a Bi-LSTM",
+        "train": [drive.name for drive in drives],
+        "sha256": {drive.name: drive.sha256 for drive in drives},
+        "leave_one_out": found,
+        "units": args.units,
+        "epochs": args.epochs,
+        "seed": args.seed,
+        "torch": torch.__version__.split("+")[0],
+        "date": datetime.date.today().isoformat(),
+    }
+    args.out.mkdir(parents=True, exist_ok=True)
+    for path in export(model, provenance, args.out, args.stem):
+        print(path)
+    print(f"{time.monotonic() - started:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
