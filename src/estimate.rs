@@ -1,18 +1,18 @@
-//! An estimate is the corrected yaw rate with its quality. Every frame is made from these values alone.
+//! An estimate is the corrected yaw rate with its quality; every CAN frame is made from these values alone.
 
 use crate::health::{Faults, Quality, Source, Status};
 use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 
-/// The corrected yaw rate of one sample.
+/// Holds the corrected yaw rate of one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct YawEstimate {
     /// Grid step of the sample that the rate belongs to.
     pub tick: u32,
-    /// The corrected rate. It is the gyro's own rate in [`Status::Init`], and zero where there is none.
+    /// The corrected rate: the gyro's own reading in [`Status::Init`], zero in [`Status::Silent`].
     pub rate: AngularRate,
-    /// The part that was taken off the gyro less its static bias: the network's estimate, the bias found
-    /// by zero-rate updates, revisions of earlier samples.
+    /// The amount subtracted from the gyro beyond its static bias: the network's estimate, the bias found by zero-rate
+    /// updates, revisions of earlier samples.
     pub correction: AngularRate,
     /// The sum of all these rates since the bias became known, each over a step of the sensor's clock
     /// ([`crate::align::clock_ratio`]).
@@ -23,15 +23,15 @@ pub struct YawEstimate {
     pub status: Status,
     /// The origin of the rate.
     pub source: Source,
-    /// The worth of the rate to a receiver.
+    /// The quality of the rate for a receiver.
     pub quality: Quality,
-    /// Everything that is wrong at present.
+    /// The faults that hold at present.
     pub faults: Faults,
     /// The time from the sample to the message in microseconds, where it is known.
     pub latency_us: Option<u32>,
 }
 
-/// Everything that is sent for one sample of the inertial sensor.
+/// Holds everything that is sent for one sample of the inertial sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VehicleSample {

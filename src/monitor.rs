@@ -26,15 +26,16 @@ use crate::health::{MonitorCounters, count};
 use crate::sample::{ImuSample, PERIOD_US, Validity};
 use crate::units::Micros;
 
-/// The sensor is silent after this time without a sample: two samples are missing, and that is reported
-/// before the third one would come.
+/// The sensor counts as silent after this time without a sample, microseconds: two samples are missing, and the silence
+/// is reported before the third one would come.
 pub const TIMEOUT_US: u64 = 29_000;
-/// An MTi needs about a second after a start before it sends.
+/// The sensor counts as silent after this time since the start without a first sample, microseconds; an MTi needs about
+/// a second before it sends.
 pub const START_US: u64 = 2_000_000;
 /// Samples after saturation that are not used: 50 ms, in which the part's filter recovers.
 pub const HOLD: u8 = 5;
 
-/// The state of the sensor as its readings and their times show it.
+/// Judges each reading of the sensor, and reports silence and clock faults.
 #[derive(Debug, Clone)]
 pub struct SensorMonitor {
     repeats: stuck::Repeats,
@@ -46,13 +47,13 @@ pub struct SensorMonitor {
     heard: Option<Micros>,
     /// The time at which the next message set without a sample is due.
     due: Option<u64>,
-    /// The sensor's clock against the outside one, where that is the better one.
+    /// Compares the sensor's clock with the outside one, where the outside one is better.
     clock: Option<RatioEstimator>,
     counters: MonitorCounters,
 }
 
 impl SensorMonitor {
-    /// Begins before the first sample. With `clock` the sensor's clock is held against the outside one.
+    /// Begins before the first sample. With `clock`, the sensor's clock is compared with the outside one.
     #[must_use]
     pub const fn new(clock: Option<ClockRatioConfig>) -> Self {
         Self {
@@ -76,7 +77,7 @@ impl SensorMonitor {
         &self.counters
     }
 
-    /// Judges a sample. Each sample is judged once, in the order of their coming.
+    /// Judges a sample. Call it once for each sample, in order of arrival.
     pub fn judge(&mut self, sample: &ImuSample) -> Validity {
         let stuck = self.repeats.are_stuck(sample);
         let began = !core::mem::replace(&mut self.stuck, stuck) && stuck;
@@ -85,7 +86,7 @@ impl SensorMonitor {
         self.recovering = if saturated { HOLD + 1 } else { self.recovering.saturating_sub(1) };
         let recovering = !saturated && self.recovering > 0;
         count(&mut self.counters.held, u32::from(recovering));
-        // A reading from beyond the range is none to hold others against.
+        // A reading beyond the range is no reference for others.
         let implausible = !saturated && !recovering && self.jump.is_implausible(sample);
         count(&mut self.counters.wrong, u32::from(implausible));
         match (saturated, stuck, recovering, implausible) {
@@ -97,7 +98,7 @@ impl SensorMonitor {
         }
     }
 
-    /// Notes that a sample of `time` by the sensor's clock has come at `now` and was used.
+    /// Notes that a sample with time stamp `time` arrived at `now` and was used.
     pub fn heard(&mut self, time: Micros, now: Micros) {
         self.heard = Some(now);
         self.due = None;
@@ -108,19 +109,19 @@ impl SensorMonitor {
         }
     }
 
-    /// Returns the length of the steps of the sensor's clock, by the samples heard so far.
+    /// Returns the true length of a step of the sensor's clock, as the samples so far show it.
     #[must_use]
     pub fn clock_ratio(&self) -> ClockRatio {
         self.clock.as_ref().map_or(ClockRatio::ONE, RatioEstimator::ratio)
     }
 
-    /// Returns whether the sensor's clock is at fault, by the samples heard so far.
+    /// Returns whether the sensor's clock is at fault, as the samples so far show it.
     #[must_use]
     pub fn is_clock_off(&self) -> bool {
         self.clock.as_ref().is_some_and(RatioEstimator::fault)
     }
 
-    /// Notes that samples wait to be read: the sensor is not silent.
+    /// Notes that samples are waiting to be read, so the sensor is not silent.
     pub fn hold(&mut self, now: Micros) {
         self.heard = self.heard.and(Some(now));
     }
@@ -138,7 +139,7 @@ impl SensorMonitor {
         }
         let first = self.due.is_none();
         count(&mut self.counters.silences, u32::from(first));
-        // No catching up: a set that nobody had time for is of no use later.
+        // Missed message sets are not made up for: late, they are of no use.
         self.due = Some(now.0.saturating_add(PERIOD_US));
         Some(if first { TIMEOUT_US.div_ceil(PERIOD_US) as u32 } else { 1 })
     }

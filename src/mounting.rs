@@ -1,13 +1,12 @@
 //! A rotation turns the sensor's axes into the vehicle's: a configured one, and levelling at standstill. A gyro map
-//! then takes out what is left of mounting and gain in the rates, as a calibration of the unit found it.
+//! then corrects the remaining mounting and gain errors of the rates, as a calibration of the unit found them.
 //!
-//! Both are 3 x 3 matrices of Q30 numbers, applied in integers: the same bits everywhere.
+//! Both are 3 x 3 matrices of Q30 numbers, applied in integers, so that every machine computes the same bits.
 //!
-//! Levelling finds the vertical from the accelerometer. It cannot tell a tilted board from a
-//! tilted street: on the recordings the parking slopes of 2 to 8 degrees, taken for mounting,
-//! more than double the 1 s error of a drive (0.00021 to 0.00049 rad on trial 04 of the training
-//! drives). Hence [`Levelling::Beyond`]: a tilt that no street has is mounting, a smaller one is
-//! the street.
+//! Levelling finds the vertical from the accelerometer. It cannot tell a tilted board from a tilted street: on the
+//! recordings, taking the parking slopes of 2 to 8 degrees for mounting more than doubles the 1 s error of a drive
+//! (0.00021 to 0.00049 rad on trial 04 of the training drives). Hence [`Levelling::Beyond`]: a tilt steeper than any
+//! street counts as mounting, a smaller one as the street.
 
 use crate::sample::ImuSample;
 use crate::units::{AngularRate, STANDARD_GRAVITY, SpecificForce};
@@ -17,29 +16,29 @@ const Q: u32 = 30;
 const ONE: f32 = (1u32 << Q) as f32;
 /// The largest distance of a mean specific force from standard gravity, m/s^2.
 const GRAVITY_TOLERANCE: f32 = 1.0;
-/// Cosine of 150 degrees: beyond, which way to turn the board up is anyone's guess.
+/// Cosine of 150 degrees: beyond that tilt the direction in which to turn the board upright is too uncertain.
 const UPSIDE_DOWN: f32 = -0.866;
 
 /// The condition under which the accelerometer's tilt counts as the board's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Levelling {
-    /// Never: the mounting is known.
+    /// The tilt never counts: the mounting is known.
     Off,
-    /// Always: the vehicle starts on level ground.
+    /// The tilt always counts: the vehicle starts on level ground.
     Always,
     /// The tilt counts when it is larger than this, degrees.
     Beyond(f32),
 }
 
 impl Levelling {
-    /// No street is as steep as 15 degrees (27 %).
+    /// The tilt counts beyond 15 degrees (27 %), since no street is so steep.
     pub const DEFAULT: Self = Self::Beyond(15.0);
 
     /// Returns the rotation that levels a sensor with this mean specific force at rest.
     ///
     /// # Errors
-    /// [`LevelError`], where the accelerometer is asked.
+    /// [`LevelError`], unless levelling is off.
     pub fn rotation(self, rest: [SpecificForce; 3]) -> Result<Rotation, LevelError> {
         let least = match self {
             Self::Off => return Ok(Rotation::IDENTITY),
@@ -64,13 +63,13 @@ pub enum LevelError {
     UpsideDown(f32),
 }
 
-/// A rotation of the sensor's axes into the vehicle's (x forward, y left, z up).
+/// Rotates the sensor's axes into the vehicle's (x forward, y left, z up).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotation([[i32; 3]; 3]);
 
 impl Rotation {
-    /// The rotation that leaves every bit as it is.
+    /// This rotation leaves every bit as it is.
     pub const IDENTITY: Self = Self([[1 << Q, 0, 0], [0, 1 << Q, 0], [0, 0, 1 << Q]]);
 
     /// Makes the rotation of a board that is turned from the vehicle's axes by `yaw` about z, then by `pitch` about
@@ -151,7 +150,7 @@ impl Rotation {
     }
 
     fn from_elements(elements: [[f32; 3]; 3]) -> Self {
-        // Up to 1 in size, so at most 2^30.
+        // Elements are at most 1 in size, so at most 2^30.
         Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)))
     }
 
@@ -169,24 +168,24 @@ fn product(rows: &[[i32; 3]; 3], vector: [i32; 3]) -> [i32; 3] {
     })
 }
 
-/// A map of the gyro's three rates, in the vehicle's axes, to the true ones: gain and mounting of one unit.
+/// Maps the gyro's three rates, in the vehicle's axes, to the true ones: it corrects gain and mounting of one unit.
 ///
-/// Its matrix is close to the identity: within [`GyroMap::MAX_GAIN`] on the diagonal and [`GyroMap::MAX_CROSS`] beside
-/// it. More is a mounting that has to be configured.
+/// Its matrix is close to the identity: within [`GyroMap::MAX_GAIN`] on the diagonal and [`GyroMap::MAX_CROSS`] off it.
+/// A larger deviation is a mounting that has to be configured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GyroMap([[i32; 3]; 3]);
 
 impl GyroMap {
-    /// The map that leaves every bit as it is.
+    /// This map leaves every bit as it is.
     pub const IDENTITY: Self = Self(Rotation::IDENTITY.0);
-    /// Largest gain error of a unit.
+    /// The largest plausible gain error of a unit.
     pub const MAX_GAIN: f32 = 0.05;
-    /// Largest share of another axis: the sine of 8.6 degrees.
+    /// The largest plausible share of another axis: the sine of 8.6 degrees.
     pub const MAX_CROSS: f32 = 0.15;
 
-    /// Makes a map of a matrix, row by row; `None` where an element is further from the identity than any unit's.
+    /// Makes a map from a matrix, row by row; `None` if an element is not finite or too far from the identity.
     #[must_use]
     pub fn from_elements(elements: [[f32; 3]; 3]) -> Option<Self> {
         let map = Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)));
@@ -200,7 +199,7 @@ impl GyroMap {
         self.0.map(|row| row.map(|element| element as f32 / ONE))
     }
 
-    /// Returns whether every element is as near to the identity as that of a unit.
+    /// Returns whether every element is near enough to the identity for a real unit.
     #[must_use]
     pub fn is_plausible(&self) -> bool {
         let [gain, cross] = [Self::MAX_GAIN, Self::MAX_CROSS].map(|limit| (limit * ONE) as u32);
@@ -211,7 +210,7 @@ impl GyroMap {
         })
     }
 
-    /// Returns the true rates of what the gyro reads.
+    /// Returns the true rates for the gyro's readings.
     #[must_use]
     #[doc(hidden)]
     pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {

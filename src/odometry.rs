@@ -5,15 +5,14 @@
 //! middle of the step: the heading at its begin, as equation 4 has it, lags by half a step and
 //! shifts the path by v dt / 2 times the change of heading in every turn.
 //!
-//! [`Track`] is in f64, for hosts. [`Odometry`] is what a board runs: heading and position are
-//! integers and do not lose the small steps of a long drive; only sine and cosine are f32 (libm's,
-//! the same bits on every machine). Against [`Track`] its position is off by no more than
-//! [`Odometry::ERROR_PER_METRE`] of the way plus [`Odometry::ERROR_PER_STEP_M`] a step, and its
-//! heading by [`Odometry::HEADING_ERROR_PER_STEP_RAD`] a step.
+//! [`Track`] is in f64, for hosts. [`Odometry`] is what a board runs: heading and position are integers, so that the
+//! small steps of a long drive are not lost; only sine and cosine are f32 (libm's, the same bits on every machine).
+//! Against [`Track`] its position is off by no more than [`Odometry::ERROR_PER_METRE`] of the way plus
+//! [`Odometry::ERROR_PER_STEP_M`] a step, and its heading by [`Odometry::HEADING_ERROR_PER_STEP_RAD`] a step.
 
 use crate::units::{Angle, AngularRate, Length, WheelSpeed};
 
-/// Dead reckoning in f64: m and rad, x ahead and y to the left of heading 0.
+/// Computes a path by dead reckoning in f64: m and rad, x ahead and y to the left of heading 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Track {
     /// Position, m.
@@ -34,7 +33,7 @@ impl Track {
     }
 }
 
-/// Dead reckoning on a board, in integers: 2^-32 m and 2^-44 rad.
+/// Computes a path by dead reckoning in integers, for a board: steps of 2^-32 m and 2^-44 rad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Odometry {
@@ -44,16 +43,18 @@ pub struct Odometry {
     pub yaw: Angle,
 }
 
-/// A turn, in codes of [`Angle`]: 2 pi x 2^44, rounded.
+/// A full turn in codes of [`Angle`] is 2 pi x 2^44, rounded.
 const TURN: i64 = 110_534_964_875_444;
 
 impl Odometry {
-    /// The error per metre of the way, m: an f32 holds an angle within pi to 1.2e-7 rad and its sine to 6e-8, in
-    /// each of two axes; the heading adds 2e-7 in ten hours of 100 steps a second.
+    /// The position error grows by at most this per metre of the way, m: an f32 holds an angle within pi to 1.2e-7 rad
+    /// and its sine to 6e-8, in each of two axes; the heading adds 2e-7 in ten hours of 100 steps a second.
     pub const ERROR_PER_METRE: f64 = 5e-7;
-    /// Half a code of [`Length`], 1.2e-10 m: of the way, and in each axis.
+    /// The position error grows by at most this per step, m: rounding costs half a code of [`Length`], 1.2e-10 m, of
+    /// the way and in each axis.
     pub const ERROR_PER_STEP_M: f64 = 3e-10;
-    /// Rounding of an angle: half a code of [`Angle`], and as much of half of it.
+    /// The heading error grows by at most this per step, rad: half a code of [`Angle`] for the turn and half a code for
+    /// its half.
     pub const HEADING_ERROR_PER_STEP_RAD: f64 = 6e-14;
 
     /// Takes one step of `span` microseconds at these speeds of the left and the right wheel and this corrected yaw
@@ -81,16 +82,16 @@ impl Odometry {
     }
 }
 
-/// Rounds to the nearest code; a value that is longer than any step stays at the limit.
+/// Rounds to the nearest code; a value beyond the range saturates.
 fn rounded(code_micros: i128) -> i64 {
     let half = 500_000 * code_micros.signum();
     let code = (code_micros + half) / 1_000_000;
     code.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64
 }
 
-/// Returns a part of the way, as exact as the factor.
+/// Returns the way times a factor, as exact as the factor.
 fn along(way: Length, part: f32) -> i64 {
-    // Exact from 2^-6 on, and to 1e-9 below.
+    // The factor is exact from 2^-6 on, and to 1e-9 below.
     const BITS: u32 = 30;
     let part = (part * (1u32 << BITS) as f32) as i128;
     ((i128::from(way.0) * part + (1 << (BITS - 1))) >> BITS) as i64

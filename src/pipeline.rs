@@ -4,10 +4,10 @@
 //! updates, report) and nothing else. The stages do not import each other; they share the types of samples,
 //! windows and units. No clock is read: the samples' own time stamps drive everything.
 //!
-//! The network runs beside the samples, not inside their turn: [`Output::window`] is a window that is due,
-//! whoever has time runs it, and [`Pipeline::deliver`] takes its estimate. The estimate is used exactly
-//! [`crate::compensate::Mode::delay`] samples after the window's newest one, so fast and slow machines send
-//! the same frames.
+//! The network runs beside the samples, not inside their turn: [`Output::window`] is a window that is due, the caller
+//! runs it when it has time, and [`Pipeline::deliver`] takes its estimate. The estimate is used exactly
+//! [`crate::compensate::Mode::delay`] samples after the window's newest one, so fast and slow machines send the same
+//! frames.
 
 mod config;
 mod initialised;
@@ -36,14 +36,14 @@ use initialised::Initialised;
 use wheels::Wheels;
 use windows::Windows;
 
-/// The way from samples to corrected rates for one vehicle.
+/// Turns the samples of one vehicle's sensor into corrected rates.
 #[derive(Debug, Clone)]
 pub struct Pipeline {
     config: PipelineConfig,
     state: State,
 }
 
-/// Everything that changes from sample to sample.
+/// Holds everything that changes from sample to sample.
 #[derive(Debug, Clone)]
 struct State {
     aligner: Aligner,
@@ -53,16 +53,16 @@ struct State {
     compensator: Compensator,
     uncertainty: Uncertainty,
     wheels: Wheels,
-    /// Samples for which the vehicle has stood.
+    /// Samples for which the vehicle has stood; zero while it moves.
     stood: u32,
     /// The sums of the rates that went out.
     prompt_yaw: Yaw,
     navigation_yaw: Yaw,
-    /// The length of the steps by which both are summed.
+    /// True length of a sensor clock step, by which both rates are summed.
     clock_ratio: ClockRatio,
     /// Grid step of the newest message set.
     tick: u32,
-    /// Samples for which a gap is still less than a whole window away.
+    /// Samples until the last gap is a whole window back.
     gap_within: u32,
     /// The newest sample as the networks see it.
     inertial: Option<Features>,
@@ -111,7 +111,7 @@ impl Pipeline {
         self.config = config;
     }
 
-    /// Takes one sample of the inertial sensor, whose validity has been judged ([`crate::monitor`]).
+    /// Corrects one sample of the inertial sensor; its validity must have been judged ([`crate::monitor`]).
     ///
     /// # Errors
     /// [`AlignError`] when its time stamp has no place on the grid; it is counted and not used. Unless it was
@@ -143,8 +143,8 @@ impl Pipeline {
         Ok(Output { vehicle, settled: rates.settled, window, refused, implausible })
     }
 
-    /// Takes what is known of the wheels, from [`crate::can::wheel::WheelReceiver`]. Call it before each
-    /// sample where wheel speeds are configured, since the wheels' silence is found here too.
+    /// Takes the newest wheel report of [`crate::can::wheel::WheelReceiver`]. Call it before each sample where wheel
+    /// speeds are configured, since the wheels' silence is found here too.
     pub fn wheels(&mut self, wheels: WheelSample) {
         self.state.wheels.update(wheels);
     }
@@ -159,9 +159,9 @@ impl Pipeline {
         self.state.clock_ratio = ratio;
     }
 
-    /// Takes the estimate of a window that [`Output::window`] announced. Returns whether it will be used: an
-    /// estimate for no window, or one that comes too late or twice, is not. A window without an
-    /// estimate is counted when its turn has passed.
+    /// Takes the estimate of a window that [`Output::window`] announced. Returns whether it will be used: it will not
+    /// if no window waits for it, or if it comes too late or twice. A window without an estimate is counted when its
+    /// turn has passed.
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
         self.state.windows.deliver(end, estimate)
     }
@@ -185,7 +185,7 @@ impl Pipeline {
         &self.state.counters
     }
 
-    /// Returns what the sums of the rates would lack if the drive were over now.
+    /// Returns the corrections that the summed rates do not contain yet.
     #[must_use]
     pub fn owed(&self) -> Owed {
         Owed {
@@ -200,13 +200,13 @@ impl Pipeline {
         self.state.initialised.as_ref().map(|known| known.zero.bias())
     }
 
-    /// Returns the bias that the zero-rate updates take off beside it.
+    /// Returns the residual bias that the zero-rate updates have found beyond the static one.
     #[must_use]
     pub fn bias(&self) -> AngularRate {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
     }
 
-    /// Returns the tilt that levelling took out, once known.
+    /// Returns the rotation that levelling applies, once known.
     #[must_use]
     pub fn levelling(&self) -> Option<Rotation> {
         self.state.initialised.as_ref().map(|known| known.levelling)
@@ -247,7 +247,7 @@ impl Pipeline {
         }
     }
 
-    /// Uses the estimate whose turn it is.
+    /// Applies the estimate that is due at this tick; counts one that has not come in time.
     fn use_estimate(&mut self, tick: u32) -> Option<Implausible> {
         let State { windows, compensator, uncertainty, counters, .. } = &mut self.state;
         let Some(estimate) = windows.take_estimate(tick, self.config.compensate.mode.delay())? else {

@@ -1,12 +1,11 @@
-//! Square roots for sigmas and gates.
+//! This module computes square roots for sigmas and gates, where a relative error of 2e-6 does not matter.
 //!
-//! micromath's estimate is up to 6 % off; two steps of Newton's method leave 2e-6. That is as
-//! good as a correctly rounded root where a sigma is formed or a force is compared with gravity, and a fraction of its
-//! code.
+//! micromath's estimate is up to 6 % off; two steps of Newton's method leave 2e-6. That is enough where a sigma is
+//! formed or a force is compared with gravity, and takes a fraction of the code of a correctly rounded root.
 
 use micromath::F32Ext;
 
-/// Returns the square root, to 2e-6 of it; zero for what is below zero.
+/// Returns the square root within 2e-6 of it; zero for negative values.
 // Inlined it would cost more flash than libm's.
 #[inline(never)]
 pub(crate) fn sqrt(value: f32) -> f32 {

@@ -1,16 +1,16 @@
-//! A sample is what a sensor delivers; a frame is a sample on the grid.
+//! A sample is one reading of a sensor; a frame is a sample with its place on the 100 Hz grid.
 
 pub use crate::units::RATE_HZ;
 use crate::units::{Angle, AngularRate, CentiCelsius, Micros, SpecificForce, WheelSpeed};
 
-/// One step of the grid, microseconds.
+/// The grid's step is 10 ms, in microseconds.
 pub const PERIOD_US: u64 = 1_000_000 / RATE_HZ as u64;
 
-/// One reading of an inertial measurement unit: x forward, y left, z up (FLU).
+/// Holds one reading of an inertial measurement unit: x forward, y left, z up (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImuSample {
-    /// The time at which the part took it, by the part's own clock, unwrapped.
+    /// Time of the reading by the part's own clock, unwrapped.
     pub time: Micros,
     /// Specific force x, y, z.
     pub specific_force: [SpecificForce; 3],
@@ -23,7 +23,7 @@ pub struct ImuSample {
     pub validity: Validity,
 }
 
-/// The validity of a reading.
+/// Says whether a reading can be used, and if not, why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {
@@ -32,7 +32,7 @@ pub enum Validity {
     Good,
     /// The part reports that one of its axes is saturated.
     Saturated,
-    /// The part was saturated less than 50 ms ago: its filter recovers.
+    /// The part was saturated less than 50 ms ago, and its filter is still recovering.
     Recovering,
     /// The readings repeat themselves: the part is stuck.
     Stuck,
@@ -41,7 +41,7 @@ pub enum Validity {
 }
 
 impl Validity {
-    /// Returns what a part reports of its own reading.
+    /// Returns the validity that a part reports for its own reading.
     #[must_use]
     pub const fn reported(saturated: bool) -> Self {
         if saturated { Self::Saturated } else { Self::Good }
@@ -54,24 +54,24 @@ impl Validity {
     }
 }
 
-/// The turn of a fibre-optic gyro since its message before: x forward, y left, z up (FLU).
+/// Holds the angle through which a fibre-optic gyro has turned since its previous message: x forward, y left, z up
+/// (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogSample {
     /// The time at which the increment ended, by the part's own clock, unwrapped.
     pub time: Micros,
-    /// The time that it lasted, microseconds.
+    /// Duration of the increment, microseconds.
     pub span: u32,
-    /// Messages missing between the one before and this one; what was turned meanwhile is lost.
+    /// Messages missing before this one; the angle turned in them is lost.
     pub lost: u32,
-    /// Angle turned about x, y, z; `None` where the part says that it is not good, or has no
-    /// such axis.
+    /// Angle turned about x, y, z; `None` where the part marks it invalid or has no such axis.
     pub increment: [Option<Angle>; 3],
     /// Temperature of the part, where it gives one.
     pub temperature: Option<CentiCelsius>,
 }
 
-/// A sample that has found its place on the 100 Hz grid.
+/// Holds a sample with its place on the 100 Hz grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame {
@@ -83,23 +83,23 @@ pub struct Frame {
     pub sample: ImuSample,
 }
 
-/// Wheels of a vehicle: front left, front right, rear left, rear right.
+/// A vehicle has this many wheels, in the order front left, front right, rear left, rear right.
 pub const WHEELS: usize = 4;
 
-/// The standstill of the vehicle as its wheels show it.
+/// Says whether the vehicle stands, as its wheels show it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Standstill {
     /// Standstill is not known: wheels are silent, or have only just become slow.
     #[default]
     Unknown,
-    /// They turn.
+    /// The wheels turn.
     Moving,
-    /// All of them have stood still for long enough.
+    /// All wheels have stood still for long enough.
     Still,
 }
 
-/// The newest speeds of the wheels, and whether they stand.
+/// Holds the newest speeds of the wheels, and whether they stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSample {

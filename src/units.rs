@@ -1,13 +1,13 @@
-//! The integer pipeline uses these fixed-point physical quantities.
+//! These types are the fixed-point physical quantities of the integer pipeline.
 //!
-//! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a
-//! host and a microcontroller agree to the last bit. One newtype per quantity; the raw code
-//! and the scaled reading are different methods.
+//! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a host and a microcontroller
+//! agree to the last bit. Each quantity is a type of its own around its integer code; conversions from and to physical
+//! units are explicit.
 
 /// Rate of the common grid that the networks see, Hz.
 pub const RATE_HZ: u32 = 100;
 
-/// Standard gravity, m/s^2 in a g: parts that measure in g mean this one.
+/// Standard gravity converts the readings of parts that measure in g, m/s^2.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
 /// The reason why a reading does not fit the fixed-point format.
@@ -81,8 +81,7 @@ impl SpecificForce {
 
 /// Angle turned, signed 64 bit, LSB 2^-44 rad (3.3e-12 deg), range +-524,288 rad.
 ///
-/// So fine that the rounding of 1000 increments a second, all the same way, stays below
-/// 6e-6 deg/h.
+/// This is so fine that rounding 1000 increments a second, always in the same direction, stays below 6e-6 deg/h.
 #[derive(Debug, Clone, Copy, PartialEq, Hash, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Angle(pub i64);
@@ -95,7 +94,7 @@ impl Angle {
     /// The angle of no turn.
     pub const ZERO: Self = Self(0);
 
-    /// Returns the nearest code to an angle in rad; exact from 2^-20 rad on.
+    /// Returns the nearest code to an angle in rad; the conversion is exact from 2^-20 rad on.
     ///
     /// # Errors
     /// [`RangeError`] when the angle is not finite or not inside +-524,288 rad.
@@ -135,7 +134,7 @@ impl Yaw {
 
 /// Length, signed 64 bit, LSB 2^-32 m (0.23 nm), range +-2,147,483 km.
 ///
-/// So fine that a hundred roundings a second, all the same way, are 42 um an hour.
+/// This is so fine that a hundred roundings a second, always in the same direction, add up to 42 um an hour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Length(pub i64);
@@ -180,7 +179,7 @@ pub struct CentiCelsius(pub i16);
 pub struct Micros(pub u64);
 
 impl Micros {
-    /// Returns the instant that is later by a duration, the end of time at most.
+    /// Returns the instant that is later by a duration; it saturates at the largest one.
     #[must_use]
     pub const fn after(self, span: Duration) -> Self {
         Self(self.0.saturating_add(span.0))

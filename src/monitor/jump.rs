@@ -1,27 +1,27 @@
-//! This module finds readings that no vehicle can have.
+//! This module finds readings that no vehicle can produce.
 //!
-//! A part without a checksum, or with a short one, delivers a wrong bit as a reading. The largest
-//! steps from one sample to the next on the six drives of training and validation are 0.46 rad/s
-//! and 10.9 m/s^2.
+//! A part without a checksum, or with a short one, passes a flipped bit on as a reading. A limit on the step between
+//! samples finds it, because a vehicle moves far less in 10 ms: the largest steps from one sample to the next on the
+//! six drives of training and validation are 0.46 rad/s and 10.9 m/s^2.
 
 use crate::sample::ImuSample;
 use crate::units::{AngularRate, SpecificForce};
 
-/// Largest step of a gyro axis in 10 ms: 1 rad/s.
+/// The largest believable step of a gyro axis in 10 ms is 1 rad/s.
 pub const JUMP_RATE: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
-/// Largest step of an accelerometer axis in 10 ms: 30 m/s^2.
+/// The largest believable step of an accelerometer axis in 10 ms is 30 m/s^2.
 pub const JUMP_FORCE: SpecificForce = SpecificForce(30 << 20);
-/// Readings in a row that are rejected; the next one is accepted, wherever it is.
+/// At most this many readings in a row are rejected; the next one is accepted whatever its value.
 pub const JUMP_PATIENCE: u8 = 3;
-/// Greatest age of the last good reading for a comparison, microseconds.
+/// A last good reading older than this is not compared with, microseconds.
 const OLD_US: u32 = 50_000;
 
-/// The last reading that was accepted.
+/// Compares each reading with the last accepted one.
 #[derive(Debug, Clone)]
 pub(super) struct Jump {
     angular_rate: [AngularRate; 3],
     specific_force: [SpecificForce; 3],
-    /// Its time, modulo 2^32.
+    /// Time of the last accepted reading, microseconds modulo 2^32.
     at: u32,
     known: bool,
     /// Readings in a row that were rejected.

@@ -1,39 +1,39 @@
-//! This module finds readings that repeat themselves.
+//! This module finds readings that repeat themselves: a working part has noise, a stuck one has none.
 
 use crate::sample::ImuSample;
 
-/// Samples in a row, equal to the one before in all axes of the gyro, or of the accelerometer, or in
-/// one axis that hardly ever repeats itself, after which the part is stuck.
+/// The part counts as stuck after this many samples in a row that equal the one before: in all axes of the gyro, in all
+/// of the accelerometer, or in one axis that hardly ever repeats itself.
 ///
 /// Noise of half a bit lets an axis repeat nearly every second reading at rest; that three axes
 /// do so seven times in a row takes two days even then, and months where an axis repeats one
 /// reading in thirty. No navigation rate of these samples has gone out yet.
 pub const STUCK_AFTER: u8 = 7;
-/// The same for one axis alone that often repeats itself.
+/// An axis that often repeats itself counts as stuck after this many equal samples in a row.
 pub const AXIS_STUCK_AFTER: u8 = 30;
 
-/// Accelerometer x, y, z, gyro x, y, z.
+/// The axes are accelerometer x, y, z, then gyro x, y, z.
 const AXES: usize = 6;
 /// Samples over which the frequency of repetitions is averaged, as a power of two.
 const AVERAGE: u32 = 8;
 const ALWAYS: u16 = 1 << 15;
-/// An axis that repeats itself less often than this, [`STUCK_AFTER`] times in a row included, has
-/// noise enough.
+/// An axis whose share of repetitions is below this normally has enough noise; the share includes the last
+/// [`STUCK_AFTER`] samples.
 const SELDOM: u16 = ALWAYS / 16;
 
-/// The repetitions of each axis.
+/// Counts how often each axis repeats itself.
 #[derive(Debug, Clone)]
 pub(super) struct Repeats {
     last: Option<[i32; AXES]>,
     /// Samples in a row that were equal to the one before.
     equal: [u8; AXES],
-    /// The share of such samples, [`ALWAYS`] for all.
+    /// Running share of repeated samples; [`ALWAYS`] stands for all of them.
     repeats: [u16; AXES],
     stuck: [bool; AXES],
 }
 
 impl Repeats {
-    /// Begins with nothing known of the part: it may be a coarse one.
+    /// Begins with every axis taken for a coarse one that often repeats itself.
     pub const fn new() -> Self {
         Self { last: None, equal: [0; AXES], repeats: [ALWAYS; AXES], stuck: [false; AXES] }
     }

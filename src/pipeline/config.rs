@@ -1,28 +1,28 @@
-//! The configuration holds everything that can be set about the pipeline.
+//! The pipeline's configuration is a plain value apart from the pipeline's state; it holds everything that can be set.
 
 use crate::bias::{EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::uncertainty::UncertaintyConfig;
 
-/// Everything that can be set about the way from sample to rate.
+/// Holds all settings of the way from sample to rate.
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineConfig {
     /// The rotation of the board in the vehicle.
     pub mounting: Rotation,
     /// The gain and the rest of the mounting of this unit's gyro.
     pub gyro_map: GyroMap,
-    /// The condition under which the accelerometer corrects that.
+    /// The condition under which the accelerometer corrects the mounting.
     pub levelling: Levelling,
     /// Limits of static initialisation.
     pub static_init: StaticConfig,
     /// The treatment of the Earth's rotation.
     pub earth_rate: EarthRate,
-    /// Zero-rate updates; without them static initialisation is all.
+    /// Zero-rate updates; `None` leaves the bias as static initialisation found it.
     pub zero_rate: Option<ZeroRateConfig>,
-    /// Standing still without wheels.
+    /// Limits by which standstill is recognised without wheels.
     pub quiet: QuietConfig,
-    /// The way from estimates to rates.
+    /// Settings of the compensation, which applies the estimates to the rates.
     pub compensate: CompensateConfig,
     /// The model of a rate's expected error.
     pub uncertainty: UncertaintyConfig,

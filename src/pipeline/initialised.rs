@@ -6,7 +6,7 @@ use crate::health::count;
 use crate::mounting::Rotation;
 use crate::sample::{Frame, ImuSample, Standstill};
 
-/// Everything that static initialisation has found.
+/// Holds the results of static initialisation, and the detectors that start from them.
 #[derive(Debug, Clone)]
 pub(super) struct Initialised {
     /// The rotation beyond the configured mounting.
@@ -17,14 +17,14 @@ pub(super) struct Initialised {
 }
 
 impl Pipeline {
-    /// Levels a sample and returns what the gyro reads at rest; `None` before that is known.
+    /// Levels a sample and returns the gyro's reading at rest; does nothing and returns `None` before initialisation.
     pub(super) fn level(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
         let known = self.state.initialised.as_ref()?;
         *sample = known.levelling.sample(sample);
         Some(known.zero)
     }
 
-    /// Takes a sample into static initialisation, and returns the reason if that is refused with it.
+    /// Adds a sample to static initialisation; returns the reason if this sample makes it fail.
     #[inline(never)]
     pub(super) fn initialise(&mut self, frame: &Frame) -> Option<StaticError> {
         let judged = if self.state.wheels.standstill() == Some(Standstill::Moving) {

@@ -1,4 +1,4 @@
-//! These types are the results of one sample.
+//! These types hold what one sample gives: the rates to send, and the window to run.
 
 use crate::bias::StaticError;
 use crate::compensate::{Implausible, Settled};
@@ -6,37 +6,37 @@ use crate::estimate::VehicleSample;
 use crate::model::window::{Features, WINDOW};
 use crate::units::Yaw;
 
-/// The part that [`crate::estimate::YawEstimate::yaw`] lacks to be the sum of the best estimates.
+/// Holds the corrections that [`crate::estimate::YawEstimate::yaw`] does not contain yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Owed {
-    /// The part that the prompt rates lack: revisions that are not carried yet.
+    /// Missing from the prompt yaw: revisions that have not been carried over yet.
     pub prompt: Yaw,
-    /// The part that the navigation rates lack: those, and the samples that wait for their turn.
+    /// Missing from the navigation yaw: such revisions, and the samples whose rates are not sent yet.
     pub navigation: Yaw,
 }
 
-/// A window that is due, oldest sample first, and the tick of its newest one.
+/// Holds a window that is due for the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DueWindow {
     /// Tick of the newest sample.
     pub end: u32,
-    /// The samples.
+    /// Features of the samples, oldest first.
     pub features: [Features; WINDOW],
 }
 
-/// The results of one sample.
+/// Holds the results of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Output {
-    /// Both rates, and all else that is sent, for [`crate::can::encoder::CanEncoder`].
+    /// Both rates and everything else that is sent, for [`crate::can::encoder::CanEncoder`].
     pub vehicle: VehicleSample,
     /// The sample whose estimate is final with this one.
     pub settled: Option<Settled>,
-    /// A window that is due: run it through the network and [`super::Pipeline::deliver`] the estimate before
-    /// the sample [`crate::compensate::Mode::delay`] steps on.
+    /// A window that is due: run it through the network and [`super::Pipeline::deliver`] the estimate before the sample
+    /// [`crate::compensate::Mode::delay`] steps later.
     pub window: Option<DueWindow>,
-    /// Static initialisation was refused with this sample; it has started again.
+    /// The reason why static initialisation failed with this sample and started again.
     pub refused: Option<StaticError>,
-    /// The estimate due with this sample was rejected.
+    /// The reason why the estimate due with this sample was rejected.
     pub implausible: Option<Implausible>,
 }

@@ -36,8 +36,8 @@ impl Pipeline {
         }
     }
 
-    /// Makes the message set without a sample, `steps` grid steps after the last one: no rate, no force, and
-    /// the yaw that is known.
+    /// Makes the message set of a silent sensor, `steps` grid steps after the last one: no rate, no force, and the yaw
+    /// as it stands.
     #[must_use]
     pub fn silent(&mut self, steps: u32) -> VehicleSample {
         self.state.tick = self.state.tick.wrapping_add(steps);
@@ -61,7 +61,7 @@ impl Pipeline {
         }
     }
 
-    /// Returns everything that is wrong with this sample.
+    /// Returns the faults that hold for this sample.
     fn faults(&self, sample: &ImuSample) -> Faults {
         let contradicted = self.zero_rate().is_some_and(ZeroRate::contradicted);
         self.state
@@ -74,7 +74,7 @@ impl Pipeline {
             .with(self.state.board.faults())
     }
 
-    /// Makes the estimate of one rate; the gyro as it is before there is one.
+    /// Makes the estimate of one rate; until a rate exists it carries the gyro's own reading.
     fn estimate(
         &mut self,
         frame: &Frame,

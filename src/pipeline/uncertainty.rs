@@ -1,13 +1,13 @@
 //! This module computes the expected error of a corrected rate.
 //!
-//! The number sent with each rate is the expected error of the mean rate over one second, 1
-//! sigma: over a single sample vibration is all there is, and nobody turns a car in 10 ms. Its
-//! parts are taken for independent: the network's, from what it expects of its own windows
-//! ([`crate::model::Estimate::scale`]), and the bias', from the zero-rate updates.
+//! The number sent with each rate is the expected error of the mean rate over one second, 1 sigma: over a single sample
+//! vibration outweighs every other error, and no car changes its heading much in 10 ms. Its two parts are taken as
+//! independent: the network's, from the error that it predicts for its windows ([`crate::model::Estimate::scale`]), and
+//! the bias's, from the zero-rate updates.
 
 use crate::units::AngularRate;
 
-/// The factors from the network's own expectation to the error over a second.
+/// Holds the factors that turn the network's predicted error into the error over a second.
 #[derive(Debug, Clone, Copy)]
 pub struct UncertaintyConfig {
     /// Sigma of a second's error over the RMS of the scales of its windows.
@@ -17,14 +17,14 @@ pub struct UncertaintyConfig {
 }
 
 impl UncertaintyConfig {
-    /// Calibrated on the validation drive alone (`cargo gyronet evaluate --ablation`).
+    /// These factors were calibrated on the validation drive alone (`cargo gyronet evaluate --ablation`).
     pub const DEFAULT: Self = Self { per_scale: 0.25, uncorrected: 2.5e-4 };
 }
 
-/// Windows over which the network's expectation is averaged: about a second at the default hop.
+/// The network's predicted error is averaged over this many windows: about a second at the default hop.
 const WINDOWS: f32 = 20.0;
 
-/// The present expectation.
+/// Tracks the expected error of the corrected rate.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
     config: UncertaintyConfig,
@@ -39,7 +39,7 @@ impl Uncertainty {
         Self { config, scale_square: None }
     }
 
-    /// Takes what a window expects of itself.
+    /// Takes the error that the network predicts for a window.
     pub fn window(&mut self, scale: AngularRate) {
         let scale = scale.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         let square = scale * scale;
@@ -47,8 +47,8 @@ impl Uncertainty {
         self.scale_square = Some(before + (square - before) / WINDOWS);
     }
 
-    /// Returns the sigma of a rate that the network has `corrected` or not, with a bias of this uncertainty, rad/s;
-    /// it is rounded up.
+    /// Returns the sigma of a rate, rounded up, from the `bias` sigma in rad/s; a rate not `corrected` by the network
+    /// has the fixed one.
     #[must_use]
     pub fn sigma(&self, corrected: bool, bias: f32) -> AngularRate {
         let UncertaintyConfig { per_scale, uncorrected } = self.config;

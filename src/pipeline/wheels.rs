@@ -2,7 +2,7 @@
 
 use crate::sample::{Standstill, WHEELS, WheelSample};
 
-/// The newest report of the wheels.
+/// Holds the newest report of the wheels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wheels {
     newest: Option<WheelSample>,
@@ -11,7 +11,7 @@ pub(super) struct Wheels {
 }
 
 impl Wheels {
-    /// Nothing known of the wheels.
+    /// Starts before the first report.
     pub const START: Self = Self { newest: None, seen: [false; WHEELS] };
 
     /// Takes a report.
@@ -22,12 +22,12 @@ impl Wheels {
         self.newest = Some(wheels);
     }
 
-    /// Returns whether the vehicle stands; `None` where there are no wheels.
+    /// Returns the standstill that the wheels show; `None` before their first report.
     pub fn standstill(&self) -> Option<Standstill> {
         self.newest.map(|wheels| wheels.standstill)
     }
 
-    /// Returns whether a wheel that has had a speed has none now, or none has ever had one.
+    /// Returns whether a wheel has lost its speed, or no wheel has one.
     pub fn are_silent(&self) -> bool {
         let Some(WheelSample { speeds, .. }) = self.newest else { return false };
         let lost = |(speed, seen): (&Option<_>, bool)| seen && speed.is_none();

@@ -1,25 +1,25 @@
-//! This module holds GyroNet's windows: the samples of the next one, the one that is out, and the use of the newest
-//! estimate.
+//! This module tracks GyroNet's windows: the samples of the next one, the one handed out, and whether the newest
+//! estimate is in use.
 
 use super::DueWindow;
 use crate::health::Faults;
 use crate::model::Estimate;
 use crate::model::window::{Features, Window};
 
-/// The samples of the next window and the state of the last one.
+/// Holds the samples of the next window and the state of the last one.
 #[derive(Debug, Clone)]
 pub(super) struct Windows {
     window: Window,
     /// Samples since the last window.
     since: u32,
-    /// Tick of the window that is out, and its estimate when it has been delivered.
+    /// Tick of the window that has been handed out, and its estimate once delivered.
     out: Option<(u32, Option<Estimate>)>,
     accepted: bool,
     faults: Faults,
 }
 
 impl Windows {
-    /// No sample, and no window out.
+    /// Starts without a sample and without a window handed out.
     pub const START: Self =
         Self { window: Window::EMPTY, since: 0, out: None, accepted: false, faults: Faults::NONE };
 
@@ -29,13 +29,13 @@ impl Windows {
         self.since += 1;
     }
 
-    /// Drops samples, the window that is out and its estimate.
+    /// Drops the samples, the window handed out and its estimate.
     pub fn break_off(&mut self) {
         *self = Self::START;
     }
 
-    /// Returns the window that ends with this tick, if it is full, `hop` samples after the last one, and no
-    /// other is out.
+    /// Returns the window that ends with this tick, if it is full, at least `hop` samples after the last one, and no
+    /// other is handed out.
     #[inline(never)]
     pub fn due(&mut self, tick: u32, hop: u32) -> Option<DueWindow> {
         if self.since < hop || self.out.is_some() {
@@ -47,7 +47,7 @@ impl Windows {
         Some(DueWindow { end: tick, features })
     }
 
-    /// Takes the estimate of the window that is out; false where none waits for this one.
+    /// Takes the estimate of the window handed out; returns false if `end` names no window that waits for one.
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
         match &mut self.out {
             Some((due, slot @ None)) if *due == end => {
@@ -58,7 +58,7 @@ impl Windows {
         }
     }
 
-    /// Returns the estimate that is to be used with this tick: `Some(None)` where it has not come in time.
+    /// Returns the estimate that is due at this tick: `Some(None)` if it has not come in time, `None` if none is due.
     pub fn take_estimate(&mut self, tick: u32, delay: u32) -> Option<Option<Estimate>> {
         let (_, estimate) = self.out.take_if(|(end, _)| tick.wrapping_sub(*end) >= delay)?;
         Some(estimate)
@@ -69,7 +69,7 @@ impl Windows {
         (self.accepted, self.faults) = (true, Faults::NONE);
     }
 
-    /// Notes that the newest estimate is not in use.
+    /// Notes that the newest estimate was rejected or late.
     pub fn reject(&mut self, fault: Faults) {
         (self.accepted, self.faults) = (false, fault);
     }
