@@ -1,4 +1,5 @@
-//! These modules are the networks of the paper, with their topology, on top of [`crate::nn`].
+//! These modules hold the networks of the paper: their topology and weight files, on top of the arithmetic of
+//! [`crate::nn`].
 
 #[doc(hidden)]
 pub mod background;
@@ -34,25 +35,25 @@ use crate::units::AngularRate;
 /// Holds estimates of the yaw gyro's error, one for each sample of a window, oldest first.
 pub type Corrections = [AngularRate; WINDOW];
 
-/// The smallest [`Estimate::scale`]: 2^-20 rad/s (0.2 deg/h), far below what a window can tell.
+/// The smallest [`Estimate::scale`]: 2^-20 rad/s (0.2 deg/h), far below what a window can resolve.
 pub const SCALE_MIN: AngularRate = AngularRate(1 << 7);
 /// The largest [`Estimate::scale`]: 1 rad/s, which says that the estimate is worth nothing.
 pub const SCALE_MAX: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
 
-/// Whatever turns a window into corrections: the integer network, the f32 reference.
+/// Turns a window into corrections; the integer network and the f32 reference implement it.
 pub trait WindowNetwork {
     /// Runs the network over one window.
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate;
 }
 
-/// The result of a window: the gyro's error in each sample, and its expected error.
+/// Holds the result of a window: the gyro's error in each sample, and the expected error of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
     /// The corrections.
     pub corrections: Corrections,
-    /// Scale of the Laplace error that the mean of the window's corrected rates has: the
-    /// absolute error to expect of it. Between [`SCALE_MIN`] and [`SCALE_MAX`].
+    /// The expected absolute error of the mean of the window's corrected rates, as the scale of a Laplace distribution,
+    /// between [`SCALE_MIN`] and [`SCALE_MAX`].
     pub scale: AngularRate,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
@@ -61,7 +62,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// No correction, and nothing known of its error.
+    /// This estimate makes no correction and claims nothing about its error.
     pub const NONE: Self = Self {
         corrections: [AngularRate::ZERO; window::WINDOW],
         scale: SCALE_MAX,
@@ -70,14 +71,14 @@ impl Estimate {
     };
 }
 
-/// The correction of an angular rate that does not change, for each of the rates about x, y and z: what a linear part
-/// makes of the unit's mounting and gain. Q24, from rate codes to a rate code.
+/// Gives the correction of a constant angular rate, by its components about x, y and z: a linear part models the unit's
+/// mounting and gain this way. Q24, from rate codes to a rate code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SteadyGain(pub [i32; 3]);
 
 impl SteadyGain {
-    /// The gain of a model without a linear part.
+    /// A model without a linear part has this gain: zero.
     pub const NONE: Self = Self([0; 3]);
 
     /// Returns the correction of a sample with these rates.

@@ -1,4 +1,5 @@
-//! These modules are recurrent networks in integers, and the f32 reference beside them.
+//! These modules compute recurrent networks in integers, so that every machine gets the same bits, and in f32 as the
+//! reference.
 //!
 //! Weights are immutable slices, apart from the state that the caller owns: one set of weights
 //! can drive many states. The number formats:
@@ -38,19 +39,19 @@ mod simd;
 
 /// Fraction bits of network inputs and hidden states.
 pub const HIDDEN_FRACTION_BITS: u32 = 10;
-/// The hidden state's largest magnitude: 1.0.
+/// The hidden state's largest magnitude is 1.0.
 pub const HIDDEN_MAX: i32 = 1 << HIDDEN_FRACTION_BITS;
 /// Fraction bits of a gate's input.
 pub const GATE_FRACTION_BITS: u32 = 14;
-/// Gates of an LSTM unit, in PyTorch's order: input, forget, cell candidate, output.
+/// An LSTM unit has this many gates, in PyTorch's order: input, forget, cell candidate, output.
 pub const GATES: usize = 4;
 
-/// Bytes on a 4-byte boundary, as a weight file must lie.
+/// Places bytes on a 4-byte boundary, as a weight file needs.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(4))]
 pub struct Aligned<T>(pub T);
 
-/// Packs two consecutive columns in one word, as the kernels load them: the first one lower.
+/// Packs two consecutive columns into one word, as the kernels load them: the first in the lower half.
 #[inline]
 #[must_use]
 pub const fn pack(first: i16, second: i16) -> u32 {

@@ -1,14 +1,14 @@
-//! The store keeps over a power cut: configuration, calibration, and two slots for weight files.
+//! The store keeps the configuration, the calibration and two slots for weight files through a power cut.
 //!
 //! | what | where | written as | after an interrupted write |
 //! |---|---|---|---|
 //! | [`Configuration`], [`WheelSettings`](crate::can::wheel::WheelSettings), [`Calibration`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
 //! | weight files | two 128 KiB sectors, [`slots`] | the slot that is not in use | the slot in use |
 //!
-//! Records are found by key and protected by CRC-32; each carries the version of its layout, and
-//! every value is checked against its range when it is stored and when it is read. A weight file is
-//! used only after all of [`crate::model::Blob::new_checked`].
-//! [`layout`] says where everything lies.
+//! It works because new data never overwrites the data in use: an interrupted write leaves the old record or slot
+//! whole. Records are found by key and protected by CRC-32; each carries the version of its layout, and every value is
+//! checked against its range when it is stored and when it is read. A weight file is used only after all checks of
+//! [`crate::model::Blob::new_checked`]. [`layout`] gives the places in flash.
 
 pub mod calibration;
 pub mod configuration;

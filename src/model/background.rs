@@ -3,7 +3,7 @@
 
 use super::blob::{Blob, BlobError, CRC};
 
-/// A check that goes round and round.
+/// Checks the weights over and over, one bounded piece at a time.
 pub struct BackgroundCheck<'w> {
     content: &'w [u8],
     stored: u32,
@@ -30,11 +30,10 @@ impl<'w> BackgroundCheck<'w> {
         self.content.is_empty()
     }
 
-    /// Checks up to `count` bytes more; with the last ones says how the round went, and begins
-    /// the next.
+    /// Checks up to `count` more bytes; with the last ones it returns the result of the round and begins the next.
     ///
     /// # Errors
-    /// [`BlobError::Crc`] inside: the weights have changed since they were checked whole.
+    /// The result is [`BlobError::Crc`] if the weights have changed since they were first checked.
     pub fn advance(&mut self, count: usize) -> Option<Result<(), BlobError>> {
         let end = self.at.saturating_add(count).min(self.content.len());
         self.digest.update(self.content.get(self.at..end).unwrap_or_default());

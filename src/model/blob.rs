@@ -1,4 +1,4 @@
-//! This module checks GyroNet's weight file before use, and reads it in place.
+//! This module checks GyroNet's weight file before use and reads it in place, without a copy.
 //!
 //! A file holds a linear part, two layers of Bi-LSTMs, or both ([`Shape`]). The header of `model::file`, then:
 //!
@@ -17,30 +17,30 @@ use super::file::{Header, Reader, check_dense, check_rows, dense_len, header_len
 use crate::model::window::{FEATURES, WINDOW};
 use crate::nn::{bilstm::Layer, dense::Dense, linear::Linear};
 
-/// Units of the paper's GyroNet a direction (section III-B), and the most that a file may have.
+/// The paper's GyroNet has this many units a direction (section III-B); a file may have no more.
 pub const HIDDEN: usize = 60;
-/// Inputs of the linear part: all features of a window, sample by sample, oldest first.
+/// The linear part has this many inputs: all features of a window, sample by sample, oldest first.
 pub const LINEAR_INPUTS: usize = WINDOW * FEATURES;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(FEATURES);
 
-/// The parts of a window model and their sizes.
+/// Describes the parts of a window model and their sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Shape {
     /// Units of the Bi-LSTMs a direction, up to [`HIDDEN`] in steps of 4; with 0 there are none.
     pub units: u16,
-    /// The model has a linear part.
+    /// Whether the model has a linear part.
     pub linear: bool,
 }
 
 impl Shape {
-    /// The shape in the paper.
+    /// The paper's GyroNet has this shape.
     pub const PAPER: Self = Self { units: HIDDEN as u16, linear: false };
-    /// The largest shape.
+    /// The largest shape that a file may have.
     pub const LARGEST: Self = Self { units: HIDDEN as u16, linear: true };
 
-    /// Returns the content that the header must have.
+    /// Returns the topology that the file's header must state.
     #[must_use]
     pub const fn topology(self) -> Topology {
         let outputs = if self.linear { WINDOW as u16 } else { 0 };
@@ -56,7 +56,7 @@ impl Shape {
         HEADER_LEN + provenance + linear + network + 4 + 4
     }
 
-    /// Reads a topology; `None` where it has none of the sizes, or no part at all.
+    /// Reads a topology; `None` if its sizes are not supported or it has no part at all.
     fn read(found: Topology) -> Option<Self> {
         let [_, _, _, units, _, outputs] = found;
         let shape = Self { units, linear: outputs > 0 };
@@ -65,14 +65,14 @@ impl Shape {
     }
 }
 
-/// A weight file that has passed all checks.
+/// Gives access to a weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct Blob<'w> {
     /// The provenance of the weights: JSON.
     pub provenance: &'w str,
-    /// The parts that there are.
+    /// The parts of the model and their sizes.
     pub shape: Shape,
-    /// One for each feature.
+    /// The scaling of each feature.
     pub normalisation: [Normalisation; FEATURES],
     /// Inputs of the Bi-LSTMs are clamped to +- this, Q10.
     pub input_clamp: i16,
@@ -80,15 +80,16 @@ pub struct Blob<'w> {
     pub linear: Option<Linear<'w>>,
     /// The two Bi-LSTM layers.
     pub layers: Option<[Layer<'w>; 2]>,
-    /// Row of the output layer that gives a step's gyro error, as a rate code; empty without layers.
+    /// Row of the output layer for a step's gyro error, as a rate code; empty without layers.
     pub gyro_error: Dense<'w>,
-    /// Row whose sum over the steps is log2 of the scale over [`Blob::scale_unit`], in Q16; empty without layers.
+    /// Row of the output layer whose sum over the steps is log2 of scale / [`Blob::scale_unit`], in Q16; empty without
+    /// layers.
     pub log_scale: Dense<'w>,
-    /// The scale whose log is zero, as a rate code; without layers, the scale of every window.
+    /// The scale at which the log is zero, as a rate code; without layers, the scale of every window.
     pub scale_unit: u32,
-    /// The file's own checksum: the name of this set of weights.
+    /// The file's own checksum, which identifies this set of weights.
     pub crc: u32,
-    /// The bytes that it is of.
+    /// The bytes that the checksum covers.
     pub content: &'w [u8],
 }
 

@@ -1,6 +1,7 @@
-//! The weight files of all networks share their header, their checks and the typed access in place.
+//! The weight files of all networks share a header, its checks, and typed access without a copy.
 //!
-//! Little-endian; every field on a 4-byte boundary.
+//! All numbers are little-endian, and every field lies on a 4-byte boundary, so that a microcontroller can read it
+//! where it lies in flash.
 //!
 //! | offset | type | field |
 //! |---|---|---|
@@ -16,27 +17,28 @@
 //! | | | what the network adds: [`super::blob`], [`super::fognet_blob`] |
 //! | end - 4 | u32 | CRC-32 (ISO-HDLC, as in zip and Ethernet) of everything before it |
 //!
-//! A direction is its input records, then its recurrent records, as [`crate::nn::lstm`] lays
-//! them out; a row of an output layer is its int16 weights, then bias and multiplier.
+//! A direction consists of its input records, then its recurrent records, as [`crate::nn::lstm`] lays them out; a row
+//! of an output layer consists of its int16 weights, then bias and multiplier.
 
 use crate::nn::lstm::{DirectionWeights, ROW_LIMIT, row_bound};
 use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense, linear::Linear};
 
-/// First bytes of a weight file.
+/// A weight file begins with these bytes.
 pub const MAGIC: [u8; 4] = *b"GYRN";
 /// The format version that this code reads.
 pub const VERSION: u16 = 3;
-/// Network number of GyroNet.
+/// This number in the header stands for GyroNet.
 pub const GYRONET: u16 = 1;
-/// Network number of FoGNet.
+/// This number in the header stands for FoGNet.
 pub const FOGNET: u16 = 2;
-/// CRC-32 as in zip and Ethernet.
+/// Computes CRC-32 as in zip and Ethernet.
 pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 #[cfg(target_endian = "big")]
 compile_error!("weights are read in place as little-endian words");
 
-/// The shape that a file states: network number, window, inputs, hidden units, layers, outputs of the linear part.
+/// Holds the shape that a file states: network number, window, inputs, hidden units, layers, outputs of the linear
+/// part.
 pub type Topology = [u16; 6];
 
 /// The reason why a weight file is refused.
@@ -45,10 +47,10 @@ pub type Topology = [u16; 6];
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BlobError {
-    /// Does not begin with [`MAGIC`].
+    /// The file does not begin with [`MAGIC`].
     #[error("weight file: this is none, it begins with {0:02x?}, not {MAGIC:02x?}")]
     Magic([u8; 4]),
-    /// A format version that this code does not read.
+    /// The file has a format version that this code does not read.
     #[error("weight file: format version {0}, this reads {VERSION}")]
     Version(u16),
     /// The file holds another network, or one of another shape.
@@ -61,15 +63,15 @@ pub enum BlobError {
     Topology {
         /// The shape in the file.
         found: Topology,
-        /// The expected shape; of GyroNet's the largest.
+        /// The expected shape; for GyroNet, the largest one.
         expected: Topology,
     },
-    /// Shorter or longer than its header and shape say.
+    /// The file is shorter or longer than its header and shape say.
     #[error("weight file: {found} bytes, should be {expected}")]
     Length {
-        /// Bytes there should be.
+        /// Expected length, bytes.
         expected: usize,
-        /// Bytes there are.
+        /// Actual length, bytes.
         found: usize,
     },
     /// The bytes do not begin on a 4-byte boundary.
@@ -78,9 +80,9 @@ pub enum BlobError {
     /// The checksum does not fit the content.
     #[error("weight file: checksum is {computed:08x}, the file says {stored:08x}")]
     Crc {
-        /// Computed over the content.
+        /// The checksum computed over the content.
         computed: u32,
-        /// Stored at the end.
+        /// The checksum stored at the end.
         stored: u32,
     },
     /// The provenance is not UTF-8.
@@ -92,7 +94,7 @@ pub enum BlobError {
     /// A gate row could overflow its accumulator.
     #[error("weight file: layer {layer}, direction {direction}, unit {unit} could overflow its accumulator")]
     RowBound {
-        /// Layer, 0 or 1; those of FoGNet's LSTM2 are 2 and 3.
+        /// Layer, 0 or 1; FoGNet's LSTM2 has layers 2 and 3.
         layer: u8,
         /// Direction, 0 forward, 1 backward.
         direction: u8,
@@ -105,7 +107,7 @@ pub enum BlobError {
         /// Output.
         output: u16,
     },
-    /// The network is larger than the memory that the caller has for one.
+    /// The network is larger than the memory that the caller provides.
     #[error("weight file: {found} units a direction, there is memory for {largest}")]
     Units {
         /// Units in the file.
@@ -120,12 +122,12 @@ fn network_name([network, ..]: &Topology) -> &'static str {
     if *network == FOGNET { "FoGNet" } else { "GyroNet" }
 }
 
-/// Returns the sizes below the largest that a network may have, as words.
+/// Returns a clause for the error text that names the smaller sizes a network may have.
 fn smaller([network, ..]: &Topology) -> &'static str {
     if *network == FOGNET { "" } else { ", or fewer units in steps of 4, or no linear outputs" }
 }
 
-/// The scaling of a feature to a network input: `(code - offset) * multiplier / 2^31`, rounded.
+/// Scales a feature to a network input: `(code - offset) * multiplier / 2^31`, rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Normalisation {
     /// The offset in the feature's code.
@@ -134,7 +136,7 @@ pub struct Normalisation {
     pub multiplier: i32,
 }
 
-/// Returns the number of bytes before those that a network of so many inputs adds.
+/// Returns the length in bytes of the common header for a network of so many inputs.
 pub(super) const fn header_len(inputs: usize) -> usize {
     32 + 8 * inputs
 }
@@ -154,7 +156,7 @@ pub(super) const fn dense_len(columns: usize) -> usize {
     2 * columns + 8
 }
 
-/// The header's fields, once they are known to fit the file.
+/// Holds the header's fields, once they are known to fit the file.
 pub(super) struct Header<const INPUTS: usize, S> {
     /// The shape, as the network reads it.
     pub shape: S,
@@ -165,8 +167,8 @@ pub(super) struct Header<const INPUTS: usize, S> {
 }
 
 impl<const INPUTS: usize, S> Header<INPUTS, S> {
-    /// Checks header and checksum of a file that should be of the topology `expected`, or of another one that `shape`
-    /// takes, and so long for that shape and length of provenance.
+    /// Checks header, length and checksum of a file; `shape` accepts its topology, and `expected` goes into the error
+    /// if it does not.
     pub fn read(
         reader: &mut Reader<'_>,
         expected: Topology,
@@ -235,7 +237,7 @@ pub(super) fn check_dense(row: &Dense<'_>) -> Result<(), BlobError> {
     if sum + i64::from(row.bias).abs() >= 1 << 31 { Err(BlobError::Scale) } else { Ok(()) }
 }
 
-/// A reader that takes typed slices off the front of the file.
+/// Takes typed slices off the front of the file.
 pub(super) struct Reader<'w> {
     bytes: &'w [u8],
     len: usize,

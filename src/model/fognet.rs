@@ -1,4 +1,4 @@
-//! This module is FoGNet in integers: it takes a minute and returns the error of the gyro's turn in that minute.
+//! This module runs FoGNet in integers: from the last minute it computes the error of the gyro's turn in that minute.
 //!
 //! ```text
 //! 60 x 9 -> LSTM1, 2 x 90 both ways -> FC1 -> f1 (60)
@@ -7,13 +7,13 @@
 //! f2, f3 -> FC4 -> correction = gyro - truth
 //! ```
 //!
-//! Section III-C of the paper. It does not say at which rate the window is sampled: with 1 s
-//! steps LSTM2's "N units" give 387,006 parameters, with any faster sampling millions.
+//! Section III-C of the paper describes it, but not the rate at which the window is sampled: with 1 s steps LSTM2's "N
+//! units" give 387,006 parameters, with any faster sampling millions.
 //!
-//! The gyro's increments reach the result on two ways. Through the LSTMs they go as int16; but
-//! what FC3 and FC4 make of them is linear, and a correction of 1e-4 rad of a turn of 10 rad is
-//! below the LSB of that. So [`FogBlob::gains`] holds FC3, FC4 and the scales multiplied out, and
-//! the linear part is computed from the increments themselves, in [`Angle`]: it is exact.
+//! The gyro's increments reach the result on two paths. Through the LSTMs they go as int16. Through FC3 and FC4 they go
+//! linearly, and there a correction of 1e-4 rad in a turn of 10 rad would be below the LSB of an int16. So
+//! [`FogBlob::gains`] holds FC3, FC4 and the scales multiplied out, and the linear part is computed from the increments
+//! themselves, in [`Angle`]: it is exact.
 
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
 use super::input::load_step;
@@ -23,9 +23,9 @@ use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};
 use crate::units::{Angle, AngularRate};
 
-/// Column of the gyro's increment.
+/// The gyro's increment is in this column.
 const GYRO: usize = INPUTS - 1;
-/// Bits between an [`Angle`] and the same angle turned in a second as [`AngularRate`].
+/// Shifting an [`Angle`] right by this many bits gives the [`AngularRate`] that turns it in a second.
 const ANGLE_TO_RATE: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
 /// Fraction bits of [`FogBlob::gains`].
 pub const GAIN_FRACTION_BITS: u32 = 31;
@@ -44,14 +44,14 @@ pub struct FogEstimate {
     pub clamped_inputs: u16,
 }
 
-/// Whatever turns a minute into a correction: the integer network, the f32 reference.
+/// Turns a minute into a correction; the integer network and the f32 reference implement it.
 pub trait MinuteNetwork {
     /// Runs the network over one window.
     fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
 }
 
-/// The piece of the window that is next. FC2 takes the last step, and the way back of LSTM2's second layer begins
-/// with it: that is [`Stage::Last`]. `Idle` is zero, so that a state at rest needs no place in flash.
+/// Names the piece of the window that runs next. FC2 needs the last step alone, where the backward pass of LSTM2's
+/// second layer begins: that is [`Stage::Last`]. `Idle` is zero, so that an idle state needs no place in flash.
 #[derive(Debug, Clone)]
 #[repr(u8)]
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; they share its place")]
@@ -77,7 +77,7 @@ pub struct FogNetState {
 }
 
 impl FogNetState {
-    /// A fresh state; a window leaves nothing in it for the next one.
+    /// A fresh state has no window under way; windows leave nothing in it for the next one.
     pub const ZERO: Self = Self {
         input: [0; _],
         between: [0; _],
@@ -89,8 +89,8 @@ impl FogNetState {
     };
 }
 
-/// The integer network: weights in place, state the caller's, for it is too large to be moved
-/// about on a small stack.
+/// Runs the integer network. It reads the weights in place and works in the caller's state, which is too large to be
+/// moved about on a small stack.
 #[derive(Debug)]
 pub struct FogNet<'w, 's> {
     blob: FogBlob<'w>,
@@ -177,14 +177,14 @@ impl<'w, 's> FogNet<'w, 's> {
     }
 }
 
-/// Returns the part of a row's sum that one direction's hidden state makes.
+/// Returns one direction's part of a row's sum.
 fn half(weights: &[i16], way: Direction, hidden: &[u32]) -> i32 {
     let (forward, backward) = weights.split_at_checked(weights.len() / 2).unwrap_or_default();
     Dense::partial(if way == Direction::Forward { forward } else { backward }, hidden)
 }
 
 impl FogNetState {
-    /// Writes LSTM2's input, f1 and the gyro, over LSTM1's.
+    /// Writes LSTM2's input, f1 and the gyro, in place of LSTM1's.
     fn load_second(&mut self, blob: &FogBlob<'_>) {
         let clamp = i32::from(blob.input_clamp);
         for step in 0..STEPS {

@@ -1,4 +1,4 @@
-//! This module checks FoGNet's weight file before use, and reads it in place.
+//! This module checks FoGNet's weight file before use and reads it in place, without a copy.
 //!
 //! The header of `model::file`, then:
 //!
@@ -19,43 +19,43 @@ use crate::model::seconds::{self, STEPS};
 use crate::nn::{bilstm::Layer, dense::Dense};
 use crate::units::Angle;
 
-/// Units of LSTM1 a direction (section III-C of the paper).
+/// LSTM1 has this many units a direction (section III-C of the paper).
 pub const HIDDEN1: usize = 90;
-/// Units of LSTM2 a direction: "N units".
+/// LSTM2 has as many units a direction as the window has steps: "N units" in the paper.
 pub const HIDDEN2: usize = STEPS;
-/// Features of a step: those of [`crate::model::seconds`], and the gyro's increment.
+/// A step has this many features: those of [`crate::model::seconds`], and the gyro's increment.
 pub const INPUTS: usize = seconds::FEATURES + 1;
-/// Columns of LSTM1's input: the features, and one that is zero to make them even.
+/// LSTM1's input has this many columns: the features, and a zero that makes their number even.
 pub const COLUMNS: usize = INPUTS + 1;
-/// Fraction bits of the factor that makes an angle of FC2's sum.
+/// Fraction bits of the factor that turns FC2's sum into an angle.
 pub const CORRECTION_SHIFT: u32 = 16;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8;
-/// The content that the header must have.
+/// The file's header must state this topology.
 pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2, 1];
 
-/// A weight file that has passed all checks.
+/// Gives access to a weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct FogBlob<'w> {
     /// The provenance of the weights: JSON.
     pub provenance: &'w str,
-    /// One for each feature.
+    /// The scaling of each feature.
     pub normalisation: [Normalisation; INPUTS],
     /// Network inputs are clamped to +- this, Q10.
     pub input_clamp: i16,
     /// The gain that FC3, FC4 and all scales give an increment: correction over increment, Q31.
     pub gains: &'w [i32],
-    /// The correction that is there whatever the inputs: all biases of FC2, FC3 and FC4.
+    /// The constant part of the correction: all biases of FC2, FC3 and FC4.
     pub offset: Angle,
     /// The two layers of LSTM1.
     pub lstm1: [Layer<'w>; 2],
-    /// FC1.
+    /// The weights of FC1.
     pub fc1: Dense<'w>,
     /// The two layers of LSTM2.
     pub lstm2: [Layer<'w>; 2],
-    /// FC2, and what FC4 makes of it.
+    /// The weights of FC2 times FC4's factor for it.
     pub fc2: Dense<'w>,
-    /// The file's own checksum: the name of this set of weights.
+    /// The file's own checksum, which identifies this set of weights.
     pub crc: u32,
 }
 
@@ -94,7 +94,7 @@ impl<'w> FogBlob<'w> {
         Ok(Self { provenance, normalisation, input_clamp, gains, offset, lstm1, fc1, lstm2, fc2, crc })
     }
 
-    /// Returns the correction that a whole sum of [`FogBlob::fc2`] makes, without the linear part.
+    /// Returns the correction for a whole sum of [`FogBlob::fc2`], without the linear part.
     #[must_use]
     pub fn spread(&self, sum: i32) -> Angle {
         let product = i64::from(sum) * i64::from(self.fc2.multiplier) + (1 << (CORRECTION_SHIFT - 1));

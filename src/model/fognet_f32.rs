@@ -1,4 +1,4 @@
-//! This module is FoGNet in f32, from PyTorch's tensors: the definition that the integer network approximates.
+//! This module computes FoGNet in f32 from PyTorch's tensors; it defines what the integer network approximates.
 
 use super::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
 use super::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
@@ -6,7 +6,7 @@ use crate::model::seconds::{STEPS, SecondsWindow};
 use crate::nn::reference::{LstmWeights, dense, lstm};
 use crate::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 
-/// FoGNet's tensors, with the names and layouts of the checkpoint.
+/// Holds FoGNet's tensors, with the names and layouts of the checkpoint.
 #[derive(Debug, Clone, Copy)]
 pub struct FogNetF32<'w> {
     /// Mean of each feature: m/s^2, rad/s, m, rad.
@@ -17,19 +17,19 @@ pub struct FogNetF32<'w> {
     pub correction_scale: f32,
     /// Layer 1, then layer 2; forward, backward.
     pub lstm1: [[LstmWeights<'w>; 2]; 2],
-    /// (180) and a scalar.
+    /// Weights (180) and bias of FC1.
     pub fc1: (&'w [f32], f32),
     /// Layer 1, then layer 2; forward, backward.
     pub lstm2: [[LstmWeights<'w>; 2]; 2],
-    /// (120) and a scalar.
+    /// Weights (120) and bias of FC2.
     pub fc2: (&'w [f32], f32),
-    /// (60) and a scalar.
+    /// Weights (60) and bias of FC3.
     pub fc3: (&'w [f32], f32),
-    /// (2) and a scalar.
+    /// Weights (2) and bias of FC4.
     pub fc4: (&'w [f32], f32),
 }
 
-/// The layers' outputs for one window.
+/// Holds the layers' outputs for one window.
 #[derive(Debug, Clone)]
 pub struct FogLayerOutputs {
     /// Features less mean, over standard deviation.
@@ -38,7 +38,7 @@ pub struct FogLayerOutputs {
     pub f1: [f32; STEPS],
     /// LSTM2's hidden state at the last step, forward then backward.
     pub layer2_last: [f32; 2 * HIDDEN2],
-    /// FC2 of it.
+    /// FC2 of that hidden state.
     pub f2: f32,
     /// FC3 of the gyro's normalised increments.
     pub f3: f32,
@@ -105,7 +105,7 @@ impl MinuteNetwork for FogNetF32<'_> {
         }
         let correction = self.layers(&features).correction;
         let mean_gain = (0..STEPS).map(|step| self.gain(step)).sum::<f32>() / STEPS as f32;
-        // A number that does not fit is as implausible as the largest one that does.
+        // A number that does not fit is as implausible as the largest one that fits.
         let angle = |rad| Angle::from_rad(rad).unwrap_or(Angle(i64::MAX));
         FogEstimate {
             correction: angle(correction),

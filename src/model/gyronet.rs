@@ -1,8 +1,8 @@
-//! This module is GyroNet in integers: it takes ten samples and returns the yaw gyro's error at each of them, and
-//! how far off that may be.
+//! This module runs GyroNet in integers: from ten samples it estimates the yaw gyro's error at each of them, and the
+//! uncertainty of that.
 //!
-//! The error is the sum of a linear part, computed from the features' codes without rounding them, and of what two
-//! layers of Bi-LSTMs give; a weight file has either or both, the Bi-LSTMs in any size up to the paper's.
+//! The error is the sum of a linear part, computed from the features' codes without rounding them, and of the output of
+//! two layers of Bi-LSTMs; a weight file has either or both, the Bi-LSTMs in any size up to the paper's.
 
 use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
@@ -20,7 +20,7 @@ pub const fn recurrent_words(units: usize) -> usize {
     DirectionWeights::recurrent_words(units)
 }
 
-/// Working memory of one window, for networks of up to `U` units a direction: `W` is half of them, `R` their
+/// Holds the working memory of one window, for networks of up to `U` units a direction: `W` is half of them, `R` their
 /// [`recurrent_words`]. An image that runs no network of the paper's size can do with less than the default; one that
 /// runs a linear part alone with `GyroNetState<0, 0, 0>`.
 #[derive(Debug, Clone)]
@@ -37,17 +37,17 @@ pub struct GyroNetState<
     recurrent: [u32; R],
     /// The outputs of the linear part.
     linear: [i32; WINDOW],
-    /// The biases of the gyro error's row, then of the log scale's row.
+    /// Sums of the gyro error's row and of the log scale's row for each sample; they start from the biases.
     sums: [[i32; 2]; WINDOW],
     clamped_inputs: u16,
-    /// A window that is not done.
+    /// The position in the window that is under way.
     run: Run,
     under_way: bool,
 }
 
 impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
-    /// A fresh state; a window leaves nothing in it for the next one. All of it is zero, so that it needs no place
-    /// in flash.
+    /// A fresh state has no window under way; windows leave nothing in it for the next one. It is all zeros, so that it
+    /// needs no place in flash.
     pub const ZERO: Self = {
         assert!(U.is_multiple_of(4) && U <= HIDDEN && R == recurrent_words(U), "no network has these sizes");
         Self {
@@ -64,8 +64,8 @@ impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
     };
 }
 
-/// The integer network: weights in place, state owned or (`S` a reference) the caller's, where it is too
-/// large to be moved about on a small stack.
+/// Runs the integer network. It reads the weights in place; it owns its state, or borrows the caller's (`S` a
+/// reference) where a state is too large to be moved about on a small stack.
 #[derive(Debug, Clone)]
 pub struct GyroNet<
     'w,
@@ -83,7 +83,7 @@ impl<'w> GyroNet<'w> {
     /// Makes a network over checked weights.
     #[must_use]
     pub fn new(blob: Blob<'w>) -> Self {
-        // The memory is that of the largest network.
+        // The state has room for the largest network.
         Self { blob, steady_gain: steady_gain(&blob), state: GyroNetState::ZERO }
     }
 }
@@ -92,8 +92,7 @@ impl<'w, S, const U: usize, const W: usize, const R: usize> GyroNet<'w, S, U, W,
 where
     S: BorrowMut<GyroNetState<U, W, R>>,
 {
-    /// Makes a network over checked weights, in a state of the caller's. A window that it was working on is
-    /// dropped.
+    /// Makes a network over checked weights, in a state of the caller's. A window under way in that state is dropped.
     ///
     /// # Errors
     /// [`BlobError::Units`]: the state is too small for this network.
@@ -163,8 +162,8 @@ where
     }
 
     /// Returns the newest sample's correction without a scale, and the clamped inputs. The backward half of layer 2
-    /// needs just its first step for that, which saves a third of the work; the result is the last of
-    /// [`WindowNetwork::estimate`]'s, bit for bit.
+    /// needs only its first step for that, which saves a third of the work; the result equals the last correction of
+    /// [`WindowNetwork::estimate`], bit for bit.
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
         let Self { blob, state, .. } = self;
         let GyroNetState { input, layer1, scratch, recurrent, .. } = state.borrow_mut();
@@ -205,7 +204,7 @@ where
     }
 }
 
-/// Returns what the outputs of the linear part make of steady rates, on average.
+/// Returns the linear part's gains for constant rates, averaged over its outputs.
 fn steady_gain(blob: &Blob<'_>) -> SteadyGain {
     const RATES: core::ops::Range<usize> = FEATURES - 3..FEATURES;
     let mut sums = [0; 3];
@@ -214,11 +213,11 @@ fn steady_gain(blob: &Blob<'_>) -> SteadyGain {
             *sum += i64::from(*weight);
         }
     }
-    // A row's sum is below 2^32 in magnitude; a gain of 128 and more is no unit's.
+    // A row's sum is below 2^32 in magnitude; no unit has a gain of 128 or more.
     SteadyGain(sums.map(|sum| i32::try_from(sum / WINDOW as i64).unwrap_or(0)))
 }
 
-/// Normalises the window into the first layer's input, if there is one; counts what had to be clamped.
+/// Normalises the window into the first layer's input, if there is one; returns how many values had to be clamped.
 fn load(blob: &Blob<'_>, window: &[Features; WINDOW], input: &mut [u32]) -> u16 {
     if blob.layers.is_none() {
         return 0;

@@ -1,4 +1,4 @@
-//! This module is GyroNet in f32, from the tensors of training: the definition that the integer network approximates.
+//! This module computes GyroNet in f32 from the tensors of training; it defines what the integer network approximates.
 
 use super::blob::{HIDDEN, LINEAR_INPUTS};
 use super::{Estimate, SCALE_MAX, SCALE_MIN, SteadyGain, WindowNetwork};
@@ -7,7 +7,7 @@ use crate::nn::linear::Linear;
 use crate::nn::reference::{LstmWeights, dense, lstm};
 use crate::units::{AngularRate, SpecificForce};
 
-/// GyroNet's tensors, with the names and layouts of the checkpoint.
+/// Holds GyroNet's tensors, with the names and layouts of the checkpoint.
 #[derive(Debug, Clone, Copy)]
 pub struct GyroNetF32<'w> {
     /// Mean of each feature, m/s^2 and rad/s.
@@ -16,26 +16,26 @@ pub struct GyroNetF32<'w> {
     pub input_std: [f32; FEATURES],
     /// rad/s per unit of the last layer; without Bi-LSTMs the scale of every window.
     pub output_scale: f32,
-    /// (N, N F): gyro error of each sample by all features of the window, if there is a linear part.
+    /// (N, N F): weights of each sample's gyro error over all features of the window, if there is a linear part.
     pub linear: Option<&'w [f32]>,
     /// The Bi-LSTMs, if there are any.
     pub network: Option<NetworkF32<'w>>,
 }
 
-/// The tensors of the Bi-LSTMs and of the layer on top of them.
+/// Holds the tensors of the Bi-LSTMs and of the layer on top of them.
 #[derive(Debug, Clone, Copy)]
 pub struct NetworkF32<'w> {
     /// Layer 1: forward, backward.
     pub lstm1: [LstmWeights<'w>; 2],
     /// Layer 2: forward, backward.
     pub lstm2: [LstmWeights<'w>; 2],
-    /// (2, 2H): gyro error, log of its scale.
+    /// (2, 2H): a row for the gyro error and one for the log of its scale.
     pub fc_weight: &'w [f32],
-    /// (2)
+    /// (2): the biases of both rows.
     pub fc_bias: [f32; 2],
 }
 
-/// Every layer's output for one window; those of fewer units than the paper's have zeros behind them.
+/// Holds every layer's output for one window; networks of fewer units than the paper's leave zeros behind them.
 #[derive(Debug, Clone)]
 pub struct LayerOutputs {
     /// Features less mean, over standard deviation.
@@ -115,7 +115,7 @@ impl WindowNetwork for GyroNetF32<'_> {
         });
         let LayerOutputs { gyro_error, log_scale, .. } = self.layers(&units);
         let corrections = gyro_error.map(|error| {
-            // A number that does not fit is as implausible as the largest one that does.
+            // A number that does not fit is as implausible as the largest one that fits.
             AngularRate::from_rad_per_sec(error).unwrap_or(AngularRate(i32::MAX))
         });
         let scale = AngularRate::from_rad_per_sec(self.output_scale * libm::expf(log_scale))

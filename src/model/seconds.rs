@@ -1,45 +1,44 @@
-//! FoGNet sees the last minute in steps of a second.
+//! This module makes FoGNet's input: the last minute in steps of a second.
 //!
-//! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged; all
-//! in integers, the gyro's increments to the last bit. A gap in the gyro ends the window, for an
-//! angle that was turned in it is in no sum; so does a second that has inertial samples or wheel
-//! speeds in less than half of its frames.
+//! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged, in integers, so that no bit
+//! of the gyro's angle is lost. A gap in the gyro ends the window, because the angle turned in it would be missing from
+//! the sum; so does a second that has inertial samples or wheel speeds in less than half of its frames.
 
 use crate::model::window;
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, WheelSpeed};
 
-/// Steps of a FoGNet window: a minute (section III-C of the paper).
+/// A FoGNet window has this many steps: a minute (section III-C of the paper).
 pub const STEPS: usize = 60;
-/// Features of a step besides the gyro's increment: specific force x, y, z; angular rate x, y, z
-/// less the static bias; way of the left and of the right wheel.
+/// A step has this many features besides the gyro's increment: specific force x, y, z; angular rate x, y, z less the
+/// static bias; way of the left and of the right wheel.
 pub const FEATURES: usize = 8;
-/// Frames in a step.
+/// A step has this many frames: a second.
 pub const FRAMES: u32 = RATE_HZ;
 
-/// The part of a second that one 10 ms frame adds.
+/// Holds the part of a second that one 10 ms frame adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogFrame {
-    /// Angle turned about z (up) since the frame before; `None` where some of it is not known.
+    /// Angle turned about z (up) since the frame before; `None` if part of it is unknown.
     pub turn: Option<Angle>,
-    /// The inertial sensor, its gyro less its static bias ([`window::features`]).
+    /// Reading of the inertial sensor, its gyro less the static bias ([`window::features`]).
     pub inertial: Option<window::Features>,
-    /// Left and right wheel.
+    /// Speeds of the left and the right wheel.
     pub wheels: Option<[WheelSpeed; 2]>,
 }
 
-/// One second.
+/// Holds the features of one second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Second {
-    /// Means in the codes of [`crate::units`]. A wheel's mean speed is its way: a second has one.
+    /// Means in the codes of [`crate::units`]. A wheel's mean speed over a second is also its way.
     pub features: [i32; FEATURES],
     /// Angle turned.
     pub turn: Angle,
 }
 
-/// The reason why the window ended.
+/// Says why the window ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -52,7 +51,7 @@ pub enum Incomplete {
     Wheels,
 }
 
-/// Sums of the second that is under way.
+/// Sums the frames of the second that is under way.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondSums {
     frames: u32,
@@ -77,8 +76,7 @@ impl<const N: usize> Mean<N> {
         self.count += u32::from(codes.is_some());
     }
 
-    /// Returns the means to the nearest code and begins again; `None` when they are of less than half a second's
-    /// frames.
+    /// Returns the means to the nearest code; `None` when less than half of the second's frames had a value.
     fn take(&self) -> Option<[i32; N]> {
         let count = i64::from(self.count.max(1));
         // A mean of int32s fits an int32.
@@ -87,7 +85,7 @@ impl<const N: usize> Mean<N> {
 }
 
 impl SecondSums {
-    /// The sums are empty.
+    /// Starts with empty sums.
     pub const ZERO: Self = Self { frames: 0, turn: 0, inertial: Mean::ZERO, wheels: Mean::ZERO };
 
     /// Takes a frame; returns the second that it completes.
@@ -114,21 +112,21 @@ impl SecondSums {
     }
 }
 
-/// The filling of a window before there are [`STEPS`] seconds (Fig. 8 of the paper, which shows that there is a
-/// padding but not which).
+/// Says how a window is filled before there are [`STEPS`] seconds; Fig. 8 of the paper shows that it is padded, but not
+/// with what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Padding {
-    /// The seconds that there are, over and over, in their order.
+    /// The window repeats the seconds so far, in their order.
     #[default]
     Repeat,
-    /// The oldest second.
+    /// The window repeats the oldest second.
     Edge,
-    /// There is no padding, and no window before the first minute is over.
+    /// The window is not padded: there is none before the first minute is over.
     None,
 }
 
-/// A ring of the last [`STEPS`] seconds without a gap between them.
+/// Keeps the last [`STEPS`] seconds without a gap, in a ring.
 #[derive(Debug, Clone)]
 pub struct Minute {
     ring: [Second; STEPS],
@@ -137,7 +135,7 @@ pub struct Minute {
 }
 
 impl Minute {
-    /// The ring has no second yet.
+    /// Starts without a second.
     pub const EMPTY: Self =
         Self { ring: [Second { features: [0; FEATURES], turn: Angle::ZERO }; STEPS], next: 0, filled: 0 };
 
@@ -176,14 +174,14 @@ impl Minute {
     }
 }
 
-/// [`STEPS`] seconds to be read, in place.
+/// Gives access to the [`STEPS`] seconds of a window, in place.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondsWindow<'m> {
     minute: &'m Minute,
     padding: Padding,
 }
 
-/// The copy of a window, for a reader that must not hold up the writer for longer than a copy takes.
+/// Holds a copy of a window, for a reader that must not block the writer for longer than a copy takes.
 #[derive(Debug, Clone)]
 pub struct WindowCopy {
     minute: Minute,
@@ -191,7 +189,7 @@ pub struct WindowCopy {
 }
 
 impl WindowCopy {
-    /// The copy of no window.
+    /// Starts without a window.
     pub const EMPTY: Self = Self { minute: Minute::EMPTY, padding: Padding::Repeat };
 
     /// Takes a copy of a window.
@@ -200,7 +198,7 @@ impl WindowCopy {
         self.padding = window.padding;
     }
 
-    /// The window; `None` before one was taken.
+    /// Returns the window; `None` before one was taken.
     #[must_use]
     pub fn window(&self) -> Option<SecondsWindow<'_>> {
         self.minute.window(self.padding)

@@ -1,14 +1,14 @@
-//! A window is the last ten samples, as the networks see them.
+//! A window holds the last ten samples as the networks see them: integer codes, the angular rate less the static bias.
 
 use crate::sample::ImuSample;
 use crate::units::AngularRate;
 
-/// Samples in a GyroNet window: 0.1 s at 100 Hz (section III-B of the paper).
+/// A GyroNet window has this many samples: 0.1 s at 100 Hz (section III-B of the paper).
 pub const WINDOW: usize = 10;
-/// Features of a sample: specific force x, y, z, then angular rate x, y, z.
+/// A sample has this many features: specific force x, y, z, then angular rate x, y, z.
 pub const FEATURES: usize = 6;
 
-/// Features of one sample, in the codes of [`crate::units`].
+/// Holds the features of one sample, in the codes of [`crate::units`].
 pub type Features = [i32; FEATURES];
 
 /// Returns the features of a sample, its angular rate less the static bias.
@@ -19,7 +19,7 @@ pub fn features(sample: &ImuSample, gyro_bias: &[AngularRate; 3]) -> Features {
     [fx.0, fy.0, fz.0, rate(0), rate(1), rate(2)]
 }
 
-/// A ring of the last [`WINDOW`] samples without a gap between them.
+/// Keeps the last [`WINDOW`] samples without a gap, in a ring.
 #[derive(Debug, Clone)]
 pub struct Window {
     ring: [Features; WINDOW],
@@ -34,7 +34,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// The window is empty.
+    /// Starts without a sample.
     pub const EMPTY: Self = Self { ring: [[0; FEATURES]; WINDOW], next: 0, filled: 0 };
 
     /// Forgets everything: a gap breaks the window.
@@ -43,7 +43,7 @@ impl Window {
         self.filled = 0;
     }
 
-    /// Adds the newest sample; the oldest one makes way.
+    /// Adds the newest sample; a full window drops its oldest.
     pub fn add(&mut self, features: Features) {
         if let Some(place) = self.ring.get_mut(self.next) {
             *place = features;
@@ -52,7 +52,7 @@ impl Window {
         self.filled = (self.filled + 1).min(WINDOW);
     }
 
-    /// Returns whether all places are taken.
+    /// Returns whether the window is full.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.filled == WINDOW

@@ -17,7 +17,7 @@
 
 use super::GATE_FRACTION_BITS;
 
-/// Bits of a saturated gate input.
+/// A saturated gate input has this many bits.
 pub const INPUT_BITS: u32 = 18;
 const INPUT_MAX: i32 = (1 << (INPUT_BITS - 1)) - 1;
 const INPUT_MIN: i32 = -(1 << (INPUT_BITS - 1));
@@ -32,9 +32,9 @@ pub const TANH_FRACTION_SCALE: u32 = 2;
 const SIGMOID_LEN: usize = 1 << (INPUT_BITS - SIGMOID_SHIFT);
 const TANH_LEN: usize = 1 << (INPUT_BITS - TANH_SHIFT);
 
-/// Lines of the sigmoid; entry 128 starts at input 0.
+/// The table holds the lines of the sigmoid; entry 128 starts at input 0.
 pub static SIGMOID: [i32; SIGMOID_LEN] = table(false, SIGMOID_SHIFT, 0);
-/// Lines of the tanh; entry 256 starts at input 0.
+/// The table holds the lines of the tanh; entry 256 starts at input 0.
 pub static TANH: [i32; TANH_LEN] = table(true, TANH_SHIFT, TANH_FRACTION_SCALE);
 
 /// Clamps a gate input to the tables' range, +-8 in Q14.
@@ -87,7 +87,7 @@ const fn table<const LEN: usize>(is_tanh: bool, shift: u32, fraction_scale: u32)
     lines
 }
 
-/// Divides towards minus infinity, for values that fit 64 bits.
+/// Rounds towards minus infinity, for values that fit 64 bits.
 const fn floor(x: f64) -> f64 {
     let whole = x as i64 as f64;
     if whole > x { whole - 1.0 } else { whole }

@@ -9,26 +9,26 @@
 
 use super::lstm::{self, DirectionWeights, Scratch};
 
-/// A layer: forward and backward direction.
+/// Holds the weights of a layer: one set for each direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Layer<'w> {
-    /// Forward in time.
+    /// The direction forward in time.
     pub forward: DirectionWeights<'w>,
-    /// Backward in time.
+    /// The direction backward in time.
     pub backward: DirectionWeights<'w>,
 }
 
-/// The order in which a direction takes its steps.
+/// Gives the order in which a direction takes its steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
-    /// First step first.
+    /// The first step is taken first.
     Forward,
-    /// Last step first.
+    /// The last step is taken first.
     Backward,
 }
 
-/// One direction's way through a sequence; [`Pass::advance`] takes it some pairs of steps further.
+/// Tracks one direction's pass through a sequence; [`Pass::advance`] takes it some pairs of steps further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pass {
     way: Direction,
@@ -148,11 +148,11 @@ pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, u
     }
 }
 
-/// A network of two bidirectional layers at work on one sequence; [`Run::advance`] takes it one
-/// bounded piece further: pairs of steps in one direction of one layer.
+/// Runs a network of two bidirectional layers over one sequence; [`Run::advance`] takes it one bounded piece further:
+/// pairs of steps in one direction of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
-    /// 0, 1: layer 1 forward, backward; 2, 3: layer 2.
+    /// Direction at work: 0 and 1 are layer 1 forward and backward, 2 and 3 layer 2.
     stage: u8,
     pass: Pass,
 }

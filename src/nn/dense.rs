@@ -3,7 +3,7 @@
 /// Weights of one output over `2 H` hidden values, int16, and how its sum is scaled.
 #[derive(Debug, Clone, Copy)]
 pub struct Dense<'w> {
-    /// Forward half, then backward half.
+    /// Weights of the forward half, then of the backward half.
     pub weights: &'w [i16],
     /// The bias in accumulator units.
     pub bias: i32,
@@ -12,7 +12,7 @@ pub struct Dense<'w> {
 }
 
 impl Dense<'_> {
-    /// A row without inputs: its output is zero.
+    /// This row has no inputs; its output is zero.
     pub const EMPTY: Self = Self { weights: &[], bias: 0, multiplier: 0 };
     /// Fraction bits of the multiplier.
     pub const SHIFT: u32 = 24;

@@ -1,11 +1,11 @@
-//! This module computes powers of two in integers: a cubic over one octave, then a shift. The same steps for any
-//! input.
+//! This module computes powers of two in integers: a cubic over one octave, then a shift. Every input takes the same
+//! steps.
 
 /// Fraction bits of the exponent.
 pub const FRACTION_BITS: u32 = 16;
 
-/// Cubic of least relative error (1.1e-4) for 2^f with 0 <= f < 1 that is exact at both ends,
-/// so that octaves join: coefficients of f, f^2, f^3 in Q16.
+/// These are the coefficients of f, f^2, f^3 in Q16 of the cubic with the least relative error (1.1e-4) for 2^f, 0 <= f
+/// < 1, among those exact at both ends, so that octaves join.
 const CUBIC: [u32; 3] = [45_575, 14_831, 5_130];
 
 /// Returns `unit * 2^exponent` for an exponent in Q16, rounded down, saturated to 2^31 - 1.

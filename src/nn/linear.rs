@@ -1,6 +1,7 @@
-//! A linear layer computes every output from all inputs with int32 weights, exactly: nothing of an input is rounded.
+//! A linear layer computes every output from all inputs with int32 weights, and rounds just once at the end: products
+//! are summed in 64 bits.
 
-/// The weights of outputs over inputs, row by row, in place.
+/// Holds the weights of a linear layer in place: a row for each output, a column for each input.
 #[derive(Debug, Clone, Copy)]
 pub struct Linear<'w> {
     inputs: usize,
@@ -10,7 +11,7 @@ pub struct Linear<'w> {
 impl<'w> Linear<'w> {
     /// Fraction bits of a weight.
     pub const FRACTION_BITS: u32 = 24;
-    /// The limit of the sum of a row's magnitudes: with it, no inputs overflow a sum of 64 bits.
+    /// The magnitudes of a row must not add up to more than this, so that no inputs can overflow a sum of 64 bits.
     pub const ROW_LIMIT: u64 = u32::MAX as u64;
 
     /// Takes rows of `inputs` weights as they lie in a weight file.

@@ -1,4 +1,4 @@
-//! This module is one LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
+//! This module computes one LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
 //!
 //! The portable code here is the definition of the result (formats and packing: [`crate::nn`]).
 //! Where the processor has a faster way (`nn/simd/`), [`project`] and [`step`] take it; the
@@ -14,18 +14,17 @@
 
 use super::{GATES, HIDDEN_FRACTION_BITS, activation, simd, unpack};
 
-/// Accumulators of one unit: row i, rows i and f packed, row g, rows g and o packed.
+/// Holds the accumulators of one unit: row i, rows i and f packed, row g, rows g and o packed.
 pub type Accumulators = [i32; GATES];
 
 /// Words of an input record before its columns.
 pub(super) const BIAS_WORDS: usize = GATES;
-/// Most inputs of a direction: a kernel may hold one unit's record on the stack.
+/// A direction has at most this many inputs, because a kernel may hold one unit's record on the stack.
 pub const MAX_INPUTS: usize = 192;
 /// Words of a recurrent record after its columns.
 const MULTIPLIER_WORDS: usize = GATES / 2;
 
-/// Weights of one direction, in place. The lengths are checked once, here; the kernels rely on
-/// them.
+/// Holds the weights of one direction, in place. Lengths are checked once, here; the kernels rely on them.
 #[derive(Debug, Clone, Copy)]
 pub struct DirectionWeights<'w> {
     units: usize,
@@ -100,10 +99,10 @@ impl<'w> DirectionWeights<'w> {
         self.recurrent
     }
 
-    /// Returns the same direction with its recurrent records in `room`, where it copies them if `load`, else an
-    /// earlier call has. Where they do not fit, they are read in place.
+    /// Returns the same direction with its recurrent records in `room`; with `load` it copies them there, without it an
+    /// earlier call has. If they do not fit, they are read in place.
     ///
-    /// A step reads every record once. Memory without wait states pays for the copy in two or three steps.
+    /// A step reads every record once. In memory without wait states the copy pays for itself in two or three steps.
     #[must_use]
     pub fn through<'a>(&self, room: &'a mut [u32], load: bool) -> DirectionWeights<'a>
     where
@@ -128,24 +127,24 @@ impl<'w> DirectionWeights<'w> {
     }
 }
 
-/// State and scratch of one direction with up to `U` units, in `W` words of hidden state, with room for the
+/// Holds state and scratch of one direction with up to `U` units, in `W` words of hidden state, with room for the
 /// projections of `P` pairs of steps. A direction of fewer units, a multiple of four, takes the first places of each
 /// array.
 #[derive(Debug, Clone)]
 pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     /// Cell state, Q20.
     pub cell_state: [i32; U],
-    /// Hidden state before and after a step, Q10, two units a word; which is which alternates.
+    /// Hidden state before and after a step, Q10, two units a word; the two take turns.
     pub hidden: [[u32; W]; 2],
     /// Input projections of consecutive steps.
     pub projection: [Projection<U>; P],
 }
 
-/// Input projections of two consecutive steps.
+/// Holds the input projections of two consecutive steps.
 pub type Projection<const U: usize> = [[Accumulators; U]; 2];
 
 impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
-    /// The state before the first step: all zero.
+    /// Before the first step the state is all zero.
     pub const ZERO: Self = {
         assert!(2 * W == DirectionWeights::padded(U), "W is half of U, U rounded up to a multiple of four");
         Self { cell_state: [0; U], hidden: [[0; W]; 2], projection: [[[[0; GATES]; U]; 2]; P] }
@@ -154,11 +153,11 @@ impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
 
 /// Computes bias and input products of all units, for a pair of consecutive steps each.
 ///
-/// `x`: the inputs of all pairs, the two steps of a pair word by word in turn, as many words a pair as the
-/// direction has inputs.
+/// `x` holds the inputs of all pairs; the two steps of a pair alternate word by word, and a pair has as many words as
+/// the direction has inputs.
 ///
-/// Does nothing when `x` does not fit the direction, or `U` does not hold its units: a defect of the caller, which
-/// debug builds stop at.
+/// Does nothing when `x` does not fit the direction, or `U` does not hold its units: that is a defect of the caller, at
+/// which debug builds stop.
 pub fn project<const U: usize>(
     direction: &DirectionWeights<'_>,
     x: &[u32],
@@ -200,7 +199,7 @@ fn accumulate(acc: &mut Accumulators, rows: &[u32], x: impl Iterator<Item = u32>
             let (w0, w1) = unpack(*word);
             let low = i32::from(w0 as i8) * x0 + i32::from(w1 as i8) * x1;
             acc[2 * pair] = acc[2 * pair].wrapping_add(low);
-            // Wraps on the way; the row bound makes the final difference exact.
+            // Sums may wrap on the way; the row bound makes the final difference exact.
             acc[2 * pair + 1] = acc[2 * pair + 1].wrapping_add(w0 * x0).wrapping_add(w1 * x1);
         }
     }
@@ -313,5 +312,5 @@ pub fn row_bound(direction: &DirectionWeights<'_>, unit: usize, input_max: i32) 
     bound
 }
 
-/// The limit of [`row_bound`]: low rows fill an int32, 256 times a high row does.
+/// [`row_bound`] must stay below this: low rows fill an int32, and so do high rows times 256.
 pub const ROW_LIMIT: [i64; GATES] = [1 << 31, 1 << 23, 1 << 31, 1 << 23];

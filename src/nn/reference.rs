@@ -1,17 +1,16 @@
-//! This module is the networks in plain f32, which the integer code is measured against. Never optimised.
+//! This module computes the layers in plain f32, the reference for the integer code; it is never optimised.
 //!
-//! Equations 7 to 12 of Zhao et al., with the weights as PyTorch lays them out: the rows of
-//! `weight_ih` (4H, I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows
-//! each, and there are two bias vectors (4H).
+//! It follows equations 7 to 12 of Zhao et al., with the weights as PyTorch lays them out: the rows of `weight_ih` (4H,
+//! I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows each, and there are two bias vectors (4H).
 
 use super::GATES;
 
-/// One direction of an LSTM layer, PyTorch layout, row-major.
+/// Holds the weights of one direction of an LSTM layer, in PyTorch's layout, row-major.
 #[derive(Debug, Clone, Copy)]
 pub struct LstmWeights<'w> {
-    /// (4H, I)
+    /// (4H, I): weights of the inputs.
     pub weight_ih: &'w [f32],
-    /// (4H, H)
+    /// (4H, H): weights of the hidden state.
     pub weight_hh: &'w [f32],
     /// (4H)
     pub bias_ih: &'w [f32],

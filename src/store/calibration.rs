@@ -1,4 +1,4 @@
-//! A calibration holds what the board has found out about its own sensor.
+//! A calibration holds what measurements have shown about the board's own sensor: bias, level, gain.
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
@@ -9,32 +9,32 @@ use serde::{Deserialize, Serialize};
 
 /// Most points of the temperature table.
 pub const MAX_POINTS: usize = 8;
-/// Points that are closer are one.
+/// Points less than this apart are merged, 1/100 deg C.
 const POINT_SPACING: i16 = 500;
 /// Largest believable bias, rad/s.
 const MAX_BIAS: f32 = 1.0;
-/// Temperatures that parts are made for, deg C.
+/// Parts are made for temperatures in this range, deg C.
 const TEMPERATURE: (f32, f32) = (-60.0, 150.0);
 /// Furthest from level that a mounting calibration may find, deg; more is a wrong rotation.
 pub(crate) const MAX_TILT_DEG: f32 = 45.0;
 
-/// The gyro's bias at a temperature.
+/// Holds the gyro's bias at one temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BiasPoint {
     /// The temperature of the part.
     pub temperature: CentiCelsius,
-    /// About x, y, z.
+    /// Bias about x, y, z.
     pub gyro_bias: [AngularRate; 3],
 }
 
-/// The tilt of the configured sensor frame against level ground.
+/// Holds the tilt of the configured sensor frame against level ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Level {
-    /// About x, deg.
+    /// Tilt about x, deg.
     pub roll_deg: f32,
-    /// About y, deg.
+    /// Tilt about y, deg.
     pub pitch_deg: f32,
 }
 
@@ -46,17 +46,18 @@ impl Level {
     }
 }
 
-/// The gain and mounting of the unit's gyro, as a drive with a reference yaw rate has shown them (`gyronet calibrate`).
+/// Holds gain and mounting of the unit's gyro, as a drive with a reference yaw rate has shown them (`gyronet
+/// calibrate`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnitMap {
     /// The map.
     pub gyro_map: GyroMap,
-    /// The checksum of the weights that corrected the drive: what they take off by themselves is not in the map.
+    /// The checksum of the weights that corrected the drive; the map leaves out the errors that these weights correct.
     pub weights: u32,
 }
 
-/// Bias, its temperature table, and the mounting as found on level ground.
+/// Holds the bias, its temperature table, the level and the unit's map, as far as calibrations have found them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Calibration {
     /// The result of the last static calibration.
@@ -70,7 +71,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// The calibration of an unknown sensor.
+    /// This calibration is that of an unknown sensor.
     pub const NONE: Self = Self { gyro_bias: None, temperature_table: Vec::new(), level: None, unit: None };
 
     /// Returns the map for a board that runs these weights; `None` if no map is stored, or one for other weights.
@@ -94,7 +95,7 @@ impl Calibration {
         }
         // There is room: a full table has just lost a point.
         let _ = self.temperature_table.push(BiasPoint { temperature, gyro_bias });
-        // All others are in order: one way through takes the new one to its place.
+        // All others are in order: one pass takes the new one to its place.
         for k in (1..self.temperature_table.len()).rev() {
             if let Some([low, high]) = self.temperature_table.get_mut(k - 1..=k)
                 && low.temperature > high.temperature
@@ -109,7 +110,7 @@ impl Record for Calibration {
     const KEY: u8 = 2;
     const VERSION: u8 = 2;
 
-    /// Returns the end that layout 1 lacks: it ended before `unit`.
+    /// Returns the bytes that layout 1 lacks at its end, where `unit` was added.
     fn missing(version: u8) -> Option<&'static [u8]> {
         (version == 1).then_some(&[0])
     }

@@ -1,4 +1,5 @@
-//! The configuration holds everything that a user sets.
+//! The configuration holds everything that a user sets; it is checked when stored and when read, so that the code that
+//! uses it needs no checks.
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
@@ -16,7 +17,7 @@ use crate::units::AngularRate;
 use embedded_can::{Id, StandardId};
 use serde::{Deserialize, Serialize};
 
-/// The inertial sensor that is fitted.
+/// Names the inertial sensor that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -29,7 +30,7 @@ pub enum ImuPart {
     Adis16465,
 }
 
-/// The fibre-optic gyro that is fitted.
+/// Names the fibre-optic gyro that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -40,7 +41,7 @@ pub enum FogPart {
     Dsp3000,
 }
 
-/// The rotation of the sensor against the vehicle: about x (forward), then y (left), then z (up).
+/// Describes the rotation of the sensor against the vehicle: about x (forward), then y (left), then z (up).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mounting {
@@ -60,7 +61,7 @@ impl Mounting {
     }
 }
 
-/// The correction of the fibre-optic gyro.
+/// Configures the correction of the fibre-optic gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogLane {
@@ -72,7 +73,7 @@ pub struct FogLane {
     pub latitude_frame: Option<LatitudeSettings>,
 }
 
-/// Everything that a user can set. It holds from the next start on.
+/// Holds everything that a user can set; a change takes effect at the next start.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
     /// Inertial sensor.
@@ -81,8 +82,8 @@ pub struct Configuration {
     pub fog: Option<FogPart>,
     /// Messages, identifiers, periods, protection.
     pub can: Settings,
-    /// -90 to 90 deg, north positive; `None`: the Earth's rate stays in the bias, and the rate of a fibre-optic gyro
-    /// is degraded until [`FogLane::latitude_frame`] brings one.
+    /// Latitude, -90 to 90 deg, north positive; with `None` the Earth's rate stays in the bias, and the rate of a
+    /// fibre-optic gyro is degraded until [`FogLane::latitude_frame`] brings a latitude.
     pub latitude_deg: Option<f32>,
     /// The mounting of the sensor.
     pub mounting: Mounting,
@@ -97,7 +98,7 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// An Xsens MTi, level, on a car, with the Bosch set and our own messages.
+    /// By default the board has an Xsens MTi, mounted level in a car, and sends the Bosch set and our own messages.
     pub const DEFAULT: Self = Self {
         imu: ImuPart::XsensMti,
         fog: None,
@@ -113,7 +114,8 @@ impl Configuration {
 
 impl Configuration {
     /// Makes the pipeline's configuration from this one and a calibration. A level that was found on level ground
-    /// is the mounting: the street is not asked any more. The map of the gyro counts for the weights it was found with.
+    /// completes the mounting, and levelling by the street is off. The map of the gyro applies only with the weights it
+    /// was found with.
     #[must_use]
     pub fn pipeline(&self, calibration: &Calibration, weights: u32) -> PipelineConfig {
         // All angles have been checked to be finite.
@@ -136,7 +138,7 @@ impl Configuration {
         self.latitude_deg.and_then(Latitude::from_degrees)
     }
 
-    /// Returns the first of these identifiers that one of the board's own messages has.
+    /// Returns the first of these identifiers that one of the board's own messages uses.
     pub(crate) fn own_identifier(&self, mut ids: impl Iterator<Item = Id>) -> Option<Id> {
         let can = Config::new(self.can).ok()?;
         let fog = self.fog_ids.map(|id| StandardId::new(id).map(Id::Standard));
@@ -166,9 +168,8 @@ impl Configuration {
         self.fog_lane.latitude_frame.map(make).transpose()
     }
 
-    /// Makes the configuration of a coprocessor that runs the weights with this checksum; the wheels, the clock, the
-    /// networks and damage found
-    /// at the start are the board's to add.
+    /// Makes the configuration of a coprocessor that runs the weights with this checksum; the board adds the wheels,
+    /// the clock, the networks and damage found at the start.
     #[must_use]
     pub fn coprocessor(&self, calibration: &Calibration, weights: u32) -> coprocessor::Config {
         coprocessor::Config {
@@ -188,8 +189,8 @@ impl Record for Configuration {
     const KEY: u8 = 1;
     const VERSION: u8 = 3;
 
-    /// Returns the end that older layouts lack: 1 ended before `fog_ids`, which were [`FOG_IDS`], here as varints; 2
-    /// ended before `fog_lane`.
+    /// Returns the bytes that older layouts lack at their end: 1 ended before `fog_ids`, which were [`FOG_IDS`], here
+    /// as varints; 2 ended before `fog_lane`.
     fn missing(version: u8) -> Option<&'static [u8]> {
         const ALL: &[u8] = &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0];
         match version {
@@ -210,7 +211,7 @@ impl Record for Configuration {
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
-        // What modes and lags there are, their types say.
+        // Modes and lags need no check: their types have no other values.
         let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_carry } = self.compensate;
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         for (field, value, low, high) in [

@@ -1,11 +1,11 @@
-//! These errors are the reasons why something is not stored, or not read.
+//! These errors say why something is not stored or not read, so that a user can mend it.
 
 use crate::can::config::ConfigError;
 use crate::can::latitude::LatitudeConfigError;
 use crate::can::wheel::WheelConfigError;
 use serde::{Deserialize, Serialize};
 
-/// A value of the configuration or calibration that has a range.
+/// Names a value of the configuration or calibration that has a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -72,21 +72,21 @@ pub enum FieldError {
         field: Field,
         /// The value.
         value: f32,
-        /// Least that it may be.
+        /// The smallest valid value.
         low: f32,
-        /// Most that it may be.
+        /// The largest valid value.
         high: f32,
     },
-    /// A map of the gyro that no unit has: an element is too far from the identity.
+    /// The map of the gyro is implausible: an element is too far from the identity.
     #[error("{}: no unit is so far from the identity", .0.name())]
     Implausible(Field),
-    /// The messages on the bus are no configuration.
+    /// The configuration of the bus messages is invalid.
     #[error("can: {0}")]
     Can(ConfigError),
-    /// The place of the latitude on the bus is no configuration.
+    /// The configuration of the latitude frame is invalid.
     #[error("fog_lane.latitude_frame: {0}")]
     Latitude(LatitudeConfigError),
-    /// The wheel frames are no configuration.
+    /// The configuration of the wheel frames is invalid.
     #[error("wheels: {0}")]
     Wheels(WheelConfigError),
     /// This firmware image does not drive the part.
@@ -97,29 +97,29 @@ pub enum FieldError {
     BitRateNotInImage(u32),
 }
 
-/// Passes a value that is inside its range.
+/// Checks that a value is inside its range.
 pub(super) fn within(field: Field, value: f32, low: f32, high: f32) -> Result<(), FieldError> {
-    // NaN is inside nothing.
+    // NaN is inside no range.
     if (low..=high).contains(&value) { Ok(()) } else { Err(FieldError::Range { field, value, low, high }) }
 }
 
-/// The fault that the flash reports.
+/// The reason why a flash operation failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FlashFault {
-    /// An address that is no start of a word or sector.
+    /// The address is not the start of a word or sector.
     #[error("not the start of a word or sector")]
     NotAligned,
-    /// The address is beyond the end.
+    /// The address is beyond the end of the flash.
     #[error("beyond its end")]
     OutOfBounds,
-    /// It did not take the operation, or did not finish it in time.
+    /// The flash refused the operation, or did not finish it in time.
     #[error("did not take or finish the operation")]
     Refused,
 }
 
-/// The reason why the store has not done what was requested.
+/// The reason why the store has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -130,10 +130,10 @@ pub enum StoreError {
     /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// There is no room left.
+    /// No room is left for the record.
     #[error("no room is left for the record")]
     Full,
-    /// A record of another layout.
+    /// The record has a layout that this firmware does not read.
     #[error("the record has layout {found}, this firmware reads {expected}")]
     Version {
         /// The version as stored.
@@ -141,7 +141,7 @@ pub enum StoreError {
         /// The version that this firmware reads.
         expected: u8,
     },
-    /// A record that is not what its version says.
+    /// The record's bytes do not decode as its version requires.
     #[error("the record is not what its version says")]
     Encoding,
     /// A value is out of its range.

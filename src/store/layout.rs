@@ -1,4 +1,4 @@
-//! The layout places everything in the flash of an STM32F405xG (RM0090 table 5): 1 MiB, twelve sectors.
+//! The layout gives the place of everything in the flash of an STM32F405xG (RM0090 table 5): 1 MiB, twelve sectors.
 //!
 //! | sectors | size | what |
 //! |---|---|---|
@@ -7,9 +7,8 @@
 //! | 3 to 9 | 16 + 64 + 5 x 128 KiB | code and constants, the built-in weights among them |
 //! | 10, 11 | 2 x 128 KiB | weight slots ([`SLOTS`]) |
 //!
-//! Records want sectors that are small and of one size, and the processor wants its vectors in
-//! sector 0; so the code begins behind the records. The image's `regions.x` and `slots.x` say the
-//! same to the linker, and a test holds them together.
+//! Records need small sectors of one size, and the processor needs its vectors in sector 0; so the code begins behind
+//! the records. The image's `regions.x` and `slots.x` give the linker the same layout, and a test compares them.
 
 use core::ops::Range;
 
@@ -26,17 +25,17 @@ pub const SECTORS: [u32; 12] = {
     sizes[4] = 64 << 10;
     sizes
 };
-/// Size of a sector of records.
+/// Size of a sector of records, bytes.
 pub const RECORD_SECTOR: usize = 16 << 10;
-/// Records, as offsets into the flash.
+/// The records lie at these offsets into the flash.
 pub const STORE: Range<u32> = 0x4000..0xC000;
-/// First byte of the code.
+/// Offset of the first byte of the code.
 pub const CODE: u32 = 0xC000;
-/// First byte behind the code.
+/// Offset of the first byte behind the code.
 pub const CODE_END: u32 = 0xC_0000;
-/// Size of a weight slot: one sector.
+/// Size of a weight slot, one sector, bytes.
 pub const SLOT_SIZE: usize = 128 << 10;
-/// The offsets of both weight slots.
+/// Both weight slots lie at these offsets into the flash.
 pub const SLOTS: Range<u32> = 0xC_0000..0x10_0000;
 
 /// Returns the number of the sector that begins at an offset; `None` where none begins.

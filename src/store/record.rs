@@ -1,4 +1,4 @@
-//! Records lie in two sectors of flash; each is found by its key, and the newest of a kind counts.
+//! Records lie in two sectors of flash; each is found by its key, and the newest with a key is valid.
 //!
 //! A sector is a header of two words, then records one behind the other:
 //!
@@ -8,11 +8,10 @@
 //! | n / 4, rounded up | postcard's encoding, then FF | 1 | CRC-32 of the generation |
 //! | 1 | CRC-32 of all words before it | | |
 //!
-//! All little-endian. A record is appended until the sector in use is full, or ends in a record
-//! that a power cut has torn. Then the *other* sector is erased, the newest record of each key is
-//! copied there with the new one, and the header comes last, with the next generation: only with
-//! it does that sector take over. So whatever is erased or half written is never what counts, and
-//! how an interrupted erasure leaves a sector does not matter.
+//! All little-endian. Records are appended until the sector in use is full, or ends in a record that a power cut has
+//! torn. Then the *other* sector is erased, the newest record of each key is copied there with the new one, and the
+//! header comes last, with the next generation: only then does that sector take over. So the sector in use is never the
+//! one being erased or filled, and it does not matter in what state an interrupted erasure leaves the other.
 
 use super::error::{FieldError, FlashFault, StoreError};
 use crate::model::blob::CRC;
@@ -30,14 +29,14 @@ const MAX_LEN: usize = 248;
 const BUFFER: usize = MAX_LEN + 2 * WORD;
 /// Highest key.
 const MAX_KEY: u8 = 7;
-/// A header is not to be mistaken for one of some other use of the flash.
+/// This mark in the header's checksum tells our sectors from other uses of the flash.
 const FORMAT: u32 = u32::from_le_bytes(*b"GYR1");
 
-/// A kind of record: its key, its layout's version, and its ranges.
+/// Gives a stored type its key, the version of its layout, and its ranges.
 pub trait Record: Serialize + DeserializeOwned {
-    /// Its place among the records, 1 to 7; never given to another one.
+    /// The key of this kind of record, 1 to 7; a key is never reused for another kind.
     const KEY: u8;
-    /// The version of its layout; it is raised with every change.
+    /// The version of the layout; every change raises it.
     const VERSION: u8;
 
     /// Returns the bytes that a record of an older layout lacks at its end; `None` where this firmware does not
@@ -49,11 +48,11 @@ pub trait Record: Serialize + DeserializeOwned {
     /// Checks that all values are inside their ranges.
     ///
     /// # Errors
-    /// [`FieldError`] that names the first one that is not.
+    /// [`FieldError`], which names the first value that is not.
     fn check(&self) -> Result<(), FieldError>;
 }
 
-/// A record as it lies in flash.
+/// Holds a record as it lies in flash.
 #[derive(Clone, Copy)]
 struct Raw {
     words: [u8; BUFFER],
@@ -71,7 +70,7 @@ impl Raw {
     fn encode<R: Record>(&mut self, record: &R) -> Option<()> {
         let (first, rest) = self.words.split_first_chunk_mut::<WORD>()?;
         let len = postcard::to_slice(record, rest.get_mut(..MAX_LEN)?).ok()?.len();
-        // The encoder may leave things behind its end.
+        // The encoder may leave bytes behind its end.
         rest.get_mut(len..)?.fill(0xFF);
         let [low, high] = u16::try_from(len).ok()?.to_le_bytes();
         *first = [R::KEY, R::VERSION, low, high];
@@ -112,35 +111,35 @@ impl Raw {
     }
 }
 
-/// The content of a place in a sector.
+/// Describes what lies at a place in a sector.
 enum Place {
     /// A record; it may be torn.
     Record,
-    /// The counters before the first event.
+    /// Nothing has been written here since the sector was erased.
     Blank,
-    /// No record can begin so, or none fits any more.
+    /// No record begins here: the bytes are not a record's, or no room is left.
     End,
 }
 
-/// The newest record of each kind, in two flash sectors that are used in turn.
+/// Keeps the newest record of each kind, in two flash sectors that are used in turn.
 pub struct Store<F> {
     flash: F,
     start: u32,
-    /// Flash that reads as zeros was never written, which holds in an emulator without a flash controller.
+    /// Flash that reads as zeros counts as never written, as in an emulator without a flash controller.
     zeros_are_blank: bool,
     /// Sector in use and its generation.
     current: Option<(u32, u32)>,
     /// The place of the next record, while there is room.
     free: Option<u32>,
     damaged: bool,
-    /// A header is neither one nor blank: a sector that would count may be lost.
+    /// A header is neither valid nor blank: the newest sector may be lost.
     header_damaged: bool,
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Looks at two sectors from `start` on (an offset into `flash`). Writes nothing. `zeros_are_blank` holds for
-    /// an emulator without a flash controller; a chip's erased flash reads as ones, and sectors of zeros are then
-    /// reported as damaged: a raw image of the flash has overwritten them.
+    /// Opens the two sectors from `start` on (an offset into `flash`); writes nothing. `zeros_are_blank` holds for an
+    /// emulator without a flash controller; a chip's erased flash reads as ones, and sectors of zeros are then reported
+    /// as damaged: a raw image of the flash has overwritten them.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
@@ -157,7 +156,7 @@ impl<F: NorFlash> Store<F> {
             }
         }
         if store.current.is_some() {
-            // The last key that there is none of: the walk goes to the end.
+            // No record has key 0: the walk goes to the end.
             let mut nothing = Raw::EMPTY;
             store.find(0, &mut nothing)?;
         }
@@ -174,13 +173,14 @@ impl<F: NorFlash> Store<F> {
     /// Returns the newest whole record; `None` before the first one.
     ///
     /// # Errors
-    /// [`StoreError`]: nothing that is not whole and inside its ranges is returned.
+    /// [`StoreError`] when the flash cannot be read, or the record has another layout, does not decode or has a value
+    /// out of its range.
     pub fn get<R: Record>(&mut self) -> Result<Option<R>, StoreError> {
         let mut raw = Raw::EMPTY;
         if self.find(R::KEY, &mut raw)? { raw.decode().map(Some) } else { Ok(None) }
     }
 
-    /// Stores a record and reads it back; until it is whole the one before stays.
+    /// Stores a record and reads it back; until it is whole the one before remains valid.
     ///
     /// # Errors
     /// [`StoreError::Field`] for a value out of its range: nothing is written then.
@@ -192,8 +192,7 @@ impl<F: NorFlash> Store<F> {
         self.write(&raw)
     }
 
-    /// Writes an encoded record. It stands apart from [`Store::set`], of which there is one for each kind of
-    /// record.
+    /// Writes an encoded record. It is separate from [`Store::set`], which is compiled once for each kind of record.
     #[inline(never)]
     fn write(&mut self, raw: &Raw) -> Result<(), StoreError> {
         let appended = match (self.current, self.free) {
@@ -232,7 +231,7 @@ impl<F: NorFlash> Store<F> {
         Ok(whole.then_some(generation))
     }
 
-    /// Reads a record, where there is one.
+    /// Reads the record at `at` into `raw`, if there is one.
     fn place(&mut self, sector: u32, at: u32, raw: &mut Raw) -> Result<Place, StoreError> {
         let end = self.range(sector).end;
         if at + WORD_U32 > end {
@@ -253,8 +252,8 @@ impl<F: NorFlash> Store<F> {
         Ok(Place::Record)
     }
 
-    /// Puts the newest whole record of a key into `newest`; whether there is one. Learns where the
-    /// next one goes.
+    /// Copies the newest whole record of a key into `newest`; returns whether there is one. Also finds the place of the
+    /// next record.
     #[inline(never)]
     fn find(&mut self, key: u8, newest: &mut Raw) -> Result<bool, StoreError> {
         let Some((sector, _)) = self.current else { return Ok(false) };
@@ -274,7 +273,7 @@ impl<F: NorFlash> Store<F> {
                         found = true;
                     }
                 }
-                // Nothing is put behind what may be half a record.
+                // No record is appended behind one that may be torn.
                 Place::Blank => {
                     self.free = (!self.damaged()).then_some(at);
                     return Ok(found);
@@ -288,7 +287,7 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Returns the place of the record after it; `None` without room for it.
+    /// Writes a record at `at` and returns the place of the next one; `None` if there is no room for it.
     fn append(&mut self, sector: u32, at: u32, raw: &Raw) -> Result<Option<u32>, StoreError> {
         let end = at + raw.bytes().len() as u32;
         if end > self.range(sector).end {

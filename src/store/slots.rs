@@ -1,9 +1,9 @@
-//! There are two slots for weight files, and a record of the file that the network runs on.
+//! Two slots take weight files, and a record names the file that the network runs on.
 //!
-//! A file is uploaded to the slot that is not in use, checked there, and then accepted: a record
-//! names the slot and the file's checksum. At the next start [`select`] takes the first file
-//! that passes all checks: the accepted slot, the other slot if its file was once accepted, the
-//! built-in weights. An upload that breaks off has touched the unused slot only.
+//! A file is uploaded to the slot that is not in use, checked there, and then accepted: a record names the slot and the
+//! file's checksum. At the next start [`select`] takes the first file that passes all checks: the accepted slot, the
+//! other slot if its file was once accepted, the built-in weights. So an upload that breaks off never harms the file in
+//! use: it touches the unused slot only.
 
 use super::error::{FieldError, FlashFault};
 use super::layout::SLOT_SIZE;
@@ -12,7 +12,7 @@ use crate::model::{Blob, BlobError};
 use embedded_storage::nor_flash::{NorFlash, NorFlashError};
 use serde::{Deserialize, Serialize};
 
-/// One of the two slots.
+/// Names one of the two slots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Slot {
@@ -35,7 +35,7 @@ impl Slot {
         }
     }
 
-    /// Returns the offset of its first byte in the slots.
+    /// Returns the offset of the slot's first byte, from that of slot A.
     #[must_use]
     pub const fn offset(self) -> u32 {
         match self {
@@ -44,7 +44,7 @@ impl Slot {
         }
     }
 
-    /// Returns its element of a pair.
+    /// Returns this slot's element of a pair.
     pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
         match self {
             Self::A => a,
@@ -59,20 +59,20 @@ impl core::fmt::Display for Slot {
     }
 }
 
-/// The files that were accepted, and the one that is to be used.
+/// Records the files that were accepted, and the one to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Accepted {
-    /// The slot to use; `None`: the built-in weights.
+    /// The slot to use; `None` selects the built-in weights.
     pub active: Option<Slot>,
     /// Checksum of the file that was accepted in each slot.
     pub files: [Option<u32>; 2],
 }
 
 impl Accepted {
-    /// The record before any file was accepted.
+    /// No file has been accepted.
     pub const NONE: Self = Self { active: None, files: [None; 2] };
 
-    /// Returns the record with a checked file in a slot, to be used.
+    /// Returns the record with a checked file added in a slot, which becomes the one to use.
     #[must_use]
     pub const fn with(mut self, slot: Slot, file: u32) -> Self {
         let [a, b] = self.files;
@@ -105,13 +105,13 @@ pub enum SlotError {
     /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// The slot was not written since it was erased.
+    /// The slot has not been written since it was erased.
     #[error("the slot is empty")]
     Empty,
-    /// A file that is longer than a slot, or no whole number of words.
+    /// The length is longer than a slot, or not a whole number of words.
     #[error("{0} bytes are no whole number of words up to {SLOT_SIZE}")]
     Length(u32),
-    /// A block that does not continue the upload.
+    /// The block does not continue the upload.
     #[error("the next block must begin at {expected}")]
     Offset {
         /// The offset at which the next block must begin; the bytes before it are written.
@@ -149,15 +149,15 @@ pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
     Blob::new_checked(bytes).map_err(SlotError::Blob)
 }
 
-/// The origin of the weights in use.
+/// Says where the weights in use come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WeightSource {
-    /// A slot.
+    /// The weights come from a slot.
     Slot(Slot),
-    /// The image itself.
+    /// The weights come from the image itself.
     BuiltIn,
-    /// Nowhere: all are damaged, and the rate is the gyro's less its bias.
+    /// All weights are damaged: no network runs, and the rate is the gyro's less its bias.
     None,
 }
 
@@ -171,14 +171,14 @@ impl core::fmt::Display for WeightSource {
     }
 }
 
-/// The result of [`select`].
+/// Holds the result of [`select`].
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'w> {
-    /// The weights to run on.
+    /// The weights to run on, if any passed.
     pub weights: Option<Blob<'w>>,
     /// The origin of the weights.
     pub source: WeightSource,
-    /// The reason why each requested slot is not used.
+    /// The reasons why slots A and B were refused, for those that were tried.
     pub refused: [Option<SlotError>; 2],
 }
 
@@ -210,7 +210,7 @@ fn refuse(refused: &mut [Option<SlotError>; 2], slot: Slot, error: SlotError) {
     } = Some(error);
 }
 
-/// A file on its way into a slot.
+/// Tracks a file that is being uploaded into a slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Upload {
     slot: Slot,
@@ -219,8 +219,8 @@ pub struct Upload {
 }
 
 impl Upload {
-    /// Erases the slot. The processor stands still meanwhile: one to two seconds on an F405
-    /// (its datasheet, 128 KiB sector).
+    /// Erases the slot and begins an upload. The processor stands still meanwhile: one to two seconds on an F405 (its
+    /// datasheet, 128 KiB sector).
     ///
     /// # Errors
     /// [`SlotError::Length`], [`SlotError::Flash`].
@@ -236,9 +236,9 @@ impl Upload {
     /// Writes the next block, a whole number of words.
     ///
     /// # Errors
-    /// [`SlotError::Offset`] when it does not continue what is written, [`SlotError::Length`]
-    /// when it is no whole number of words or goes beyond the announced end,
-    /// [`SlotError::Flash`]; after the last one the upload must begin again.
+    /// [`SlotError::Offset`] when it does not continue what is written, [`SlotError::Length`] when it is not a whole
+    /// number of words or goes beyond the announced end, [`SlotError::Flash`]; after a flash error the upload must
+    /// begin again.
     pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
         if offset != self.written {
             return Err(SlotError::Offset { expected: self.written });
@@ -253,10 +253,10 @@ impl Upload {
         Ok(())
     }
 
-    /// Checks the whole file where it now lies; its checksum.
+    /// Checks the whole file in its slot and returns its checksum.
     ///
     /// # Errors
-    /// [`SlotError::Incomplete`], and whatever [`file()`] finds.
+    /// [`SlotError::Incomplete`], and the errors of [`file()`].
     pub fn verify(&self, slots: [&[u8]; 2]) -> Result<u32, SlotError> {
         if self.written != self.length {
             return Err(SlotError::Incomplete { written: self.written });

@@ -1,5 +1,4 @@
-//! The record of the wheel settings makes a vehicle that is not the built-in one a matter of configuration, not of a
-//! new image.
+//! The wheel settings are a stored record, so that another vehicle needs a configuration and not a new image.
 
 use super::error::FieldError;
 use super::record::Record;

@@ -73,23 +73,23 @@ macro_rules! cpu {
     };
 }
 
-/// Column pairs in the unrolled loop of the projection.
+/// The unrolled loop of the projection has this many column pairs.
 const PROJECT_UNROLL: usize = 12;
 /// Bytes of code for one of them: 4 loads of 2 bytes and 10 instructions of 4; the last one has 4 more.
 const PROJECT_BYTES: usize = 48;
-/// Double column pairs in the unrolled loop of the recurrent step.
+/// The unrolled loop of the recurrent step has this many double column pairs.
 const STEP_UNROLL: usize = 8;
 /// Bytes of code for one of them: 4 loads of 2 bytes and 14 instructions of 4; the last one has 2 more.
 const STEP_BYTES: usize = 64;
 
-/// The arguments of the projection kernel, in the order in which it unpacks them.
+/// Holds the arguments of the projection kernel, in the order in which it unpacks them.
 #[repr(C)]
 struct ProjectCall {
     /// A word before the columns of the first pair of steps.
     x: *const u32,
     /// A word before the end of those of the last one.
     x_end: *const u32,
-    /// The first unit's, of the first step.
+    /// Accumulators of the first unit in the first step.
     projection: *mut Accumulators,
     projection_end: *const Accumulators,
     /// The place to copy a unit's record to; null where it is read in place.
@@ -105,7 +105,7 @@ struct ProjectCall {
     pair_bytes: usize,
 }
 
-/// The arguments of the step kernel, in the order in which it unpacks them.
+/// Holds the arguments of the step kernel, in the order in which it unpacks them.
 #[repr(C)]
 struct StepCall {
     /// A word before the columns, less those that the first turn of the loop leaves out.
@@ -200,7 +200,7 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
 /// Words that the copying kernel takes at once.
 const COPY_WORDS: usize = 8;
 
-/// Copies as much as is in both.
+/// Copies as many words as both slices have.
 pub(in crate::nn) fn copy(from: &[u32], to: &mut [u32]) {
     let (from, to) = (from.as_chunks::<COPY_WORDS>(), to.as_chunks_mut::<COPY_WORDS>());
     let chunks = from.0.len().min(to.0.len());

@@ -1,4 +1,4 @@
-//! This is the kernel for hosts, on the `wide` crate's vectors (SSE2, AVX2 or NEON, as compiled).
+//! This kernel is for hosts and uses the `wide` crate's vectors (SSE2, AVX2 or NEON, as compiled).
 //!
 //! Four words of a record are two column pairs of all four gates: (i,f) (g,o) (i,f) (g,o). With
 //! the matching columns copied beside each other, one multiply-add of halfword pairs does all
@@ -8,7 +8,7 @@ use crate::nn::lstm::{Accumulators, DirectionWeights, Projection, update};
 use crate::nn::pack;
 use wide::{i16x8, i32x4};
 
-/// Packed and low sums, each (i,f) (g,o) (i,f) (g,o): the two halves are still to be added.
+/// Holds packed and low sums, each (i,f) (g,o) (i,f) (g,o); their two halves are still to be added.
 #[derive(Clone, Copy)]
 struct Sums {
     packed: i32x4,
@@ -26,7 +26,7 @@ impl Sums {
         self.low += low.dot(x);
     }
 
-    /// Returns the accumulators, added to their start values.
+    /// Returns the sums added to the accumulators' start values.
     #[inline]
     fn finish(self, start: Accumulators) -> Accumulators {
         let [packed, low] = [self.packed.to_array(), self.low.to_array()];
