@@ -79,7 +79,7 @@ pub struct Aligner {
 }
 
 impl Aligner {
-    /// Is the state before the first sample.
+    /// Starts before the first sample.
     pub const START: Self = Self { last: None };
 
     /// Places a sample on the grid.

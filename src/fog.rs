@@ -1,12 +1,11 @@
-//! This module corrects the turns of a fibre-optic gyro, frame by frame: by the Earth's rate and the gyro's bias
-//! (`lane`), or by FoGNet's estimates where a configuration asks for them.
+//! This module corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
+//! bias (`lane`), or FoGNet's estimate where the configuration selects FoGNet.
 //!
 //! # FoGNet
 //!
-//! A window covers a minute, and there is a new one every second, so 60 windows cover each
-//! second. The estimate of the newest window is used in the second after next. The caller runs the
-//! network in the meantime ([`FogOutput::due`], [`FogCorrector::deliver`]), so fast and slow machines
-//! give the same output.
+//! A window covers a minute, and a new one begins every second, so 60 windows cover each second. A window's estimate is
+//! used in the second after next. The caller runs the network in the meantime ([`FogOutput::due`],
+//! [`FogCorrector::deliver`]), so fast and slow machines give the same output.
 //!
 //! Only the part of a window's correction that is linear in the gyro's increments can be assigned to the
 //! seconds of the window. So, with d a frame's increment, g the mean factor of the linear part, C the
@@ -42,10 +41,10 @@ use crate::model::seconds::{
 };
 use crate::units::Angle;
 
-/// Frames that a window's correction is spread over.
+/// A window's correction is spread over this many frames.
 const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;
 
-/// The use of FoGNet.
+/// Says whether FoGNet is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -58,23 +57,23 @@ pub enum FogNetUse {
     Simulated,
 }
 
-/// The correction of a fibre-optic gyro, and the limits within which FoGNet is used.
+/// Configures the correction of a fibre-optic gyro, and the limits within which FoGNet is used.
 #[derive(Debug, Clone, Copy)]
 pub struct FogConfig {
-    /// The errors of the gyro.
+    /// The expected errors of the gyro.
     pub errors: FogErrors,
     /// The latitude; `None` where it is not known, or comes over the bus.
     pub latitude: Option<Latitude>,
     /// The tilt of the gyro's axis.
     pub tilt: Tilt,
     /// The rate of shaking that a mean over a second still holds, 1 sigma, rad/s: of the standing and of the moving
-    /// vehicle. It is no turn of the vehicle, and sums up to nothing.
+    /// vehicle. It is no turn of the vehicle, and adds up to zero.
     pub shake: [f32; 2],
-    /// The use of FoGNet.
+    /// Whether FoGNet is used.
     pub fognet: FogNetUse,
     /// The filling of a window before a minute is over.
     pub padding: Padding,
-    /// A larger correction of a window is not believed.
+    /// A window's correction beyond this is rejected.
     pub max_correction: Angle,
 }
 
@@ -93,7 +92,7 @@ impl FogConfig {
     };
 }
 
-/// A window's estimate was not believed.
+/// A window's estimate was rejected as too large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImplausibleTurn {
@@ -101,7 +100,7 @@ pub struct ImplausibleTurn {
     pub correction: Angle,
 }
 
-/// The results of one frame of 10 ms.
+/// Holds the results of one frame of 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogOutput {
@@ -109,20 +108,20 @@ pub struct FogOutput {
     pub turn: Option<Angle>,
     /// The correction that was subtracted.
     pub correction: Angle,
-    /// An estimate was in use for this frame.
+    /// Whether an estimate was in use for this frame.
     pub corrected: bool,
     /// A window is due: run [`FogCorrector::window`] through the network and
     /// [`FogCorrector::deliver`] the estimate under this number within a second.
     pub due: Option<u32>,
     /// The window ended here; a new one has begun.
     pub broken: Option<Incomplete>,
-    /// The estimate due with this frame was not believed.
+    /// The reason why the estimate due with this frame was rejected.
     pub implausible: Option<ImplausibleTurn>,
-    /// The estimate due with this frame has not come.
+    /// Whether the estimate due with this frame has not come in time.
     pub late: bool,
 }
 
-/// The gyro's corrections, and where the window stands.
+/// Applies FoGNet's corrections to the gyro, and collects its windows.
 #[derive(Debug, Clone)]
 pub struct FogCorrector {
     config: FogConfig,

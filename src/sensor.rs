@@ -1,9 +1,8 @@
 //! These modules make samples from the bytes of a sensor.
 //!
-//! What the pipeline sees of a part is its samples alone: [`ImuSample`] or [`FogSample`], in
-//! fixed point, with the part's own time unwrapped. [`Source`] names what every part has in
-//! common: firmware for one part is generic over it, and nothing else changes. The image chooses among
-//! the parts that it drives at its start, by configuration.
+//! The pipeline sees only the samples of a part: [`ImuSample`] or [`FogSample`], in fixed point, with the part's own
+//! time unwrapped. [`Source`] is the common interface of all parts, so that firmware can be generic over the part. The
+//! image chooses at its start, by configuration, among the parts that it drives.
 //!
 //! | part | line | type | sample |
 //! |---|---|---|---|
@@ -13,9 +12,8 @@
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
 //! | ADI ADIS16465, 16470 | SPI | [`adis16465::Adis16465`] | [`ImuSample`], timed by data ready |
 //!
-//! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`,
-//! and brought to their configuration by [`serial::configure`]; SPI parts take an
-//! `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
+//! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`, and configured by
+//! [`serial::configure`]; SPI parts take an `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
 //!
 //! # What a parser finds out about damage
 //!
@@ -28,18 +26,17 @@
 //! | DSP-3000 line | none, but its form | a digit may become another one | that digit |
 //! | ICM-42688 packet | none, but its header | a reading may be another one | that reading |
 //!
-//! The last two have no check on the wire at all: keep their lines short, and let the pipeline's
-//! own limits judge the numbers.
+//! The last two have no check on the wire at all: keep their lines short, and rely on the pipeline's own limits.
 //!
 //! # Adding a part, in six steps
 //!
 //! 1. Write down its bytes: a file of its own with `parse` and `emit` over byte slices, and an
-//!    error that says what is wrong and where. No input or output in it.
+//!    error that says what is wrong and where. It does no input or output.
 //! 2. Say how its frames are found: [`framer::Protocol`] for a stream of bytes (header and
-//!    checksum together are synchronisation, a header alone is none), or a thin driver over
+//!    checksum together synchronise, a header alone does not), or a thin driver over
 //!    `embedded_hal::spi::SpiDevice` with bounded waits.
 //! 3. Turn a frame into a sample: units by the types of [`crate::units`], axes x forward, y
-//!    left, z up, time unwrapped, what the part marks as bad left out, never replaced.
+//!    left, z up, time unwrapped; readings that the part marks as bad are left out, never replaced.
 //! 4. Implement [`Source`] (and [`ByteSource`] for a stream) for it, and
 //!    [`serial::Dialogue`] where it must be configured. A part without a clock of its own
 //!    takes the arrival time as an argument instead, as [`adis16465`] and [`dsp3000`] do.
@@ -64,18 +61,18 @@ pub mod xsens;
 
 use crate::sample::{FogSample, ImuSample};
 
-/// A part that gives samples.
+/// Delivers the samples of a part.
 pub trait Source {
-    /// [`ImuSample`] or [`FogSample`].
+    /// The type of its samples: [`ImuSample`] or [`FogSample`].
     type Sample;
     /// The error of a frame or a transfer.
     type Error: core::error::Error;
 
-    /// Returns the next sample. `Some(Err)`: a frame is invalid. `None`: no complete frame waits.
+    /// Returns the next sample: `Some(Err)` for an invalid frame, `None` if no complete frame is waiting.
     fn next_sample(&mut self) -> Option<Result<Self::Sample, Self::Error>>;
 }
 
-/// A part at the end of a line of bytes.
+/// Delivers the samples of a part that sends a stream of bytes.
 pub trait ByteSource: Source {
     /// Takes one byte. Call [`Source::next_sample`] until `None` before the next one.
     fn receive(&mut self, byte: u8);

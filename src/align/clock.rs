@@ -104,7 +104,7 @@ pub struct PartClock {
 }
 
 impl PartClock {
-    /// Is the state before the first sample.
+    /// Starts before the first sample.
     pub const START: Self = Self { last: None, late_since: None, counters: ClockCounters::NONE };
 
     /// Takes a sample's time stamp and when it arrived.

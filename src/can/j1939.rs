@@ -18,7 +18,7 @@ use embedded_can::{ExtendedId, Frame};
 
 /// Parameter group number of VDC2.
 pub const VDC2_PGN: u32 = 61_449;
-/// Is the default priority of VDC2 on the bus.
+/// VDC2 has this default priority on the bus.
 pub const VDC2_PRIORITY: u8 = 6;
 /// Largest code that is a value.
 const MAX_CODE: i64 = 0xFAFF;
@@ -41,7 +41,7 @@ pub const fn broadcast_id(pgn: u32, priority: u8, source: u8) -> Option<Extended
     ExtendedId::new((priority as u32) << 26 | pgn << 8 | source as u32)
 }
 
-/// Holds the signals of VDC2 that the coprocessor measures, as codes.
+/// Holds the codes of the VDC2 signals that the coprocessor fills in; the frame's other bytes say "not available".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vdc2 {
@@ -103,7 +103,7 @@ impl Vdc2 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {
-    /// A value.
+    /// The rate is valid.
     Valid,
     /// The rate is not available, because the sensor is not ready.
     NotAvailable,
@@ -125,7 +125,7 @@ impl Default for Vdc2Encoder {
 }
 
 impl Vdc2Encoder {
-    /// Nothing owed.
+    /// Starts without a rounding residual.
     pub const START: Self = Self { yaw_rate: RoundingCarry::new(YAW_RATE) };
 
     /// Encodes one sample; the specific force points forward, left, up. J1939 has no status beside a value, so a

@@ -1,5 +1,5 @@
-//! The lane takes off a gyro's turns what is known without a network: the Earth's rate at the latitude, the tilt of its
-//! axis, and its bias ([`super::rest`]).
+//! The lane corrects a gyro's turns for what is known without a network: the Earth's rate at the latitude, the tilt of
+//! the gyro's axis, and its bias ([`super::rest`]).
 
 use super::part::FogErrors;
 use super::rest::{RestOutcome, RestReading};
@@ -10,8 +10,9 @@ use crate::units::{Angle, AngularRate};
 /// Fraction bits of [`Tilt`].
 const TILT_FRACTION_BITS: u32 = 30;
 
-/// The angle between the gyro's axis and the vertical of the level vehicle. Such a gyro shows a turn times its cosine.
-/// The level part of the Earth's rate, which it shows too, depends on the heading and is not known.
+/// Holds the angle between the gyro's axis and the vertical of the level vehicle. A tilted gyro measures a turn times
+/// the cosine of this angle. It also measures part of the Earth's horizontal rate, which depends on the heading and is
+/// not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tilt {

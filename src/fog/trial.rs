@@ -1,24 +1,24 @@
 //! The trial drops FoGNet where standstills show no gain by it.
 //!
-//! A standing vehicle turns by nothing, so what is left of a rate is its error. Each second the squares of both rates,
-//! with FoGNet and without, are compared over the same two seconds ([`super::rest`]); their difference is summed up and
-//! forgotten again over some two minutes of standing. FoGNet is dropped, until the next start, when it is clearly worse
-//! after ten seconds, or no better after thirty.
+//! A standing vehicle does not turn, so its corrected rate is all error. Each second the squares of both rates, with
+//! FoGNet and without, are compared over the same two seconds ([`super::rest`]); a sum of their differences fades over
+//! some two minutes of standing. FoGNet is dropped, until the next start, when it is clearly worse after ten seconds,
+//! or no better after thirty.
 
 use super::rest::Second;
 use crate::sample::{RATE_HZ, Standstill};
 use crate::units::Angle;
 
-/// Comparisons after which FoGNet must not be clearly worse.
+/// After this many comparisons FoGNet must not be clearly worse.
 const SOON: u8 = 10;
-/// Comparisons after which it must be better.
+/// After this many comparisons FoGNet must be better.
 const LATE: u8 = 30;
-/// Comparisons that the sum is of, at most.
+/// The sum remembers at most this many comparisons.
 const MEMORY: f32 = 128.0;
-/// The variance of a mean that is clearly more than noise: 5 deg/h.
+/// A mean variance beyond this is clearly more than noise: 5 deg/h squared, in (rad/s)^2.
 const CLEAR: f32 = 6e-10;
 
-/// The comparison of the rates with and without FoGNet.
+/// Compares the rates with and without FoGNet.
 #[derive(Debug, Clone)]
 pub struct Trial {
     second: [Second; 2],

@@ -1,7 +1,7 @@
 //! This driver reads Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
 //!
-//! One burst gives everything: the command 68 00, then the twenty bytes of a [`Burst`], at 1 MHz
-//! at most. This file fetches it; what it says is parsed without I/O.
+//! One burst gives everything: the command 68 00, then the twenty bytes of a [`Burst`], at 1 MHz at most. This file
+//! fetches it; its content is parsed without I/O.
 
 mod burst;
 
@@ -11,7 +11,7 @@ use crate::sample::ImuSample;
 use crate::units::Micros;
 use embedded_hal::spi::{Operation, SpiDevice};
 
-/// Asks for a burst.
+/// This command requests a burst.
 const BURST_COMMAND: [u8; 2] = [0x68, 0x00];
 
 /// The error of a read.
@@ -22,18 +22,18 @@ pub enum AdisError<E> {
     /// The bus failed.
     #[error("ADIS164xx: the bus failed: {0:?}")]
     Bus(E),
-    /// The bytes give no sample.
+    /// The bytes hold no valid sample.
     #[error(transparent)]
     Burst(BurstError),
 }
 
-/// The part on its bus.
+/// Drives the part on its bus.
 #[derive(Debug)]
 pub struct Adis16465<SPI> {
     spi: SPI,
     model: Model,
     last_counter: Option<u16>,
-    /// Readings that were not fetched, by the data counter.
+    /// Readings that were not fetched, counted by the data counter.
     lost: u32,
 }
 
@@ -49,7 +49,7 @@ impl<SPI: SpiDevice> Adis16465<SPI> {
         self.spi
     }
 
-    /// Reads the newest values. The part carries no time: `now` is the time of the data-ready signal.
+    /// Reads the newest values. The burst carries no time: `now` is the time of the data-ready signal.
     ///
     /// # Errors
     /// [`AdisError`].

@@ -1,11 +1,10 @@
-//! This module reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which speak the same):
+//! This module reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which use the same messages):
 //! RS-422, 921600 8N1 at 1000 messages a second.
 //!
-//! The bytes do not say whether rotations are increments or rates, radians or degrees: that is
-//! [`Dsp1760Config`]. Format A and C carry no time, only a sequence number; their time is the
-//! number of messages, lost ones included, times the period. A loss of 128 messages or more is
-//! not seen in a number that wraps at 128; the time stamps of format B show it, or the arrival times do
-//! ([`crate::align`]).
+//! The bytes do not say whether rotations are increments or rates, radians or degrees: [`Dsp1760Config`] does. Formats
+//! A and C carry no time, only a sequence number; their time is the number of messages, lost ones included, times the
+//! period. The number wraps at 128, so it does not show a loss of 128 messages or more; the time stamps of format B
+//! show it, or the arrival times do ([`crate::align`]).
 
 mod clock;
 #[doc(hidden)]
@@ -34,37 +33,37 @@ use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Dsp1760Error {
-    /// Its content makes no sense.
+    /// The content of the frame is invalid.
     #[error(transparent)]
     Message(MessageError),
-    /// The sequence number of the message before: the same message twice.
+    /// The sequence number equals the one before: the same message came twice.
     #[error("DSP-1760: message {sequence} came twice")]
     Repeated {
-        /// The number.
+        /// The sequence number.
         sequence: u8,
     },
 }
 
-/// The numbers of events. They saturate.
+/// Counts events; the counters saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dsp1760Counters {
-    /// Times that the sequence number went on by more than one.
+    /// Times that the sequence number advanced by more than one.
     pub gaps: u32,
     /// Messages missing in these gaps.
     pub lost: u32,
     /// Messages that came twice.
     pub repeated: u32,
-    /// Built-in-test messages passed over.
+    /// Built-in-test messages skipped.
     pub self_tests: u32,
-    /// Rotations that were marked as good but that no gyro can measure.
+    /// Rotations marked as good but beyond what the gyro can measure.
     pub implausible: u32,
 }
 
-/// The fastest rotation that is believed, rad/s: the part itself ends at 490 deg/s.
+/// Faster rotations are rejected as implausible, rad/s; the part's own range ends at 490 deg/s.
 const MAX_RATE: f32 = 16.0;
 
-/// A DSP-1760 at the end of a cable: bytes in, increments with unwrapped time out.
+/// Turns the bytes of a DSP-1760 into increments with unwrapped time.
 #[derive(Debug, Clone)]
 pub struct Dsp1760 {
     config: Dsp1760Config,
@@ -72,13 +71,13 @@ pub struct Dsp1760 {
     last_sequence: Option<u8>,
     /// Counts all messages, lost ones included.
     messages: MessageClock,
-    /// The fields of format B.
+    /// Unwraps the time stamps of format B.
     stamps: StampClock,
     counters: Dsp1760Counters,
 }
 
 impl Dsp1760 {
-    /// Begins before the first sample.
+    /// Begins before the first byte.
     #[must_use]
     pub const fn new(config: Dsp1760Config) -> Self {
         Self {
@@ -97,11 +96,10 @@ impl Dsp1760 {
         self.framer.receive(byte);
     }
 
-    /// Returns the next sample, or the reason why an intact frame is none. Built-in-test messages are
-    /// skipped.
+    /// Returns the next sample, or the reason why an intact frame gives none. Built-in-test messages are skipped.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
-        // One byte in 36 ends a message: the others do not pay for what the message takes.
+        // Only one byte in 36 ends a message, so most calls return early.
         if self.framer.is_waiting() { None } else { self.next_message() }
     }
 

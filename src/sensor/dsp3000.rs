@@ -3,12 +3,11 @@
 //! One ([`ascii`]) sends 100 lines a second at 38400 8N1, `[-]ddd.dddddd y`; the other
 //! ([`binary`]) 1000 words of four bytes a second at 115200 8N1.
 //!
-//! Neither carries time or a counter, so a lost reading leaves no trace in the bytes: the
-//! arrival times tell. The part's rate is its own within some 3 %; the readings belong on the
-//! grid by their arrival ([`crate::align`]), not by their number.
+//! Neither carries time or a counter, so only the arrival times show a lost reading. The part's own rate is off by up
+//! to some 3 %, so readings are placed on the grid by arrival ([`crate::align`]), not by number.
 //!
-//! Rotation of the Earth, 15.04 deg/h times the sine of the latitude, is in the reading and is
-//! 300 times the part's bias. It is left in: the bias stage takes it off, once.
+//! The reading includes the rotation of the Earth, 15.04 deg/h times the sine of the latitude, which is 300 times the
+//! part's bias. It is left in here, because the bias stage subtracts it.
 
 pub mod ascii;
 pub mod binary;
@@ -16,25 +15,25 @@ pub mod binary;
 use crate::sample::FogSample;
 use crate::units::{Angle, Micros};
 
-/// The meaning of the number; it is set at the part with one letter.
+/// Says what the number means; one letter sets it at the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
-    /// Angular rate.
+    /// The number is an angular rate.
     Rate,
-    /// Angle since the last reading.
+    /// The number is the angle since the last reading.
     Incremental,
-    /// Angle since the start or since it was zeroed.
+    /// The number is the angle since the start, or since it was zeroed.
     Integrated,
 }
 
-/// The commands of the part, one letter each.
+/// Names the commands of the part, one letter each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
-    /// Send this kind of number.
+    /// Selects the kind of number that is sent.
     Mode(Mode),
-    /// The integrated angle is zero now.
+    /// Sets the integrated angle to zero.
     Zero,
 }
 
@@ -50,7 +49,7 @@ impl Command {
         }
     }
 
-    /// Returns the command of a letter, if it is one.
+    /// Returns the command that a letter stands for, if any.
     #[must_use]
     pub const fn parse(letter: u8) -> Option<Self> {
         match letter {

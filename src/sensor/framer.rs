@@ -1,15 +1,15 @@
 //! The framer finds frames in a byte stream that may begin, break and be damaged anywhere.
 //!
-//! A header alone is no synchronisation: its bytes may occur in a payload. Only header and
-//! checksum together are. So when a candidate fails its check, the search goes on one byte
-//! after its start, inside the bytes already received: an intact frame behind a false header
-//! is found, and nothing but damaged frames is lost. At most one frame is held.
+//! A header alone does not synchronise, because its bytes may occur in a payload; only header and checksum together do.
+//! So when a candidate fails its check, the search continues one byte after its start, inside the bytes already
+//! received: an intact frame behind a false header is found, and nothing but damaged frames is lost. At most one frame
+//! is held.
 
 use heapless::Vec;
 
-/// The properties of a framed protocol.
+/// Describes a framed protocol.
 pub trait Protocol {
-    /// Bytes that tell whether a frame begins with them, and how long it is.
+    /// The first bytes of a frame, this many, tell whether one begins and how long it is.
     const HEADER: usize;
     /// Returns the length of the frame that begins with these [`Protocol::HEADER`] bytes, at least their own;
     /// `None` when none does.
@@ -24,8 +24,8 @@ pub struct Framer<P, const N: usize> {
     buffer: Vec<u8, N>,
     /// Bytes of `buffer` that belonged to the frame handed out last.
     used: usize,
-    /// The number of bytes in `buffer` below which there is nothing new to see: a header is looked at once, not at
-    /// every byte. 0 while a frame is out.
+    /// With fewer bytes in `buffer` than this there is nothing new to find: a header is examined once, not at every
+    /// byte. 0 while a frame is handed out.
     needed: usize,
     bad_checksums: u32,
     skipped: u32,
@@ -33,7 +33,7 @@ pub struct Framer<P, const N: usize> {
 }
 
 impl<P: Protocol, const N: usize> Framer<P, N> {
-    /// Begins before the first sample.
+    /// Begins before the first byte.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -53,7 +53,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
             self.release();
         }
         if self.buffer.push(byte).is_err() {
-            // Only when the caller left frames waiting: the oldest byte gives way, counted.
+            // The buffer is full only when the caller left frames waiting: the oldest byte is dropped and counted.
             self.skip(1);
             self.needed = 0;
             let _ = self.buffer.push(byte);
@@ -65,8 +65,8 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         if self.is_waiting() { None } else { self.search() }
     }
 
-    /// Returns whether [`Framer::next_frame`] has nothing to return before more bytes come. A caller that asks this
-    /// first spends a few instructions on most bytes.
+    /// Returns whether [`Framer::next_frame`] has nothing to return before more bytes come. A caller that checks this
+    /// first spends only a few instructions on most bytes.
     #[inline]
     #[must_use]
     pub fn is_waiting(&self) -> bool {
@@ -127,7 +127,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
     fn drop_front(&mut self, count: usize) {
         let count = count.min(self.buffer.len());
         let left = self.buffer.len() - count;
-        // Nearly always all of it goes, or nothing.
+        // Nearly always everything is dropped, or nothing.
         if count > 0 && left > 0 {
             self.buffer.copy_within(count.., 0);
         }

@@ -1,9 +1,8 @@
 //! This driver reads the TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
 //!
-//! [`packet`] is what its FIFO holds, sans I/O; [`registers`] its registers; this file talks to
-//! it. Every wait is bounded by counts of [`DelayNs`]. At each read one register of the
-//! configuration is read back in turn, so that a part that has reset itself or lost a bit is
-//! noticed within [`SETTINGS`] reads, not never.
+//! [`packet`] parses the entries of its FIFO without I/O, [`registers`] names its registers, and this file talks to it.
+//! Every wait is bounded by counts of [`DelayNs`]. Each call for a sample reads back one register of the configuration,
+//! in turn, so that a part that has reset itself or lost a bit is noticed within [`SETTINGS`] calls.
 
 mod clock;
 mod config;
@@ -22,9 +21,9 @@ use embedded_hal::spi::{Operation, SpiDevice};
 use packet::{MAX_PACKET, Packet, PacketError};
 use registers::{self as reg, Register, Setting};
 
-/// Looks at the reset bit, 1 ms apart.
+/// The reset bit is polled at most this many times, 1 ms apart.
 const RESET_POLLS: u8 = 10;
-/// The gyro needs this long from switched on to good, ms.
+/// The gyro needs this long from being switched on to valid readings, ms.
 const START_MS: u32 = 45;
 
 /// The error of the part or its bus.
@@ -38,7 +37,7 @@ pub enum Icm42688Error<E> {
     /// The part did not come back from its reset.
     #[error("ICM-42688: no answer after the reset")]
     Reset,
-    /// Another part answers, or none.
+    /// A different part answers, or none.
     #[error("ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY)]
     Identity {
         /// The identity that it reports.
@@ -54,15 +53,15 @@ pub enum Icm42688Error<E> {
         /// The bits that were written.
         expected: u8,
     },
-    /// A packet in which an axis has no reading.
+    /// An axis of the packet has no reading.
     #[error("ICM-42688: a packet in which an axis has no reading")]
     NoReading,
-    /// The bytes from the FIFO are no packet; the FIFO was emptied.
+    /// The bytes from the FIFO are not a packet; the FIFO was emptied.
     #[error(transparent)]
     Packet(PacketError),
 }
 
-/// The part on its bus, configured.
+/// Drives the configured part on its bus.
 #[derive(Debug)]
 pub struct Icm42688<SPI> {
     spi: SPI,
@@ -73,7 +72,7 @@ pub struct Icm42688<SPI> {
 }
 
 impl<SPI: SpiDevice> Icm42688<SPI> {
-    /// Resets the part, asks who it is, sets it and reads every setting back.
+    /// Resets the part, checks its identity, configures it and reads every setting back.
     ///
     /// # Errors
     /// `Bus`, `Reset`, `Identity` or `Setting`.
@@ -109,10 +108,10 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         self.spi
     }
 
-    /// Returns the oldest sample in the FIFO, if there is one. It checks one setting each time.
+    /// Returns the oldest sample in the FIFO, if there is one, and checks one setting.
     ///
     /// # Errors
-    /// `Bus`, `Setting`, `NoReading` or `Packet`; a sample is not made up.
+    /// `Bus`, `Setting`, `NoReading` or `Packet`.
     pub fn next_sample(&mut self) -> Result<Option<ImuSample>, Icm42688Error<SPI::Error>> {
         self.check_next_setting()?;
         let mut waiting = [0; 2];
@@ -139,7 +138,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         }
     }
 
-    /// Reads one register of the configuration, a different one each time.
+    /// Checks one register of the configuration, the next one each time.
     fn check_next_setting(&mut self) -> Result<(), Icm42688Error<SPI::Error>> {
         let settings = self.config.settings();
         let Setting { register, mask, value: expected } = settings[self.next_check % SETTINGS];

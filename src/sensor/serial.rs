@@ -1,12 +1,10 @@
-//! This module connects parts on a serial line over the traits of `embedded-io`: the line itself, and the dialogue
-//! that brings a part to send what the pipeline wants. Nothing here knows a part.
+//! This module connects parts on a serial line over the traits of `embedded-io`: the line itself, and the dialogue that
+//! configures a part for the pipeline. Nothing here depends on a particular part.
 //!
-//! No read blocks: a port must say whether bytes wait ([`ReadReady`]), so a silent part costs a
-//! bounded time and no more.
+//! No read blocks: a port must say whether bytes wait ([`ReadReady`]), so a silent part costs only a bounded time.
 //!
-//! There are no async shims. All parsers and dialogues take bytes and a time and do no input or
-//! output, so an async caller awaits its own read, pushes the bytes and polls; what is here
-//! would only be there twice.
+//! There are no async shims. All parsers and dialogues take bytes and a time and do no input or output, so an async
+//! caller awaits its own read, pushes the bytes and polls; it needs nothing from this module.
 
 use super::{ByteSource, Source};
 use crate::units::Micros;
@@ -14,30 +12,30 @@ use embedded_hal::delay::DelayNs;
 use embedded_io::{Read, ReadReady, Write};
 use heapless::Vec;
 
-/// Bytes of the longest message that a dialogue sends.
+/// Length of the longest message that a dialogue sends, bytes.
 pub const MAX_SENT: usize = 32;
-/// Time between two looks at the line.
+/// The line is polled this far apart, ms.
 const POLL_MS: u32 = 1;
-/// Bytes that are read at each look: more than 921,600 baud bring in that time.
+/// Each poll reads at most this many bytes, more than arrive in that time at 921,600 baud.
 const CHUNK: usize = 128;
-/// Bytes that one call of [`Serial::next_sample`] reads at most.
+/// One call of [`Serial::next_sample`] reads at most this many bytes.
 const MAX_READ: usize = 1024;
 
-/// The action that a dialogue asks for.
+/// Names the action that a dialogue asks for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Action {
-    /// Send these bytes.
+    /// The caller sends these bytes.
     Send(Vec<u8, MAX_SENT>),
-    /// There is nothing to do; poll again when bytes have come or time has passed.
+    /// There is nothing to do; the caller polls again when bytes have come or time has passed.
     Wait,
-    /// The part sends what it should.
+    /// The part is configured.
     Done,
 }
 
-/// A dialogue with a part: bytes and the time in, messages to send out. It ends after a bounded
-/// time, whatever the part does.
+/// Holds a dialogue with a part: bytes and the time in, messages to send out. It ends after a bounded time, whatever
+/// the part does.
 pub trait Dialogue {
-    /// The reason why it has ended without a part that is set up.
+    /// The reason why a dialogue has failed to configure the part.
     type Error: core::error::Error;
 
     /// Takes one byte from the part.
@@ -46,7 +44,7 @@ pub trait Dialogue {
     /// Returns the next action at `now`.
     ///
     /// # Errors
-    /// Why the dialogue is over; again at each call.
+    /// The reason why the dialogue has failed; it is returned at each later call too.
     fn poll(&mut self, now: Micros) -> Result<Action, Self::Error>;
 }
 
@@ -62,7 +60,7 @@ pub enum SerialError<P, E> {
     Part(E),
 }
 
-/// Runs a dialogue to its end. `delay` counts the time.
+/// Runs a dialogue to its end; `delay` measures the time.
 ///
 /// # Errors
 /// [`SerialError::Port`] at once, [`SerialError::Part`] when the dialogue gives up.
@@ -90,7 +88,7 @@ pub fn configure<PORT: Read + Write + ReadReady, D: Dialogue>(
     }
 }
 
-/// A part at the end of a port: a [`Source`] like any other.
+/// Reads a part through a port, as a [`Source`].
 #[derive(Debug)]
 pub struct Serial<PORT, PART> {
     port: PORT,
@@ -98,7 +96,7 @@ pub struct Serial<PORT, PART> {
 }
 
 impl<PORT, PART> Serial<PORT, PART> {
-    /// Makes a source of a part that sends what it should, and its port.
+    /// Makes a source from a port and a configured part.
     #[must_use]
     pub const fn new(port: PORT, part: PART) -> Self {
         Self { port, part }
@@ -119,7 +117,7 @@ impl<PORT: Read + ReadReady, PART: ByteSource> Source for Serial<PORT, PART> {
     type Sample = PART::Sample;
     type Error = SerialError<PORT::Error, PART::Error>;
 
-    /// Reads what waits at the port, a bounded number of bytes, up to the next sample.
+    /// Reads the waiting bytes, a bounded number, up to the next sample.
     fn next_sample(&mut self) -> Option<Result<PART::Sample, Self::Error>> {
         for _ in 0..MAX_READ {
             if let Some(sample) = self.part.next_sample() {
@@ -135,7 +133,7 @@ impl<PORT: Read + ReadReady, PART: ByteSource> Source for Serial<PORT, PART> {
     }
 }
 
-/// Reads the bytes that wait at the port, as many as there is room for.
+/// Reads the bytes that are waiting at the port, as many as fit.
 fn receive<'a, PORT: Read + ReadReady>(port: &mut PORT, to: &'a mut [u8]) -> Result<&'a [u8], PORT::Error> {
     let count = if port.read_ready()? { port.read(to)? } else { 0 };
     Ok(to.get(..count).unwrap_or_default())

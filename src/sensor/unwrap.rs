@@ -1,10 +1,10 @@
-//! This clock counts on where a clock of 32 bits wraps.
+//! This clock continues a clock of 32 bits beyond its wrap, by summing the signed differences of its stamps.
 
-/// Ticks of 32 bits (71 minutes of microseconds, 119 hours at 10 kHz) to ones that never wrap. A stamp
-/// that goes back by less than half the range is a step back, not a wrap.
+/// Extends stamps of 32 bits (71 minutes of microseconds, 119 hours at 10 kHz) to ones that never wrap. A stamp that
+/// goes back by less than half the range is a step back, not a wrap.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct StampClock {
-    /// Last stamp and the time it stands for.
+    /// The last stamp and the time that it stands for.
     last: Option<(u32, u64)>,
 }
 

@@ -1,7 +1,7 @@
 //! This module reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
-//! Frames are in `xbus`, the measurements in a frame are [`MtData2`], the four forms of their
-//! numbers are in `precision`; `dialogue` brings a part to send what the pipeline wants.
+//! Frames are in `xbus`, the measurements in a frame are [`MtData2`], the four forms of their numbers are in
+//! `precision`; `dialogue` configures a part for the pipeline.
 
 #[doc(hidden)]
 pub mod dialogue;
@@ -21,19 +21,19 @@ use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
 
-/// Clipping of accelerometer x, y, z and gyro x, y, z in the status word.
+/// These bits of the status word report clipping of accelerometer x, y, z and gyro x, y, z.
 const STATUS_CLIPPED: u32 = 0x3F << 8;
 
-/// An MTi at the end of a cable: bytes in, samples with unwrapped time out.
+/// Turns the bytes of an MTi into samples with unwrapped time.
 #[derive(Debug, Clone, Default)]
 pub struct Mti {
     framer: Framer<Xbus, MAX_FRAME>,
-    /// The unit of SampleTimeFine: 10 kHz ticks.
+    /// Unwraps SampleTimeFine, in 10 kHz ticks.
     stamps: StampClock,
 }
 
 impl Mti {
-    /// Begins before the first sample.
+    /// Begins before the first byte.
     #[must_use]
     pub const fn new() -> Self {
         Self { framer: Framer::new(), stamps: StampClock::START }
@@ -45,10 +45,10 @@ impl Mti {
         self.framer.receive(byte);
     }
 
-    /// Returns the next sample, or the reason why an intact data message is none. Other messages are skipped.
+    /// Returns the next sample, or the reason why an intact data message gives none. Other messages are skipped.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
-        // One byte in 54 ends a message: the others do not pay for what the message takes.
+        // Only one byte in 54 ends a message, so most calls return early.
         if self.framer.is_waiting() { None } else { self.next_message() }
     }
 
@@ -88,7 +88,7 @@ impl Mti {
     }
 }
 
-/// Returns hundredths of a degree, where the reading is one.
+/// Returns hundredths of a degree; `None` if the reading is beyond the range or not a number.
 fn centi_celsius(degrees: f32) -> Option<CentiCelsius> {
     let code = libm::roundf(degrees * 100.0);
     (code >= f32::from(i16::MIN) && code <= f32::from(i16::MAX)).then_some(CentiCelsius(code as i16))

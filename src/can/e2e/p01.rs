@@ -7,7 +7,7 @@
 use super::Fault;
 use super::header::ShortHeader;
 
-/// Start 0, final XOR 0; not the J1850 of other messages, although the polynomial is.
+/// The CRC has start 0 and final XOR 0; it is not the J1850 CRC of other messages, although it has the same polynomial.
 pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
     width: 8,
     poly: 0x1D,
@@ -19,13 +19,13 @@ pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
     residue: 0,
 });
 
-/// 15 is the invalid value.
+/// The counter takes 15 values; 15 itself marks an invalid one.
 pub(super) const COUNTERS: u16 = 15;
-/// 240 bits; beyond 255 the CRC would miss two-bit errors.
+/// The longest message has 240 bits; beyond 255 the CRC would miss two-bit errors.
 const MAX_LEN: usize = 30;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// The way in which the 16-bit identifier enters the CRC.
+/// Says which bytes of the 16-bit identifier enter the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -40,14 +40,14 @@ pub enum DataIdMode {
     Nibble,
 }
 
-/// Protects one message with profile 1.
+/// Protects and checks one message with profile 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P01 {
     /// Identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
     pub data_id: u16,
-    /// The way in which it enters the CRC.
+    /// The bytes of the identifier that enter the CRC.
     pub mode: DataIdMode,
 }
 

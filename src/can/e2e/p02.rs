@@ -12,7 +12,7 @@ pub(super) const COUNTERS: u16 = 16;
 const MAX_LEN: usize = 14;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// Protects one message with profile 2.
+/// Protects and checks one message with profile 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

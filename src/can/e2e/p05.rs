@@ -4,12 +4,12 @@ use super::Fault;
 
 /// CRC-16-CCITT-FALSE: polynomial 0x1021, start FFFF, no final XOR.
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
-/// A whole byte.
+/// The counter takes all values of a byte.
 pub(super) const COUNTERS: u16 = 256;
 /// The specification's limit, 4096 bytes, is one bit more than the CRC covers; CAN needs 64.
 const MAX_LEN: usize = 64;
 
-/// Protects one message with profile 5.
+/// Protects and checks one message with profile 5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -3,7 +3,7 @@
 use super::Fault;
 use super::p01::{DataIdMode, P01};
 
-/// The way in which the identifier enters the CRC.
+/// Says which bytes of the identifier enter the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -14,14 +14,14 @@ pub enum P11Mode {
     Nibble,
 }
 
-/// Protects one message with profile 11.
+/// Protects and checks one message with profile 11.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P11 {
     /// Identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.
     pub data_id: u16,
-    /// The way in which it enters the CRC.
+    /// The bytes of the identifier that enter the CRC.
     pub mode: P11Mode,
 }
 

@@ -21,7 +21,7 @@ pub struct LineAssembler {
 }
 
 impl LineAssembler {
-    /// Begins before the first sample.
+    /// Begins before the first character.
     #[must_use]
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false, done: false }

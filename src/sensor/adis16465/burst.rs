@@ -9,33 +9,33 @@
 //! | 16 | data counter |
 //! | 18 | sum of the 18 bytes before, modulo 2^16 |
 //!
-//! Eighteen zeros have the sum zero: an all-zero burst, and an all-one burst, are refused, for
-//! that is what a part without power and a cut line look like.
+//! Eighteen zeros have the sum zero, so the checksum alone would accept them. All-zero and all-one bursts are therefore
+//! refused: a part without power or a cut line reads like that.
 
 use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, RangeError, STANDARD_GRAVITY, SpecificForce};
 
-/// Bytes of a burst behind its command.
+/// Length of a burst behind its command, bytes.
 pub const BURST: usize = 20;
-/// Bytes of a burst that are summed.
+/// The checksum covers this many bytes.
 const SUMMED: usize = 18;
 
-/// The part, which fixes the scales.
+/// Names the part, which determines the scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Model {
-    /// 125 deg/s.
+    /// ADIS16465-1: 125 deg/s.
     Adis16465_1,
-    /// 500 deg/s.
+    /// ADIS16465-2: 500 deg/s.
     Adis16465_2,
-    /// 2000 deg/s.
+    /// ADIS16465-3: 2000 deg/s.
     Adis16465_3,
-    /// 2000 deg/s, 40 g.
+    /// ADIS16470: 2000 deg/s, 40 g.
     Adis16470,
 }
 
 impl Model {
-    /// Counts per deg/s.
+    /// Returns the counts per deg/s.
     #[must_use]
     pub const fn counts_per_dps(self) -> f32 {
         match self {
@@ -45,7 +45,7 @@ impl Model {
         }
     }
 
-    /// Counts per g.
+    /// Returns the counts per g.
     #[must_use]
     pub const fn counts_per_g(self) -> f32 {
         match self {
@@ -55,7 +55,7 @@ impl Model {
     }
 }
 
-/// The part's report of its own state; reading it clears it.
+/// Holds the part's report of its own state; reading it clears it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiagStat(pub u16);
@@ -67,16 +67,16 @@ impl DiagStat {
     pub const FLASH_UPDATE: Self = Self(1 << 2);
     /// A transfer had a wrong number of clocks.
     pub const SPI: Self = Self(1 << 3);
-    /// Supply voltage too low.
+    /// The supply voltage is too low.
     pub const STANDBY: Self = Self(1 << 4);
-    /// Self-test of the sensors failed.
+    /// The self-test of the sensors failed.
     pub const SELF_TEST: Self = Self(1 << 5);
     /// The part's program memory is damaged.
     pub const MEMORY: Self = Self(1 << 6);
     /// The clocks disagree.
     pub const CLOCK: Self = Self(1 << 7);
-    /// The bits that make readings useless. An overrun, a failed write to flash or a transfer error concerns
-    /// another transfer than this one, whose sum fits.
+    /// These bits make readings useless. An overrun, a failed write to flash or a transfer error concerns a different
+    /// transfer, since the sum of this one fits.
     pub const FATAL: Self = Self(Self::STANDBY.0 | Self::SELF_TEST.0 | Self::MEMORY.0 | Self::CLOCK.0);
 
     /// Returns whether any of these bits is set.
@@ -86,7 +86,7 @@ impl DiagStat {
     }
 }
 
-/// The reason why bytes are no burst, or a burst gives no sample.
+/// The reason why bytes are not a burst, or a burst gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -94,41 +94,41 @@ pub enum BurstError {
     /// The sum does not fit.
     #[error("ADIS164xx: the bytes add up to {computed:04x}, but the burst says {stored:04x}")]
     Checksum {
-        /// The value that the bytes give.
+        /// The sum computed over the bytes.
         computed: u16,
-        /// The one in the burst.
+        /// The sum in the burst.
         stored: u16,
     },
     /// The bytes are all zeros or all ones: no part answers.
     #[error("ADIS164xx: no part answers")]
     Silent,
-    /// The part says that its readings are worthless.
+    /// The part reports that its readings are useless.
     #[error("ADIS164xx: DIAG_STAT {:04x}", .0.0)]
     Diagnosis(DiagStat),
-    /// The data counter stands still: the same readings again.
+    /// The data counter has not advanced: these are the same readings again.
     #[error("ADIS164xx: the data counter stands still at {counter}")]
     Repeated {
         /// The counter.
         counter: u16,
     },
-    /// A reading that no part of this kind can measure.
+    /// A reading is beyond what a part of this kind can measure.
     #[error("ADIS164xx: a reading is {0}")]
     Reading(RangeError),
 }
 
-/// A burst in the part's own counts.
+/// Holds a burst in the part's own counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Burst {
-    /// The part reports a fault.
+    /// The part's report of its own state.
     pub diagnosis: DiagStat,
-    /// x, y, z.
+    /// Rate about x, y, z.
     pub rate: [i16; 3],
-    /// x, y, z.
+    /// Specific force along x, y, z.
     pub acceleration: [i16; 3],
-    /// 0.1 deg C.
+    /// Temperature, 0.1 deg C.
     pub temperature: i16,
-    /// Counts the readings; wraps.
+    /// The part's count of readings; it wraps.
     pub counter: u16,
 }
 

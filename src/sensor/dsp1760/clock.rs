@@ -2,12 +2,12 @@
 
 use super::config::OutputRate;
 
-/// Time by the number of messages since the start, microseconds. 750 a second have no whole
-/// period, so what is left over is kept: the clock never drifts.
+/// Computes time from the number of messages since the start, microseconds. At 750 a second the period is not a whole
+/// number, so the remainder is carried and the clock never drifts.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct MessageClock {
     time: u64,
-    /// The remainder of a division by the rate.
+    /// The remainder of the last division by the rate.
     remainder: u32,
 }
 
@@ -16,7 +16,7 @@ impl MessageClock {
 
     /// Returns the time `messages` (127 at most) later.
     pub(super) fn advance(&mut self, rate: OutputRate, messages: u32) -> u64 {
-        // No rate is zero; where the compiler does not see that, nothing is divided by it.
+        // No rate is zero; the maximum shows the compiler that no division by zero can occur.
         let hertz = u32::from(rate.hertz()).max(1);
         let elapsed = messages * 1_000_000 + self.remainder;
         self.time += u64::from(elapsed / hertz);

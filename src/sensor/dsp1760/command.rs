@@ -1,4 +1,4 @@
-//! The commands of the DSP-1760: lines of ASCII, ended by LF.
+//! The commands of the DSP-1760 are lines of ASCII, ended by LF.
 //!
 //! Settings are taken in configuration mode only. Whether the part sends radians or degrees is
 //! set at the part and cannot be read from a frame; no command for it is known here.
@@ -7,22 +7,22 @@ use super::{Dsp1760Config, OutputRate, Rotation, TemperatureUnit};
 use core::fmt::Write;
 use heapless::String;
 
-/// Bytes of the longest line.
+/// Length of the longest line, bytes.
 pub const MAX_LINE: usize = 20;
 
-/// One line to the part.
+/// Names a command to the part: one line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
     /// Enters (true) or leaves configuration mode.
     Configure(bool),
-    /// Messages per second. The two messages after the change are invalid.
+    /// Sets the messages per second. The two messages after the change are invalid.
     Rate(OutputRate),
-    /// Increments or rates.
+    /// Selects increments or rates.
     Rotation(Rotation),
-    /// Back to the part's own choice.
+    /// Returns to the part's default for rotations.
     ResetRotation,
-    /// Unit of the temperature field.
+    /// Sets the unit of the temperature field.
     Temperature(TemperatureUnit),
     /// Asks for the rate: [`Reply::Rate`] answers.
     QueryRate,
@@ -78,8 +78,8 @@ impl Command {
     }
 }
 
-/// Returns the lines that bring a part to a configuration, in order. Its messages stop meanwhile.
-/// [`super::dialogue`] sends them and asks whether they were received.
+/// Returns the lines that configure a part, in order. Its messages stop meanwhile. [`super::dialogue`] sends them and
+/// checks that they were received.
 #[must_use]
 pub const fn setup(config: &Dsp1760Config) -> [Command; 5] {
     [
@@ -91,7 +91,7 @@ pub const fn setup(config: &Dsp1760Config) -> [Command; 5] {
     ]
 }
 
-/// A line from the part.
+/// Holds a line from the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reply {

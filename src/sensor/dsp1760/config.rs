@@ -1,17 +1,19 @@
-//! The configuration of a DSP-1760 holds what its bytes do not say.
+//! The configuration of a DSP-1760 holds the settings that its messages do not state: without them rotation and time
+//! cannot be computed.
 
-/// Rotation as increment or as rate.
+/// Says whether a rotation is an increment or a rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rotation {
-    /// Angle since the last message; the part's default, and better: nothing is lost between.
+    /// Rotations are angles since the last message; this is the part's default, and better, since no turn between
+    /// messages is lost.
     #[default]
     Delta,
-    /// Angular rate.
+    /// Rotations are angular rates.
     Rate,
 }
 
-/// Unit of the rotation.
+/// Gives the unit of the rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AngleUnit {
@@ -33,7 +35,7 @@ pub enum TemperatureUnit {
     Hundredths,
 }
 
-/// Messages per second, one of those that the part offers.
+/// Holds the number of messages per second, one of those that the part offers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OutputRate(u16);
@@ -41,10 +43,10 @@ pub struct OutputRate(u16);
 impl OutputRate {
     /// The rates that the part offers.
     pub const OFFERED: [u16; 10] = [1, 5, 10, 25, 50, 100, 250, 500, 750, 1000];
-    /// 1000 a second.
+    /// The part sends 1000 messages a second.
     pub const HZ_1000: Self = Self(1000);
 
-    /// Returns `None` when the part does not offer it.
+    /// Makes a rate; `None` when the part does not offer it.
     #[must_use]
     pub fn new(hertz: u16) -> Option<Self> {
         Self::OFFERED.contains(&hertz).then_some(Self(hertz))
@@ -57,7 +59,7 @@ impl OutputRate {
     }
 }
 
-/// The settings that the bytes do not contain.
+/// Holds the settings that the messages do not state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dsp1760Config {
@@ -72,7 +74,7 @@ pub struct Dsp1760Config {
 }
 
 impl Dsp1760Config {
-    /// 1000 messages a second, otherwise as the part comes.
+    /// The default is 1000 messages a second, otherwise as the part is delivered.
     pub const DEFAULT: Self = Self {
         rate: OutputRate::HZ_1000,
         rotation: Rotation::Delta,

@@ -1,13 +1,13 @@
-//! This dialogue brings a DSP-1760 to a configuration.
+//! This dialogue configures a DSP-1760.
 //!
-//! The part acknowledges no setting, so its settings are queried afterwards: the lines of
-//! [`setup`], then the query for the rate, and only then out of configuration mode. The rules:
+//! The part acknowledges no setting, so its settings are queried afterwards: the dialogue sends the lines of [`setup`],
+//! then the query for the rate, and leaves configuration mode only after the answer. The rules:
 //! - Lines follow each other [`PAUSE`] apart.
 //! - Without an answer for [`TIMEOUT`], or with another rate, all of it is sent again,
 //!   [`ATTEMPTS`] times in all.
-//! - Whatever stands before an answer in its line (messages that still come in) is passed over.
+//! - Bytes before an answer in its line (from messages that still come in) are skipped.
 //!
-//! No port, no clock: bytes and the time come in, lines to send come out. Make the parser
+//! The dialogue needs no port and no clock: bytes and the time come in, lines to send come out. Make the parser
 //! ([`super::Dsp1760::new`]) afterwards, with the rate that was set.
 
 use super::command::{Command, MAX_LINE, Reply, setup};
@@ -16,14 +16,14 @@ use crate::sensor::serial::{self, Action};
 use crate::units::{Duration, Micros};
 use heapless::Vec;
 
-/// The pause between two lines.
+/// Two lines are sent this far apart.
 pub const PAUSE: Duration = Duration::from_millis(20);
-/// The time that the answer may take.
+/// The answer may take this long.
 pub const TIMEOUT: Duration = Duration::from_millis(500);
-/// The number of attempts before the part is given up.
+/// The dialogue gives up after this many attempts.
 pub const ATTEMPTS: u8 = 3;
 
-/// The reason why the dialogue has ended without a part that is set.
+/// The reason why the dialogue has failed to configure the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -31,25 +31,25 @@ pub enum DialogueError {
     /// No query was answered.
     #[error("DSP-1760: no answer after {ATTEMPTS} attempts")]
     Silent,
-    /// The last answer was another rate than the one that was set.
+    /// The last answer reported a different rate from the one that was set.
     #[error("DSP-1760: the rate stays at {} Hz", .got.hertz())]
     Rate {
-        /// Messages per second.
+        /// The rate that the part reports.
         got: OutputRate,
     },
 }
 
-/// The dialogue with one part.
+/// Holds the state of the dialogue with one part.
 #[derive(Debug, Clone)]
 pub struct Dialogue {
     config: Dsp1760Config,
-    /// The newest bytes of the line that comes in.
+    /// The newest bytes of the line being received.
     line: Vec<u8, MAX_LINE>,
-    /// The line that is sent next, and when at the earliest.
+    /// Number of the line that is sent next.
     next: usize,
     due: Micros,
     attempts: u8,
-    /// The part's last answer.
+    /// The part's last answer to the query.
     answer: Option<OutputRate>,
 }
 
@@ -75,7 +75,7 @@ impl serial::Dialogue for Dialogue {
             if self.line.is_full() {
                 self.line.remove(0);
             }
-            // There is room now.
+            // The buffer now has room.
             let _ = self.line.push(byte);
             return;
         }
@@ -95,7 +95,7 @@ impl serial::Dialogue for Dialogue {
             return Ok(Action::Wait);
         }
         if self.next == leave && !set {
-            // The query's time is up.
+            // The query has timed out.
             if self.attempts == ATTEMPTS {
                 return Err(self.answer.map_or(DialogueError::Silent, |got| DialogueError::Rate { got }));
             }

@@ -1,9 +1,9 @@
-//! A data message has one of three layouts, and some fields are only in some of them.
+//! A data message has one of three layouts, which its fourth byte announces; some fields exist only in some of them.
 
-/// The bytes that begin every data message; the format byte follows.
+/// Every data message begins with these bytes; the format byte follows.
 pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
 
-/// Layout of a message.
+/// Names the layout of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Format {
@@ -11,7 +11,7 @@ pub enum Format {
     A,
     /// The message has a time stamp.
     B,
-    /// The message has one slow reading in turn.
+    /// The message has one of four slow readings in turn.
     C,
 }
 
@@ -46,7 +46,7 @@ impl Format {
     }
 }
 
-/// The good readings, one bit each; bits 3 and 7 are 0.
+/// Marks the good readings, one bit each; bits 3 and 7 are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Validity(pub u8);
@@ -70,19 +70,19 @@ impl Validity {
     }
 }
 
-/// The fields that only some formats have.
+/// Holds the fields that only some formats have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extra {
-    /// Format A: a temperature in the unit that the part is set to.
+    /// Format A has a temperature, in the unit that the part is set to.
     Temperature(i16),
-    /// Format B.
+    /// Format B has a time stamp and a temperature.
     Timed {
-        /// Microseconds, wraps.
+        /// Time, microseconds; it wraps.
         time: u32,
-        /// The fields of format A.
+        /// Temperature, in the unit that the part is set to.
         temperature: i16,
     },
-    /// Format C: temperature or magnetic field x, y, z by sequence number modulo 4.
+    /// Format C has a temperature or the magnetic field x, y, z, by sequence number modulo 4.
     Slow(f32),
 }

@@ -1,4 +1,4 @@
-//! A data message of the DSP-1760 is parsed and encoded here, field by field.
+//! This module parses and encodes the data messages of the DSP-1760, field by field.
 //!
 //! | offset | format A, 36 bytes | format B, 40 bytes | format C, 38 bytes |
 //! |---|---|---|---|
@@ -10,9 +10,9 @@
 //! | 32 | CRC | status, sequence, i16 temperature | status, sequence |
 //! | end | | CRC at 36 | CRC at 34 |
 //!
-//! Everything is big-endian. Format C's length is an inference: no recorded frame of it was at
-//! hand, its fields add up to 38 bytes, and a test script for these parts counts as many. If
-//! it is wrong, no frame of that format passes its CRC: nothing wrong comes out.
+//! Everything is big-endian. Format C's length is an inference: no recorded frame of it was available, its fields add
+//! up to 38 bytes, and a test script for these parts counts as many. If it is wrong, no frame of that format passes its
+//! CRC, so no wrong reading comes out.
 
 pub use super::format::{Extra, Format, Validity};
 
@@ -20,17 +20,17 @@ use super::format::PREFIX;
 use crate::sensor::crc::CRC_32_MPEG_2;
 use heapless::Vec;
 
-/// The longest message.
+/// Length of the longest message, bytes.
 pub const MAX_MESSAGE: usize = 40;
 /// The largest sequence number; 0 follows it.
 pub const MAX_SEQUENCE: u8 = 127;
 
-/// The reason why bytes are no message.
+/// The reason why bytes are not a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MessageError {
-    /// The bytes begin with no header of a data message.
+    /// The bytes do not begin with the header of a data message.
     #[error("DSP-1760: no header of a data message")]
     Header,
     /// The message is not as long as the header announces.
@@ -46,18 +46,18 @@ pub enum MessageError {
     Crc {
         /// The CRC of the bytes before it.
         computed: u32,
-        /// The one in the message.
+        /// The CRC in the message.
         stored: u32,
     },
-    /// A sequence number above [`MAX_SEQUENCE`].
+    /// The sequence number is above [`MAX_SEQUENCE`].
     #[error("DSP-1760: sequence number {got}, above {MAX_SEQUENCE}")]
     Sequence {
-        /// The number.
+        /// The sequence number.
         got: u8,
     },
 }
 
-/// A data message as it stands on the wire.
+/// Holds a data message as it stands on the wire.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
@@ -69,7 +69,7 @@ pub struct Message {
     pub extra: Extra,
     /// The good readings.
     pub validity: Validity,
-    /// 0 to [`MAX_SEQUENCE`].
+    /// Sequence number, 0 to [`MAX_SEQUENCE`].
     pub sequence: u8,
 }
 
@@ -84,7 +84,7 @@ impl Message {
         }
     }
 
-    /// Reads a whole message. A reading that is no number loses its valid bit.
+    /// Reads a whole message. A reading that is not finite loses its valid bit.
     ///
     /// # Errors
     /// [`MessageError`].
@@ -163,7 +163,7 @@ impl Message {
     }
 }
 
-/// Returns the status bits that may stay set: those of finite readings, and the two that mean nothing.
+/// Returns the status bits that may stay set: those of finite readings, and the two unused ones.
 fn numbers(rotation: &[f32; 3], acceleration: &[f32; 3]) -> u8 {
     let bits = |readings: &[f32; 3]| {
         (0u8..).zip(readings).fold(0, |bits, (axis, reading)| bits | u8::from(reading.is_finite()) << axis)

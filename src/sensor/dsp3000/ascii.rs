@@ -1,9 +1,9 @@
-//! This variant of the DSP-3000 sends lines of text.
+//! This module parses the variant of the DSP-3000 that sends lines of text.
 //!
-//! A line is a decimal number, blanks and `1` (valid) or `0` (fault), ended by CR and LF.
-//! Implementations differ in the width of the line, so blanks are trimmed and the line end is
-//! the only framing. There is no checksum: a damaged digit is a wrong number. What is not
-//! exactly a line is refused, and a reading is good only if the caller finds it plausible too.
+//! A line is a decimal number, blanks and `1` (valid) or `0` (fault), ended by CR and LF. Implementations differ in the
+//! width of the line, so blanks are trimmed and the line end is the only framing. There is no checksum: a damaged digit
+//! gives a wrong number. Everything that does not have exactly this form is refused, and the caller must also check
+//! that a reading is plausible.
 
 use super::Mode;
 use crate::sample::FogSample;
@@ -11,22 +11,22 @@ use crate::units::Micros;
 use core::fmt::Write;
 use heapless::{String, Vec};
 
-/// Longer than any line that the part sends.
+/// The line buffer has this many bytes, more than any line that the part sends.
 pub const MAX_LINE: usize = 32;
-/// Millionths of a degree in a degree, the unit of the last digit.
+/// The last digit counts millionths.
 const MILLIONTHS: u32 = 1_000_000;
 
-/// A number as the part sends it: deg/s, deg, or deg modulo 360, by [`super::Mode`].
+/// Holds a number as the part sends it: deg/s, deg, or deg modulo 360, by [`super::Mode`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading {
     /// The value in millionths of the unit, exact.
     pub millionths: i32,
-    /// The part says that it is good.
+    /// Whether the part marks the reading as valid.
     pub valid: bool,
 }
 
-/// The reason why a line is no reading.
+/// The reason why a line is not a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -34,7 +34,7 @@ pub enum LineError {
     /// The line is not of the form `[-]ddd.dddddd y`.
     #[error("DSP-3000: a line that is no number with a validity")]
     Form,
-    /// Longer than [`MAX_LINE`].
+    /// The line is longer than [`MAX_LINE`].
     #[error("DSP-3000: a line without an end")]
     TooLong,
 }
@@ -51,7 +51,7 @@ impl Reading {
             [number @ .., b'0'] => (number, false),
             _ => return Err(LineError::Form),
         };
-        // At least one blank parts number and validity.
+        // At least one blank separates number and validity.
         let trimmed = number.trim_ascii_end();
         if trimmed.len() == number.len() {
             return Err(LineError::Form);
@@ -96,24 +96,23 @@ fn decimal(digits: &[u8]) -> Result<u32, LineError> {
     })
 }
 
-/// Lines out of bytes.
+/// Assembles lines from bytes and parses them.
 #[derive(Debug, Clone, Default)]
 pub struct Dsp3000Ascii {
     line: Vec<u8, MAX_LINE>,
-    /// The line has outgrown its place: nothing counts until it ends.
+    /// The line has outgrown its buffer and is ignored until it ends.
     too_long: bool,
 }
 
 impl Dsp3000Ascii {
-    /// Begins before the first sample.
+    /// Begins before the first byte.
     #[must_use]
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false }
     }
 
-    /// Takes one byte; a line that it ends is a reading or an error. Empty lines are nothing.
-    /// The first line may be half a one, and half a number is a number: drop it if the part
-    /// was already sending when the line was opened.
+    /// Takes one byte; if it ends a line, returns a reading or an error. Empty lines are skipped. The first line may be
+    /// incomplete and still parse as a number: drop it if the part was already sending when the port was opened.
     pub fn receive(&mut self, byte: u8) -> Option<Result<Reading, LineError>> {
         if byte != b'\r' && byte != b'\n' {
             self.too_long |= self.line.push(byte).is_err();

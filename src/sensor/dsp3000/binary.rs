@@ -1,4 +1,4 @@
-//! This variant of the DSP-3000 sends words of 32 bits, most significant byte first.
+//! This module parses the variant of the DSP-3000 that sends words of 32 bits, most significant byte first.
 //!
 //! | bit | content |
 //! |---|---|
@@ -8,59 +8,58 @@
 //! | 26 | odd parity over all 32 bits |
 //! | 25-0 | two's complement; integrated: 25-23 turns, 22-0 angle within a turn |
 //!
-//! One parity bit is a weak check, so a byte more or less would give wrong numbers half of the
-//! time. Two things hold the stream together. The part is silent for 0.65 of every
-//! millisecond: who calls [`Dsp3000Binary::pause`] then gets no wrong word from a lost byte.
-//! And a part sends one type: [`Dsp3000Binary`] believes a phase of the four bytes only after
-//! [`LOCK`] good words of the expected type and sync in a row, and looks for it again after one
-//! bad word. Without the pauses a lost byte gives
-//! wrong readings until a word fails, and there is no bound on how many: a test saw four.
+//! One parity bit is a weak check, so a byte more or less would give wrong numbers half of the time. Two things keep
+//! the parser in step. The part is silent for 0.65 of every millisecond: a caller that then calls
+//! [`Dsp3000Binary::pause`] gets no wrong word from a lost byte. And a part sends one type: [`Dsp3000Binary`] accepts a
+//! phase of the four bytes only after [`LOCK`] good words of the expected type and sync in a row, and searches again
+//! after one bad word. Without the pauses a lost byte gives wrong readings until a word fails, and there is no bound on
+//! how many: a test saw four.
 
 use super::Mode;
 use crate::sample::FogSample;
 use crate::units::Micros;
 use heapless::Vec;
 
-/// deg/s of a rate's last bit.
+/// The last bit of a rate, deg/s.
 pub const RATE_LSB: f64 = 60e-6;
-/// deg of an increment's last bit.
+/// The last bit of an increment, deg.
 pub const INCREMENT_LSB: f64 = 6e-6;
-/// deg of an integrated angle's last bit: 360 / 2^23.
+/// The last bit of an integrated angle, deg: 360 / 2^23.
 pub const ANGLE_LSB: f64 = 360.0 / (1 << 23) as f64;
-/// Good words in a row before the first is believed.
+/// The phase is accepted after this many good words in a row.
 pub const LOCK: u8 = 4;
 
 const VALID: u32 = 1 << 31;
 const PARITY: u32 = 1 << 26;
 const VALUE_MASK: u32 = PARITY - 1;
 
-/// A word's content.
+/// Holds the content of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Word {
-    /// The part says that it is good.
+    /// Whether the part marks the value as valid.
     pub valid: bool,
-    /// 0 to 3.
+    /// Sync bits, 0 to 3.
     pub sync: u8,
     /// The meaning of the value.
     pub mode: Mode,
-    /// 26 bits, two's complement. For [`Mode::Integrated`] turns and angle together: the bits
-    /// above 22 count turns, so the whole is an angle that wraps after eight turns.
+    /// Value of 26 bits, two's complement. For [`Mode::Integrated`] it is turns and angle together: the bits above 22
+    /// count turns, so it is an angle that wraps after eight turns.
     pub value: i32,
 }
 
-/// The reason why four bytes are no word.
+/// The reason why four bytes are not a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WordError {
-    /// An even number of ones.
+    /// The word has an even number of ones.
     #[error("DSP-3000: word {word:08x} has even parity")]
     Parity {
         /// The word.
         word: u32,
     },
-    /// Type 3, which does not exist.
+    /// The word has type 3, which does not exist.
     #[error("DSP-3000: word {word:08x} is of no known type")]
     Type {
         /// The word.
@@ -121,7 +120,7 @@ impl Word {
     }
 }
 
-/// Words out of bytes.
+/// Assembles words from bytes and parses them.
 #[derive(Debug, Clone)]
 pub struct Dsp3000Binary {
     mode: Mode,
@@ -140,9 +139,9 @@ impl Dsp3000Binary {
         Self { mode, sync: sync & 3, bytes: Vec::new(), good: 0, losses: 0 }
     }
 
-    /// Takes one byte; the fourth of a word may give a reading.
+    /// Takes one byte; returns a word if it completes a good one in an accepted phase.
     pub fn receive(&mut self, byte: u8) -> Option<Word> {
-        // Three at most are kept between calls.
+        // At most three bytes are kept between calls.
         let _ = self.bytes.push(byte);
         let bytes: [u8; 4] = self.bytes.as_slice().try_into().ok()?;
         match Word::parse(bytes) {
@@ -170,7 +169,7 @@ impl Dsp3000Binary {
         }
     }
 
-    /// Returns the number of times that a believed phase turned out wrong.
+    /// Returns the number of times that an accepted phase turned out wrong.
     #[must_use]
     pub fn losses(&self) -> u32 {
         self.losses

@@ -1,21 +1,21 @@
 //! This module turns the ICM-42688-P's 16-bit time stamps into microseconds that never wrap.
 //!
-//! Without a clock on CLKIN the part counts in units of 32/30 us, though TMST_RES says 1 us
-//! (DS-000347, 12.7): the 10 ms between two samples at 100 Hz read as 9,375 counts. The counts are
-//! summed as they are, and the sum is scaled by 16/15. A time is thus within half a microsecond of
-//! the exact one however long the part has run, and a difference of two times within one.
+//! Without a clock on CLKIN the part counts in units of 32/30 us, though TMST_RES says 1 us (DS-000347, 12.7): the 10
+//! ms between two samples at 100 Hz read as 9,375 counts. The counts are summed unscaled, and the sum is scaled by
+//! 16/15. A time is thus within half a microsecond of the exact one however long the part has run, and a difference of
+//! two times within one microsecond.
 //!
 //! The counter wraps every 65,536 counts, 69.9 ms: a time is right as long as two samples are less
 //! than that apart. A longer silence shows in the arrival times ([`crate::align`]).
 
 use crate::units::Micros;
 
-/// Microseconds in 15 counts: 32/30 us each.
+/// `COUNTS` counts are this many microseconds: 32/30 us each.
 const MICROS: u64 = 16;
-/// Counts in 16 us.
+/// `MICROS` microseconds are this many counts.
 const COUNTS: u64 = 15;
 
-/// The clock sums the part's counts.
+/// Sums the part's counts.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Clock {
     last: Option<u16>,

@@ -1,9 +1,9 @@
 //! This module turns the configuration of an ICM-42688-P into register values.
 //!
-//! The part's filters run at 400 Hz where the output rate is lower, and every fourth value is put
-//! out at 100 Hz (DS-000347, 5.5): what the last filter leaves above 50 Hz folds back, and vibration
-//! near 100 Hz becomes a turn. After a reset that filter lets 92.3 Hz pass. The driver sets its third
-//! order, and [`Bandwidth::Sixteenth`] where nothing else is asked for. At 100 Hz:
+//! The part's filters run at 400 Hz where the output rate is lower, and every fourth value is output at 100 Hz
+//! (DS-000347, 5.5): whatever the last filter passes above 50 Hz folds back, and vibration near 100 Hz looks like a
+//! turn. After a reset that filter has a bandwidth of 92.3 Hz. The driver sets its third order, and by default
+//! [`Bandwidth::Sixteenth`]. At 100 Hz:
 //!
 //! | bandwidth | code | -3 dB, Hz | group delay, ms | at 50 Hz, dB | at 100 Hz, dB |
 //! |---|---|---|---|---|---|
@@ -13,25 +13,24 @@
 //! | [`Bandwidth::Twentieth`] | 6 | 18.7 | 20.4 | -25.6 | -43.7 |
 //! | [`Bandwidth::Fortieth`] | 7 | 10.1 | 35.2 | -41.7 | -59.7 |
 //!
-//! Bandwidth and group delay are the data sheet's (tables of 5.5). It gives no attenuation: the
-//! last two columns are those of a Butterworth filter of that order and bandwidth. What would
-//! fold at 400 Hz meets the anti-alias filter (258 Hz) and the decimation's own (104.8 Hz) before.
+//! Bandwidth and group delay are the data sheet's (tables of 5.5). It gives no attenuation: the last two columns are
+//! those of a Butterworth filter of that order and bandwidth. Vibration that would fold at 400 Hz first passes the
+//! anti-alias filter (258 Hz) and the filter of the decimation (104.8 Hz).
 //!
-//! A mean of ten samples at 1 kHz would be late by 4.5 ms only and have its zeros where it folds,
-//! for ten times the traffic on SPI and a decimator in the driver. It is not needed: what the filter
-//! leaves at 100 Hz is 1.4 %.
+//! A mean of ten samples at 1 kHz would be late by 4.5 ms only and have its zeros where it folds, for ten times the
+//! traffic on SPI and a decimator in the driver. It is not needed: the filter leaves 1.4 % at 100 Hz.
 
 use super::packet::Resolution;
 use super::registers::{self as reg, Register, Setting, aaf_258_hz};
 
-/// Samples per second.
+/// Gives the samples per second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum OutputRate {
-    /// 100.
+    /// The part delivers 100 samples per second.
     #[default]
     Hz100,
-    /// 1000.
+    /// The part delivers 1000 samples per second.
     Hz1000,
 }
 
@@ -45,9 +44,8 @@ impl OutputRate {
     }
 }
 
-/// Both sensors' last filter has its -3 dB point near this share of the rate at which it runs: the
-/// output rate, but at least 400 Hz. The wider settings of the part are left out: they fold back at
-/// 100 Hz.
+/// Sets the -3 dB point of both sensors' last filter, as a share of the rate at which it runs: the output rate, but at
+/// least 400 Hz. The wider settings of the part are left out, because with them vibration folds back at 100 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Bandwidth {
@@ -74,7 +72,7 @@ impl Bandwidth {
     }
 }
 
-/// The settings of the part.
+/// Holds the settings of the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Icm42688Config {
@@ -122,5 +120,5 @@ impl Icm42688Config {
     }
 }
 
-/// Registers that are set, and checked in turn.
+/// This many registers are set, and checked in turn.
 pub const SETTINGS: usize = 17;

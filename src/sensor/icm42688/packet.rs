@@ -8,29 +8,28 @@
 //! | 13 | i8 temperature, t / 2.07 + 25 deg C | i16 temperature, t / 132.48 + 25 deg C |
 //! | end | u16 time, 32/30 us | u16 time, 32/30 us, then bits 3-0 for x, y, z: acceleration high, rate low nibble |
 //!
-//! Bit 7 of the header means that the FIFO was empty. A most negative reading is no reading;
-//! of 20 bits, -524288. There is no checksum: a bit that flips on the bus is a wrong reading,
-//! but for those of the header.
+//! Bit 7 of the header means that the FIFO was empty. The most negative value (-524288 of 20 bits) marks an absent
+//! reading. There is no checksum: a bit flipped on the bus gives a wrong reading, except in the header.
 
 use heapless::Vec;
 
-/// Bytes of the longer packet.
+/// Length of the longer packet, bytes.
 pub const MAX_PACKET: usize = 20;
 const EMPTY: u8 = 0x80;
 const HEADER_16: u8 = 0x68;
 const HEADER_20: u8 = 0x78;
-/// Bits of the header that tell the content; the two below say that a rate has changed.
+/// These bits of the header tell the content; the two below say that a rate has changed.
 const CONTENT: u8 = 0xFC;
 const NO_READING_16: i32 = -32_768;
 const NO_READING_20: i32 = -524_288;
 
-/// The packet.
+/// Selects the packet, and so the resolution of its readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Resolution {
-    /// Packet 3. The range is the one that is set.
+    /// Packet 3 has 16 bits for a reading, over the range that is set.
     Bits16,
-    /// Packet 4. The range is the largest, whatever is set.
+    /// Packet 4 has 20 bits for a reading, always over the largest range.
     #[default]
     Bits20,
 }
@@ -46,12 +45,12 @@ impl Resolution {
     }
 }
 
-/// The reason why bytes are no packet.
+/// The reason why bytes are not a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PacketError {
-    /// Another number of bytes than the packet has.
+    /// The number of bytes is not that of the packet.
     #[error("ICM-42688: {got} bytes for a packet of {expected}")]
     Length {
         /// Bytes given.
@@ -62,7 +61,7 @@ pub enum PacketError {
     /// The FIFO was empty.
     #[error("ICM-42688: the FIFO was empty")]
     Empty,
-    /// Another content than was set: the packets' beginnings are lost, or a setting is.
+    /// The header announces other content than was set: the packets are out of step, or a setting is lost.
     #[error("ICM-42688: header {got:02x} is not what was set")]
     Header {
         /// The header.
@@ -70,17 +69,17 @@ pub enum PacketError {
     },
 }
 
-/// A packet's readings in the part's own counts; `None` is "no reading".
+/// Holds a packet's readings in the part's own counts; `None` is an absent one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// The packet.
+    /// The kind of packet.
     pub resolution: Resolution,
-    /// x, y, z, 16 or 20 bits.
+    /// Acceleration x, y, z, 16 or 20 bits.
     pub acceleration: [Option<i32>; 3],
-    /// x, y, z, 16 or 20 bits.
+    /// Rate about x, y, z, 16 or 20 bits.
     pub rate: [Option<i32>; 3],
-    /// 8 or 16 bits.
+    /// Temperature, 8 or 16 bits.
     pub temperature: Option<i16>,
     /// The part's time stamp, counts of 32/30 us modulo 2^16.
     pub time: u16,
@@ -99,7 +98,7 @@ impl Packet {
         let high = words.map(|word| i32::from(i16::from_be_bytes(word)));
         let (code, temperature, time, readings, no_acceleration, no_rate) = match (resolution, rest) {
             (Resolution::Bits16, &[t, u1, u0]) => {
-                // A temperature of -128 is what is left of -32768.
+                // A temperature of -128 is the upper byte of -32768.
                 let temperature = i8::from_be_bytes([t]);
                 let temperature = (temperature != i8::MIN).then_some(i16::from(temperature));
                 (HEADER_16, temperature, [u1, u0], high, NO_READING_16, NO_READING_16)

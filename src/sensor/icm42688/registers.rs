@@ -1,24 +1,24 @@
 //! The driver uses these registers of the ICM-42688-P, and writes these values to them.
 
-/// A register: its bank and its address there.
+/// Names a register by its bank and its address there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Register {
-    /// 0 to 4.
+    /// Bank, 0 to 4.
     pub bank: u8,
-    /// 0x00 to 0x7F.
+    /// Address, 0x00 to 0x7F.
     pub address: u8,
 }
 
-/// The content that a register of the configuration must have.
+/// Gives the content that a register of the configuration must have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setting {
     /// The register.
     pub register: Register,
-    /// Its bits that are set; the others stay as they are after a reset.
+    /// The bits that are written; the others stay as they are after a reset.
     pub mask: u8,
-    /// Their value.
+    /// The value of these bits.
     pub value: u8,
 }
 
@@ -31,85 +31,85 @@ pub const READ: u8 = 0x80;
 
 /// Bit 0 resets the part.
 pub const DEVICE_CONFIG: Register = bank0(0x11);
-/// The FIFO's treatment of an overflow.
+/// Sets how the FIFO treats an overflow.
 pub const FIFO_CONFIG: Register = bank0(0x16);
-/// Bytes in the FIFO, high byte; the low one follows.
+/// Holds the number of bytes in the FIFO, high byte; the low one follows.
 pub const FIFO_COUNTH: Register = bank0(0x2E);
-/// The FIFO's front.
+/// Reads from the front of the FIFO.
 pub const FIFO_DATA: Register = bank0(0x30);
 /// Bit 1 empties the FIFO.
 pub const SIGNAL_PATH_RESET: Register = bank0(0x4B);
-/// Byte order, and unit of the FIFO count.
+/// Sets the byte order and the unit of the FIFO count.
 pub const INTF_CONFIG0: Register = bank0(0x4C);
-/// Clock and AFSR.
+/// Sets the clock and AFSR.
 pub const INTF_CONFIG1: Register = bank0(0x4D);
-/// The sensors that are switched on.
+/// Switches the sensors on.
 pub const PWR_MGMT0: Register = bank0(0x4E);
-/// Gyro range and rate.
+/// Sets the gyro's range and rate.
 pub const GYRO_CONFIG0: Register = bank0(0x4F);
-/// Accelerometer range and rate.
+/// Sets the accelerometer's range and rate.
 pub const ACCEL_CONFIG0: Register = bank0(0x50);
-/// Order of the gyro's last filter.
+/// Sets the order of the gyro's last filter.
 pub const GYRO_CONFIG1: Register = bank0(0x51);
-/// Bandwidth of the last filters: accelerometer in the high nibble, gyro in the low one.
+/// Sets the bandwidth of the last filters: accelerometer in the high nibble, gyro in the low one.
 pub const GYRO_ACCEL_CONFIG0: Register = bank0(0x52);
-/// Order of the accelerometer's last filter.
+/// Sets the order of the accelerometer's last filter.
 pub const ACCEL_CONFIG1: Register = bank0(0x53);
-/// The data that go into the FIFO.
+/// Selects the data that go into the FIFO.
 pub const FIFO_CONFIG1: Register = bank0(0x5F);
-/// [`IDENTITY`].
+/// Reads as [`IDENTITY`].
 pub const WHO_AM_I: Register = bank0(0x75);
-/// The bank that is selected; in every bank.
+/// Selects the bank; this register exists in every bank.
 pub const BANK_SEL: u8 = 0x76;
-/// Gyro anti-alias filter: switches.
+/// Switches the gyro's anti-alias filter.
 pub const GYRO_CONFIG_STATIC2: Register = Register { bank: 1, address: 0x0B };
-/// Gyro anti-alias filter: DELT.
+/// Holds DELT of the gyro's anti-alias filter.
 pub const GYRO_CONFIG_STATIC3: Register = Register { bank: 1, address: 0x0C };
-/// Gyro anti-alias filter: DELTSQR, low byte.
+/// Holds the low byte of DELTSQR of the gyro's anti-alias filter.
 pub const GYRO_CONFIG_STATIC4: Register = Register { bank: 1, address: 0x0D };
-/// Gyro anti-alias filter: BITSHIFT in the high nibble, DELTSQR's high bits in the low one.
+/// Holds BITSHIFT of the gyro's anti-alias filter in the high nibble, DELTSQR's high bits in the low one.
 pub const GYRO_CONFIG_STATIC5: Register = Register { bank: 1, address: 0x0E };
-/// Accelerometer anti-alias filter: DELT in bits 6-1, bit 0 switches it off.
+/// Holds DELT of the accelerometer's anti-alias filter in bits 6-1; bit 0 switches it off.
 pub const ACCEL_CONFIG_STATIC2: Register = Register { bank: 2, address: 0x03 };
-/// Accelerometer anti-alias filter: DELTSQR, low byte.
+/// Holds the low byte of DELTSQR of the accelerometer's anti-alias filter.
 pub const ACCEL_CONFIG_STATIC3: Register = Register { bank: 2, address: 0x04 };
-/// Accelerometer anti-alias filter: BITSHIFT and DELTSQR's high bits.
+/// Holds BITSHIFT and the high bits of DELTSQR of the accelerometer's anti-alias filter.
 pub const ACCEL_CONFIG_STATIC4: Register = Register { bank: 2, address: 0x05 };
 
 /// The content that [`WHO_AM_I`] must have.
 pub const IDENTITY: u8 = 0x47;
-/// [`DEVICE_CONFIG`]: reset.
+/// Written to [`DEVICE_CONFIG`], resets the part.
 pub const RESET: u8 = 0x01;
-/// [`SIGNAL_PATH_RESET`]: empty the FIFO.
+/// Written to [`SIGNAL_PATH_RESET`], empties the FIFO.
 pub const FIFO_FLUSH: u8 = 0x02;
-/// [`FIFO_CONFIG`]: the oldest packets give way.
+/// Written to [`FIFO_CONFIG`], lets a full FIFO drop its oldest packets.
 pub const FIFO_STREAM: u8 = 0x40;
-/// [`INTF_CONFIG0`]: count in bytes, big-endian, as after a reset.
+/// Written to [`INTF_CONFIG0`], selects a count in bytes and big-endian order, as after a reset.
 pub const BIG_ENDIAN: u8 = 0x30;
-/// [`INTF_CONFIG1`]: bits 7-6 = 01 switch AFSR off. With AFSR on, the gyro repeats samples for
-/// a millisecond or two above some 100 deg/s.
+/// Written to [`INTF_CONFIG1`], switches AFSR off (bits 7-6 = 01). With AFSR on, the gyro repeats samples for a
+/// millisecond or two above some 100 deg/s.
 pub const AFSR_OFF: u8 = 0x40;
-/// [`PWR_MGMT0`]: gyro and accelerometer in low-noise mode.
+/// Written to [`PWR_MGMT0`], switches gyro and accelerometer on in low-noise mode.
 pub const LOW_NOISE: u8 = 0x0F;
-/// [`GYRO_CONFIG0`]: 250 deg/s. A car turns at less than 100 deg/s, and finer steps are worth
-/// more than range.
+/// Written to [`GYRO_CONFIG0`], sets the range of 250 deg/s. A car turns at less than 100 deg/s, and finer steps are
+/// worth more than range.
 pub const GYRO_250_DPS: u8 = 3 << 5;
-/// [`ACCEL_CONFIG0`]: 16 g.
+/// Written to [`ACCEL_CONFIG0`], sets the range of 16 g.
 pub const ACCEL_16_G: u8 = 0 << 5;
-/// [`GYRO_CONFIG1`]: GYRO_UI_FILT_ORD, bits 3-2.
+/// Written to [`GYRO_CONFIG1`], sets the third order (GYRO_UI_FILT_ORD, bits 3-2).
 pub const GYRO_THIRD_ORDER: u8 = 2 << 2;
-/// [`ACCEL_CONFIG1`]: ACCEL_UI_FILT_ORD, bits 4-3.
+/// Written to [`ACCEL_CONFIG1`], sets the third order (ACCEL_UI_FILT_ORD, bits 4-3).
 pub const ACCEL_THIRD_ORDER: u8 = 2 << 3;
-/// [`FIFO_CONFIG1`]: temperature, gyro, accelerometer.
+/// Written to [`FIFO_CONFIG1`], puts temperature, gyro and accelerometer into the FIFO.
 pub const FIFO_16_BIT: u8 = 0x07;
-/// [`FIFO_CONFIG1`]: the same with 20 bits.
+/// Written to [`FIFO_CONFIG1`], does the same with readings of 20 bits.
 pub const FIFO_20_BIT: u8 = 0x17;
 
-/// The anti-alias filter for 258 Hz: its three numbers, from the data sheet's table of bandwidths.
+/// These three numbers set the anti-alias filter to 258 Hz; they are from the data sheet's table of bandwidths.
 pub mod aaf_258_hz {
     /// The value for [`super::GYRO_CONFIG_STATIC3`].
     pub const DELT: u8 = 6;
-    /// The square of it, for the two registers behind.
+    /// The square of `DELT`, for the two registers behind.
     pub const DELTSQR: u16 = 36;
     /// The value for the high nibble of [`super::GYRO_CONFIG_STATIC5`].
     pub const BITSHIFT: u8 = 10;

@@ -5,29 +5,29 @@ use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, STANDARD_GRAVITY, SpecificForce};
 
 impl Resolution {
-    /// Counts per deg/s, at the range that the driver sets.
+    /// Returns the counts per deg/s, at the range that the driver sets.
     #[must_use]
     pub const fn counts_per_dps(self) -> f32 {
         match self {
             // At 250 deg/s eight times the 16.4 counts per deg/s that there are at 2000.
             Self::Bits16 => 131.0,
-            // Halved they are 131 counts per deg/s.
+            // The lowest bit is always 0: halved, readings have 131 counts per deg/s.
             Self::Bits20 => 262.0,
         }
     }
 
-    /// Counts per g.
+    /// Returns the counts per g, at the range that the driver sets.
     #[must_use]
     pub const fn counts_per_g(self) -> f32 {
         match self {
-            // 16 g.
+            // The range is 16 g.
             Self::Bits16 => 2048.0,
-            // Quartered they are 8192 per g.
+            // The lowest two bits are always 0: quartered, readings have 8192 counts per g.
             Self::Bits20 => 32_768.0,
         }
     }
 
-    /// Counts per deg C above 25.
+    /// Returns the counts per deg C above 25.
     const fn counts_per_degree(self) -> f32 {
         match self {
             Self::Bits16 => 2.07,
@@ -55,7 +55,7 @@ impl Packet {
             specific_force: [force(ax)?, force(ay)?, force(az)?],
             angular_rate: [rate(gx)?, rate(gy)?, rate(gz)?],
             temperature: self.temperature.map(|code| {
-                // At most 27,000.
+                // The value is at most 27,000.
                 CentiCelsius(libm::roundf(f32::from(code) * (100.0 / per_degree) + 2500.0) as i16)
             }),
             validity: Validity::reported(readings().any(|reading| clipped(self.resolution, *reading))),
@@ -68,7 +68,7 @@ impl Packet {
 const fn clipped(resolution: Resolution, reading: i32) -> bool {
     match resolution {
         Resolution::Bits16 => reading <= -32_766 || reading >= 32_767,
-        // Of 20 bits the lowest is always 0 in a rate, the lowest two in an acceleration.
+        // The lowest of 20 bits is always 0 in a rate, and the lowest two in an acceleration.
         Resolution::Bits20 => reading <= -524_256 || reading >= 524_284,
     }
 }

@@ -1,17 +1,17 @@
-//! This dialogue brings an MTi to send what the pipeline needs.
+//! This dialogue configures an MTi to send what the pipeline needs.
 //!
-//! GoToConfig, SetOutputConfiguration, GoToMeasurement, each answered by its own identifier
-//! plus one. The rules:
+//! It sends GoToConfig, SetOutputConfiguration and GoToMeasurement; the part answers each with its identifier plus one.
+//! The rules:
 //! - A message without an answer for [`TIMEOUT`] is sent again, [`ATTEMPTS`] times in all.
 //! - An error frame counts as an attempt, and the message is sent again at once.
 //! - The part may set other outputs than asked for, and says so in its acknowledgement: an
 //!   acceleration or rate of turn at another rate ends the dialogue.
 //! - A part that wakes up (MID 3E) is answered within 500 ms if the caller polls that often; it
-//!   is in configuration mode then. One that starts again and again is given up, as a part that
-//!   does not answer is.
-//! - Measurements that still come in are passed over.
+//!   is in configuration mode then. The dialogue gives up a part that keeps restarting, as it
+//!   does one that does not answer.
+//! - Measurements that still come in are skipped.
 //!
-//! No port, no clock: bytes and the time come in, frames to send come out.
+//! The dialogue needs no port and no clock: bytes and the time come in, frames to send come out.
 
 pub use super::setup::{OUTPUTS, Output, Step, mid};
 pub use crate::sensor::serial::Action;
@@ -22,11 +22,11 @@ use crate::sensor::framer::Framer;
 use crate::sensor::serial;
 use crate::units::{Duration, Micros};
 
-/// The time that an answer may take.
+/// An answer may take this long.
 pub const TIMEOUT: Duration = Duration::from_millis(500);
-/// The number of times that a message is sent before the part is given up.
+/// A message is sent this many times before the dialogue gives up.
 pub const ATTEMPTS: u8 = 3;
-/// The reason why the dialogue has ended without a part that measures.
+/// The reason why the dialogue has failed to configure the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -40,7 +40,7 @@ pub enum DialogueError {
     /// The last attempt was answered by an error frame.
     #[error("MTi: {step:?} is refused with error {code}")]
     Refused {
-        /// The step that was not answered.
+        /// The step that was refused.
         step: Step,
         /// The part's error code.
         code: u8,
@@ -48,28 +48,28 @@ pub enum DialogueError {
     /// The part has woken up more than [`ATTEMPTS`] times: its supply fails, or it resets itself.
     #[error("MTi: restarted more than {ATTEMPTS} times")]
     Restarts,
-    /// The part has set another rate than asked for, or left the output out (rate 0).
+    /// The part has set a different rate from the one requested, or left the output out (rate 0).
     #[error("MTi: output {id:04x} is set to {rate} Hz")]
     Output {
         /// Data identifier.
         id: u16,
-        /// The rate that it has set, Hz.
+        /// The rate that the part has set, Hz.
         rate: u16,
     },
 }
 
-/// The steps of the dialogue.
+/// Holds the step of the dialogue and how far it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// This message is to be sent.
+    /// The message of this step is to be sent.
     Due(Step),
-    /// It was sent, and its answer is due by then.
+    /// The message was sent, and its answer is due by this time.
     Sent(Step, Micros),
     Done,
     Failed(DialogueError),
 }
 
-/// The dialogue with one part.
+/// Holds the state of the dialogue with one part.
 #[derive(Debug, Clone)]
 pub struct Dialogue {
     framer: Framer<Xbus, MAX_FRAME>,
@@ -79,7 +79,7 @@ pub struct Dialogue {
     last_error: Option<u8>,
     /// The part has woken up and waits for the answer.
     woken: bool,
-    /// Times that it has woken up.
+    /// Times that the part has woken up.
     starts: u8,
 }
 
@@ -90,7 +90,7 @@ impl Default for Dialogue {
 }
 
 impl Dialogue {
-    /// Begins before the first line is sent.
+    /// Begins before the first message is sent.
     #[must_use]
     pub const fn new() -> Self {
         let state = State::Due(Step::GoToConfig);
@@ -108,7 +108,7 @@ impl Dialogue {
     /// Returns the next action at `now`.
     ///
     /// # Errors
-    /// [`DialogueError`], again at each call: the dialogue is over.
+    /// [`DialogueError`], which is returned at each later call too: the dialogue is over.
     pub fn poll(&mut self, now: Micros) -> Result<Action, DialogueError> {
         if core::mem::take(&mut self.woken) {
             return Ok(Action::Send(xbus::emit(mid::WAKE_UP_ACK, &[]).unwrap_or_default()));
@@ -184,7 +184,7 @@ impl serial::Dialogue for Dialogue {
     }
 }
 
-/// The relevant part of a frame's data, whatever its message is.
+/// Holds the relevant part of a frame's data, whatever its message is.
 struct Reply {
     /// The code of an error frame.
     code: u8,

@@ -1,31 +1,31 @@
-//! MTData2 (MID 36) consists of packets `ID ID LEN DATA..`, big-endian. The low nibble of an ID is precision and
-//! coordinate system. The coordinate system is that of orientations; what is read here is in the axes of the part.
+//! MTData2 (MID 36) consists of packets `ID ID LEN DATA..`, big-endian. The low nibble of an ID gives precision and
+//! coordinate system. The coordinate system concerns orientations; the readings used here are in the axes of the part.
 
 use super::precision::Precision;
 use super::xbus;
 use crate::units::RangeError;
 use heapless::Vec;
 
-/// Message identifier of MTData2.
+/// MTData2 has this message identifier.
 pub const MID_MT_DATA2: u8 = 0x36;
-/// Bytes of the longest frame that [`MtData2::emit_as`] makes.
+/// Length of the longest frame that [`MtData2::emit_as`] makes, bytes.
 pub const MAX_EMITTED: usize = 96;
 
-/// Data identifiers, precision and coordinate system masked out.
+/// These are the data identifiers, with precision and coordinate system masked out.
 pub mod id {
-    /// The identifier without them.
+    /// Selects an identifier without precision and coordinate system.
     pub const MASK: u16 = 0xFFF0;
     /// Counts messages: u16, wraps.
     pub const PACKET_COUNTER: u16 = 0x1020;
-    /// The part's time: u32, 10 kHz ticks, wraps.
+    /// Holds the part's time: u32, 10 kHz ticks, wraps.
     pub const SAMPLE_TIME_FINE: u16 = 0x1060;
-    /// Temperature, deg C.
+    /// Holds the temperature, deg C.
     pub const TEMPERATURE: u16 = 0x0810;
-    /// Specific force: x, y, z, m/s^2.
+    /// Holds the specific force x, y, z, m/s^2.
     pub const ACCELERATION: u16 = 0x4020;
-    /// Angular rate: x, y, z, rad/s.
+    /// Holds the angular rate x, y, z, rad/s.
     pub const RATE_OF_TURN: u16 = 0x8020;
-    /// Self-test, filter, clipping: u32.
+    /// Holds the status of self-test, filter and clipping: u32.
     pub const STATUS_WORD: u16 = 0xE020;
 }
 
@@ -34,25 +34,25 @@ pub mod id {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum XsensError {
-    /// A packet is longer than what is left of the message.
+    /// A packet is longer than the rest of the message.
     #[error("MTData2: packet {id:04x} is cut off")]
     Truncated {
-        /// Its identifier.
+        /// Identifier of the packet.
         id: u16,
     },
-    /// A packet that is used has not the length that its precision asks for.
+    /// A packet that is used does not have the length of its precision.
     #[error("MTData2: packet {id:04x} is not as long as its precision asks for")]
     Format {
-        /// Its identifier.
+        /// Identifier of the packet.
         id: u16,
     },
     /// The message lacks a packet that is needed.
     #[error("MTData2: packet {id:04x} is missing")]
     Missing {
-        /// Its identifier.
+        /// Identifier of the packet.
         id: u16,
     },
-    /// A reading that no part of this kind can measure.
+    /// A reading is beyond what a part of this kind can measure.
     #[error("MTData2: packet {id:04x}: {error}")]
     Reading {
         /// Identifier of the packet.
@@ -62,25 +62,25 @@ pub enum XsensError {
     },
 }
 
-/// The used content of an MTData2 message.
+/// Holds the used content of an MTData2 message.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MtData2 {
     /// Message counter, wraps.
     pub packet_counter: Option<u16>,
-    /// 10 kHz ticks, wraps.
+    /// Time of the sample, 10 kHz ticks, wraps.
     pub sample_time_fine: Option<u32>,
     /// Specific force x, y, z, m/s^2.
     pub acceleration: Option<[f32; 3]>,
     /// Angular rate x, y, z, rad/s.
     pub rate_of_turn: Option<[f32; 3]>,
-    /// deg C.
+    /// Temperature, deg C.
     pub temperature: Option<f32>,
     /// Status word.
     pub status: Option<u32>,
 }
 
 impl MtData2 {
-    /// Reads the packets of a message; unknown ones are passed over.
+    /// Reads the packets of a message; unknown ones are skipped.
     ///
     /// # Errors
     /// [`XsensError::Truncated`] and [`XsensError::Format`].
@@ -122,7 +122,7 @@ impl MtData2 {
         xbus::emit(MID_MT_DATA2, &self.data(precision)).unwrap_or_default()
     }
 
-    /// Parses all packets.
+    /// Encodes all packets that are present.
     fn data(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
         let mut data = Vec::new();
         // MAX_EMITTED bytes hold all six packets in double precision, the longest.

@@ -2,13 +2,13 @@
 
 use heapless::Vec;
 
-/// The encoding of a number, big-endian.
+/// Names the encoding of a number, big-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Precision {
     /// f32.
     Single,
-    /// i32, 20 bits of fraction.
+    /// i32 with 20 bits of fraction.
     Fixed1220,
     /// 48 bits, 32 of them fraction; the fraction comes first, the integer behind it.
     Fixed1632,

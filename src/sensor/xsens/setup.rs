@@ -1,11 +1,11 @@
-//! These messages bring an MTi to send what the pipeline needs.
+//! These messages configure an MTi to send what the pipeline needs.
 
 use super::mtdata2::id;
 use super::xbus;
 use crate::sensor::serial::MAX_SENT;
 use heapless::Vec;
 
-/// Message identifiers; an acknowledgement is one more.
+/// These are the message identifiers; an acknowledgement has the next higher one.
 pub mod mid {
     /// Asks for the device identifier.
     pub const REQ_DID: u8 = 0x00;
@@ -15,28 +15,28 @@ pub mod mid {
     pub const GO_TO_CONFIG: u8 = 0x30;
     /// The part has started.
     pub const WAKE_UP: u8 = 0x3E;
-    /// The answer to it.
+    /// Answers a wake-up.
     pub const WAKE_UP_ACK: u8 = 0x3F;
     /// The part refuses a message; one byte says why.
     pub const ERROR: u8 = 0x42;
-    /// The data that are requested, and their rates.
+    /// Sets the outputs and their rates.
     pub const SET_OUTPUT_CONFIGURATION: u8 = 0xC0;
 }
 
-/// "With every message": the rate of counters and time stamps.
+/// Counters and time stamps are sent with every message; this rate stands for that.
 const EVERY_MESSAGE: u16 = 0xFFFF;
 
-/// One output of the part.
+/// Describes one output of the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Output {
     /// Data identifier.
     pub id: u16,
-    /// Hz.
+    /// Rate, Hz.
     pub rate: u16,
 }
 
-/// The outputs that the pipeline needs: 100 Hz, all in single precision.
+/// The pipeline needs these outputs: 100 Hz, all in single precision.
 pub const OUTPUTS: [Output; 6] = [
     Output { id: id::PACKET_COUNTER, rate: EVERY_MESSAGE },
     Output { id: id::SAMPLE_TIME_FINE, rate: EVERY_MESSAGE },
@@ -46,15 +46,15 @@ pub const OUTPUTS: [Output; 6] = [
     Output { id: id::STATUS_WORD, rate: EVERY_MESSAGE },
 ];
 
-/// A message of the dialogue.
+/// Names a message of the dialogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Step {
-    /// Stop measuring.
+    /// The part stops measuring.
     GoToConfig,
-    /// Send [`OUTPUTS`].
+    /// The part is to send [`OUTPUTS`].
     SetOutputConfiguration,
-    /// Start measuring.
+    /// The part starts measuring.
     GoToMeasurement,
 }
 

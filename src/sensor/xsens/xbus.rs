@@ -1,19 +1,18 @@
-//! An Xbus frame is `FA FF MID LEN DATA.. CS`, and all of it after FA adds up to 0 modulo 256. CS`, all of it after
-//! FA adding up to 0 modulo 256.
+//! An Xbus frame is `FA FF MID LEN DATA.. CS`; all bytes after FA add up to 0 modulo 256.
 
 use crate::sensor::framer::Protocol;
 use heapless::Vec;
 
 const PREAMBLE: u8 = 0xFA;
 const BUS_ID: u8 = 0xFF;
-/// A LEN of this value announces an extended length, which nothing here needs.
+/// A LEN of this value announces an extended length, which no message here needs.
 const EXTENDED_LENGTH: u8 = 0xFF;
 /// Bytes of a frame around its data.
 const OVERHEAD: usize = 5;
-/// The longest frame.
+/// Length of the longest frame, bytes.
 pub const MAX_FRAME: usize = 254 + OVERHEAD;
 
-/// The framing of Xbus.
+/// Frames Xbus messages.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Xbus;
 

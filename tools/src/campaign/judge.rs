@@ -27,7 +27,7 @@ impl Limits {
     pub const FIBRE_OPTIC: Self = Self { moved: 1e-4, mean: 1e-4, largest: 2e-4, inside_sigma: [0.0, 1.0] };
 }
 
-/// Counts the rows after a report that are not judged, because they still make up for estimates of bad samples.
+/// After a report this many rows are not judged, because their rates still compensate for estimates of bad samples.
 const PAID: usize = 20;
 const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
 
