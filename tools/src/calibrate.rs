@@ -1,11 +1,11 @@
-//! The calibration of one unit: gain and mounting of its gyro, from drives with a reference yaw rate.
+//! This module calibrates one unit: gain and mounting of its gyro, from drives with a reference yaw rate.
 //!
-//! A yaw rate that the coprocessor has corrected still errs by a share of the roll rate and of the pitch rate (the
-//! sensor is not level in the vehicle, or the reference is not) and by a share of itself (gain). Over a second or more
+//! A yaw rate that the coprocessor has corrected still contains a share of the roll rate and of the pitch rate (the
+//! sensor is not level in the vehicle, or the reference is not) and a share of itself (gain). Over a second or more
 //! these errors add up to an angle, and the reference shows it. The shares are fitted to those angles, each drive with
 //! a constant of its own, because bias belongs to the drive and not to the unit. They are the last row of a 3 x 3 map
 //! ([`gyronet::mounting::GyroMap`]) that the board applies to every sample. The rows above it stay those of the
-//! identity: a heading shows nothing of them.
+//! identity, because a heading does not depend on them.
 
 mod fit;
 mod spans;
@@ -18,13 +18,14 @@ use gyronet::mounting::GyroMap;
 use spans::Span;
 use unit_file::UnitFile;
 
-/// Fewest seconds of a drive after static initialisation.
+/// A drive needs at least this many seconds after static initialisation.
 const SHORTEST_S: f64 = 30.0;
-/// Largest sigma of a share of another axis: 1.1 deg of mounting.
+/// The sigma of another axis's share may be at most this: 1.1 deg of mounting.
 const MAX_CROSS_SIGMA: f64 = 0.02;
-/// Largest sigma of the gain.
+/// The sigma of the gain may be at most this.
 const MAX_GAIN_SIGMA: f64 = 0.005;
-/// Largest robust deviation of a span's angle behind the fit, rad: no corrected gyro errs so much in so short a time.
+/// The robust deviation of the spans' angles from the fit may be at most this, rad: no corrected gyro has so large an
+/// error in so short a time.
 const MAX_RESIDUAL_RAD: f64 = 0.05;
 
 /// The reason why a drive gives no calibration.
@@ -39,7 +40,7 @@ pub enum CalibrateError {
     NoReference {
         /// The recording.
         path: String,
-        /// The columns that would do.
+        /// The columns that would serve as one.
         columns: &'static str,
     },
     /// The drive is too short.
@@ -47,7 +48,7 @@ pub enum CalibrateError {
     TooShort {
         /// The recording.
         path: String,
-        /// Its length with a reference.
+        /// The time with a reference, s.
         seconds: f64,
     },
     /// Reference and gyro contradict each other, whatever the calibration.
@@ -58,7 +59,7 @@ pub enum CalibrateError {
         /// The robust deviation.
         rad: f64,
     },
-    /// An element is further from the identity than any unit's.
+    /// An element is further from the identity than a real unit's can be.
     #[error("{what} {value:+.4}: no unit is so far off; configure how the sensor is mounted")]
     Implausible {
         /// The name of the element.
@@ -68,20 +69,20 @@ pub enum CalibrateError {
     },
 }
 
-/// A share of the map, with its sigma.
+/// Holds a share of the map, with its sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Share {
-    /// Its name.
+    /// The name of the share.
     pub name: &'static str,
     /// The value; 0 where it is refused.
     pub value: f64,
-    /// Its standard deviation, by leaving out one block of time after the other.
+    /// Its standard deviation, from fits that leave out one block of time each.
     pub sigma: f64,
     /// The reason why it is refused: the drives do not show it.
     pub refused: Option<&'static str>,
 }
 
-/// A drive that runs with the weights that the board runs.
+/// Holds a drive, replayed with the weights that the board runs.
 pub struct Drive<'a> {
     /// The recording.
     pub recording: &'a Recording,
@@ -89,7 +90,7 @@ pub struct Drive<'a> {
     pub replay: Replay,
 }
 
-/// The names of the shares, the largest sigma of each, and what a drive lacks that does not show it.
+/// Lists the shares: the name, the largest sigma, and what the drives lack if the share is not found.
 const SHARES: [(&str, f64, &str); 3] = [
     ("roll", MAX_CROSS_SIGMA, "no rolling: the drives do not show it"),
     ("pitch", MAX_CROSS_SIGMA, "no pitching: the drives do not show it"),

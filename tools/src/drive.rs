@@ -1,5 +1,6 @@
-//! Recorded drives: [`recording`] reads one, [`wheel_frames`] turns its wheels into the frames of a vehicle's bus,
-//! [`replay`] runs it through the coprocessor as the board would, and [`candump`] writes what was sent.
+//! These modules handle recorded drives: [`recording`] reads one, [`wheel_frames`] turns its wheels into the frames of
+//! a vehicle's bus, [`replay`] runs it through the coprocessor as the board would, and [`candump`] writes what was
+//! sent.
 
 pub mod candump;
 pub mod error;
@@ -9,5 +10,5 @@ pub mod wheel_frames;
 
 use gyronet::sample::RATE_HZ;
 
-/// The time of one sample on the grid, s.
+/// One sample on the grid takes this time, s.
 pub const DT: f64 = 1.0 / RATE_HZ as f64;

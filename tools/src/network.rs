@@ -1,5 +1,5 @@
-//! The networks' weights on a host: [`checkpoint`]s from training, [`quantize`]d into [`weight_file`]s, and the error
-//! that this adds ([`quantization_error`]).
+//! These modules handle the networks' weights on a host: [`checkpoint`]s from training are [`quantize`]d into
+//! [`weight_file`]s, and [`quantization_error`] measures the error that this adds.
 
 pub mod checkpoint;
 pub mod quantization_error;

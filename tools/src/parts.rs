@@ -1,4 +1,4 @@
-//! The sensors that a vehicle may have, and what each of them sends.
+//! These modules simulate the sensors that a vehicle may have, byte by byte.
 //!
 //! A recording goes through the bytes of a part: its samples are encoded as the part would send them and read back by
 //! the parser that the board runs. The fault campaign damages the same bytes.
@@ -20,7 +20,7 @@ use crate::drive::recording::{Recording, Row};
 use gyronet::sample::ImuSample;
 use gyronet::units::{AngularRate, SpecificForce};
 
-/// A sensor of the vehicle.
+/// Names a sensor of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Part {
@@ -41,16 +41,16 @@ impl std::fmt::Display for Part {
     }
 }
 
-/// The steps in which a part's readings come; 0 where nothing is rounded.
+/// Holds the steps to which a part's readings are rounded; 0 without rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Quantisation {
-    /// rad/s.
+    /// Step of the rate, rad/s.
     pub rate: f64,
-    /// m/s^2.
+    /// Step of the specific force, m/s^2.
     pub force: f64,
 }
 
-/// The error of a recording that does not come back from a part.
+/// The reason why a recording does not pass through a part.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ViaError {
@@ -76,7 +76,7 @@ pub enum ViaError {
     },
 }
 
-/// A recording that has been through a part.
+/// Holds a recording that has passed through a part.
 #[derive(Debug, Clone)]
 pub struct Via {
     /// The rows with the samples that the part's parser delivered.
@@ -88,10 +88,10 @@ pub struct Via {
 }
 
 impl Part {
-    /// All of them.
+    /// All parts.
     pub const ALL: [Self; 4] = [Self::Xsens, Self::Dsp1760, Self::Icm42688, Self::Adis16465];
 
-    /// The name in tables.
+    /// Returns the name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -121,8 +121,8 @@ impl Part {
         })
     }
 
-    /// The steps of the part's readings in this recording: of the part itself, of our codes and
-    /// of f32 at the largest rate.
+    /// Returns the steps of the part's readings in this recording: those of the part itself, of our codes and of f32 at
+    /// the largest rate.
     fn quantisation(self, recording: &Recording) -> Quantisation {
         let rates = recording.rows.iter().flat_map(|row| row.sample.angular_rate);
         let peak = rates.map(|rate| rate.rad_per_sec().abs()).fold(0.0, f64::max);
@@ -133,7 +133,7 @@ impl Part {
         let ulp = f64::from(f32::EPSILON);
         match self {
             Self::Xsens => Quantisation::default(),
-            // The increment is rounded once; ten equal ones are wrong alike.
+            // The increment is rounded once; ten equal ones have equal errors.
             Self::Dsp1760 => Quantisation { rate: rate_code + ulp * peak, force: 0.0 },
             // The driver divides and multiplies in f32: two more roundings.
             Self::Icm42688 => Quantisation {
@@ -156,11 +156,11 @@ impl Part {
     }
 }
 
-/// The message that an Xsens MTi would send for each row of a recording.
+/// Returns the message that an Xsens MTi would send for each row of a recording.
 #[must_use]
 pub fn mti_bytes(recording: &Recording) -> Vec<Vec<u8>> {
     xsens::messages(recording).collect()
 }
 
-/// The sample of each row from a part, and the number of bytes that they took.
+/// Holds the sample of each row from a part, and the number of bytes that they took.
 type Sent = (Vec<ImuSample>, u64);

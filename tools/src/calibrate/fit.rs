@@ -1,32 +1,32 @@
-//! The robust fit of the shares to the spans of all drives.
+//! This module fits the shares to the spans of all drives, robustly.
 //!
-//! Huber's weights (1.345 robust deviations) let a span of a lost reference count little; leaving out one block of time
-//! after the other (jackknife) gives sigmas that hold for errors that last for seconds.
+//! Huber's weights (1.345 robust deviations) give little weight to a span of a lost reference; leaving out one block of
+//! time after the other (jackknife) gives sigmas that remain valid for errors that last for seconds.
 
 use super::spans::Span;
 use nalgebra::{DMatrix, DVector};
 
-/// Rounds of reweighting.
+/// The fit is reweighted this many times.
 const ROUNDS: usize = 30;
 /// Huber's constant: 95 % of the efficiency of least squares where the errors are normal.
 const HUBER: f64 = 1.345;
-/// Normal deviations in the median of magnitudes.
+/// The median of magnitudes is this many normal deviations.
 const MEDIAN: f64 = 0.6745;
-/// Blocks of a drive that are left out in turn.
+/// A drive is cut into this many blocks, which are left out in turn.
 const BLOCKS: usize = 10;
-/// Smallest robust deviation, rad: below it is rounding.
+/// The robust deviation is taken as at least this, rad: below it is rounding.
 const FLOOR_RAD: f64 = 1e-9;
 
-/// The result of a fit.
+/// Holds the result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// Shares of the roll, pitch and yaw rate; 0 where it is not fitted.
+    /// Shares of the roll, pitch and yaw rate; 0 for one that is not fitted.
     pub shares: [f64; 3],
     /// Their standard deviations.
     pub sigmas: [f64; 3],
     /// The constant of each drive, rad/s.
     pub biases: Vec<f64>,
-    /// The robust deviation of each drive's spans behind the fit, rad.
+    /// The robust deviation of each drive's spans from the fit, rad.
     pub deviations: Vec<f64>,
 }
 
@@ -99,7 +99,7 @@ fn solve(
         let weighted =
             DMatrix::from_fn(kept.len(), columns, |row, column| inputs[(row, column)] * weights[row]);
         let normal = weighted.transpose() * &inputs;
-        // A column of zeros has the solution zero.
+        // For a column of zeros the solution is zero.
         let inverse = normal.svd(true, true).solve(&(weighted.transpose() * &errors), f64::EPSILON);
         let Ok(found) = inverse else { break };
         solution = found;
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Spans of a second with known shares, noise, and a few lost references.
+    /// Makes spans of a second with known shares, noise, and a few lost references.
     fn spans(shares: [f64; 3], bias: f64, seed: u64, turning: f64) -> Vec<Span> {
         let mut random = Random::new(seed, 0);
         let span = |k: usize, random: &mut Random| {

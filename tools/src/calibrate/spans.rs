@@ -1,13 +1,14 @@
-//! Spans are pieces of a drive whose turn the reference knows.
+//! Spans are pieces of a drive for which the reference gives the angle turned; over a second or more its noise is small
+//! beside the errors to be fitted.
 
 use super::{CalibrateError, Drive, SHORTEST_S};
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
 
-/// Samples of a span with a yaw rate as reference: a second.
+/// With a yaw rate as reference, a span has this many samples: a second.
 const RATE_SPAN: usize = RATE_HZ as usize;
 
-/// A piece of a drive.
+/// Holds a piece of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Span {
     /// The true turn less that of the corrected yaw rate, rad.
@@ -43,7 +44,7 @@ pub fn of(Drive { recording, replay }: &Drive<'_>) -> Result<Vec<Span>, Calibrat
     Ok(spans)
 }
 
-/// Sums up a span; `None` where the reference does not know all of it.
+/// Sums up a span; `None` if the reference is not known throughout.
 fn whole(samples: &[Option<(f64, [f64; 3])>]) -> Option<Span> {
     let mut span = Span { error: 0.0, turns: [0.0; 3], seconds: samples.len() as f64 * DT };
     for sample in samples {

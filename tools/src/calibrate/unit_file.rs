@@ -1,4 +1,4 @@
-//! The file of a unit's calibration: the map for the board, and how well it is known.
+//! The file of a unit's calibration holds the map for the board, and how well it is known.
 
 use super::{Drive, Share, fit::Fit};
 use gyronet::mounting::GyroMap;
@@ -6,12 +6,12 @@ use gyronet::store::UnitMap;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The calibration of a unit.
+/// Holds the calibration of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitFile {
     /// The map.
     pub gyro_map: GyroMap,
-    /// Its last row: what is added to the yaw rate of roll, pitch and yaw rate.
+    /// The last row of the map: the shares of roll, pitch and yaw rate that are added to the yaw rate.
     pub shares: [Share; 3],
     /// The checksum of the weights that corrected the drives.
     pub weights: u32,
@@ -19,16 +19,16 @@ pub struct UnitFile {
     pub drives: Vec<DriveFit>,
 }
 
-/// The fit on one drive.
+/// Holds the fit on one drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DriveFit {
     /// The recording.
     pub name: String,
     /// The gyro's bias about x, y and z at its start, rad/s.
     pub gyro_bias_rad_per_s: [f64; 3],
-    /// The mean of the reference less the corrected yaw rate, rad/s: the bias that is left.
+    /// The mean of the reference less the corrected yaw rate, rad/s: the remaining bias.
     pub yaw_rate_bias_rad_per_s: f64,
-    /// The robust standard deviation of the spans' angles behind the fit, rad.
+    /// The robust standard deviation of the spans' angles from the fit, rad.
     pub deviation_rad: f64,
 }
 
@@ -36,7 +36,7 @@ pub struct DriveFit {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnitFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{path}: {source}")]
     Read {
         /// The file.
@@ -44,7 +44,7 @@ pub enum UnitFileError {
         /// The reason.
         source: std::io::Error,
     },
-    /// It is no calibration of a unit.
+    /// The file is not the calibration of a unit.
     #[error("{path}: {source}")]
     Json {
         /// The file.
@@ -52,25 +52,25 @@ pub enum UnitFileError {
         /// The reason.
         source: serde_json::Error,
     },
-    /// Its map is no unit's.
+    /// The map is too far from the identity for a real unit.
     #[error("{path}: gyro_map: an element is too far from the identity")]
     Implausible {
         /// The file.
         path: String,
     },
-    /// It was found with other weights.
+    /// The calibration was found with other weights.
     #[error("{path}: found with the weights {found:08x}, these are {runs:08x}")]
     OtherWeights {
         /// The file.
         path: String,
-        /// The checksum of those.
+        /// The checksum of the weights that it was found with.
         found: u32,
         /// The checksum of the weights in use.
         runs: u32,
     },
 }
 
-/// The content as JSON has it.
+/// Mirrors the JSON of the file.
 #[derive(Serialize, Deserialize)]
 struct Content {
     gyro_map: [[f32; 3]; 3],
@@ -126,7 +126,7 @@ pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, UnitFileError> {
     }
 }
 
-/// Returns what each drive has shown.
+/// Returns the results of the fit for each drive.
 pub(super) fn drives(drives: &[Drive<'_>], fit: &Fit) -> Vec<DriveFit> {
     let fits = fit.biases.iter().zip(&fit.deviations);
     drives

@@ -1,5 +1,5 @@
-//! CAN frames as text, one on each line, in the format that can-utils' `candump -L` logs and that `canplayer` and
-//! python-can read: `(seconds.micros) interface ID#DATA`.
+//! This module writes CAN frames as text, one on each line, in the format that can-utils' `candump -L` logs and that
+//! `canplayer` and python-can read: `(seconds.micros) interface ID#DATA`.
 
 use embedded_can::{Frame, Id};
 use gyronet::units::Micros;

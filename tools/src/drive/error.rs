@@ -1,8 +1,9 @@
-//! Errors of recorded drives and of data sets, which name the file and, where there is one, line and column.
+//! These are the errors of recorded drives and of data sets. They name the file and, where there is one, line and
+//! column, so that a user finds the place.
 
 use std::fmt;
 
-/// An error of one file: where it is, and what is wrong there.
+/// Describes an error in one file: its place, and the fault.
 #[derive(Debug)]
 pub struct DataError {
     /// The file or folder.
@@ -63,7 +64,7 @@ impl fmt::Display for DataError {
     }
 }
 
-/// A fault of a file.
+/// Names the fault of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each fault names its fields")]
@@ -71,7 +72,7 @@ pub enum DataFault {
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// The file is no CSV in UTF-8.
+    /// The file is not a CSV in UTF-8.
     #[error(transparent)]
     Csv(#[from] csv::Error),
     /// A file that the data set has does not exist.
@@ -97,14 +98,14 @@ pub enum DataFault {
     /// A field is not what its column needs.
     #[error("{text:?} is {error}")]
     Value { text: String, error: ValueError },
-    /// Time does not rise.
+    /// Time does not increase.
     #[error("time goes {} from {last_s:.4} s to {at_s:.4} s",
         if at_s < last_s { "backwards" } else { "nowhere" })]
     Time { last_s: f64, at_s: f64 },
     /// A stamp is earlier than the one before.
     #[error("time goes backwards from {last} to {at}")]
     Backwards { last: i64, at: i64 },
-    /// The file stops for so long that what follows is another drive.
+    /// The file has so long a gap that the rows after it are another drive.
     #[error("silent for {seconds:.0} s before it, at most {most} s are one drive")]
     Silent { seconds: f64, most: f64 },
     /// The recording is too short for static initialisation.
@@ -119,10 +120,10 @@ pub enum DataFault {
     /// A wheel, 1 to 4, turns during static initialisation; its mean rate over a second is in rad/s.
     #[error("starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s")]
     Moving { line: u64, wheel: usize, rate: f64 },
-    /// The calibration lacks a parameter, or it is no positive number.
+    /// The calibration lacks a parameter, or the parameter is not a positive number.
     #[error("no usable parameter {0:?}")]
     Parameter(&'static str),
-    /// The sequence has no inertial sensor, which the request needs.
+    /// The request needs an inertial sensor, and the sequence has none.
     #[error("xsens_imu.csv has 8 columns: no gyro and no accelerometer")]
     NoGyro,
     /// The note that a sequence is simulated cannot be parsed.
@@ -130,7 +131,7 @@ pub enum DataFault {
     Marker(#[from] serde_json::Error),
 }
 
-/// A fault of one field.
+/// Names the fault of one field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
@@ -143,7 +144,7 @@ pub enum ValueError {
     /// The field is NaN or an infinity.
     #[error("not finite")]
     NotFinite,
-    /// The value is larger than any part of this kind can measure, or the time is before zero.
+    /// The value is larger than a part of this kind can measure, or the time is before zero.
     #[error("out of range")]
     OutOfRange,
 }

@@ -1,6 +1,6 @@
-//! Recorded drives: a CSV with a header, one row for each 10 ms.
+//! A recorded drive is a CSV file with a header and one row for each 10 ms.
 //!
-//! Columns are found by their name, in any order; others are passed over.
+//! Columns are found by name, in any order; unknown ones are skipped.
 //!
 //! | column | unit | |
 //! |---|---|---|
@@ -25,15 +25,15 @@ use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
 use std::fs::File;
 use std::path::Path;
 
-/// Wheels that a recording can have.
+/// A recording can have this many wheels.
 pub const WHEELS: usize = 4;
 /// A wheel that turns faster than this, on average over a second of static initialisation, is
 /// rolling, rad/s. A rate sensor on a standing wheel shows up to 0.04.
 pub const WHEEL_STANDS: f64 = 0.3;
-/// Largest departure of the median sample period from 10 ms, microseconds.
+/// The median sample period may differ from 10 ms by at most this, microseconds.
 const PERIOD_TOLERANCE_US: u64 = 2_000;
 
-/// A row.
+/// Holds one row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// Line of the file, the header being line 1.
@@ -42,14 +42,14 @@ pub struct Row {
     pub sample: ImuSample,
     /// The true yaw rate, rad/s.
     pub reference: Option<f64>,
-    /// The true course, rad to the left from any direction, wrapped or not.
+    /// The true course, rad, positive to the left, from any zero direction, wrapped or not.
     pub course: Option<f64>,
     /// Rates of the wheels, rad/s.
     pub wheels: [Option<f64>; WHEELS],
 }
 
-/// A whole drive, fit to be run: at least 3 s long, at 100 Hz, with its wheels at rest in the
-/// first 3 s where it has any.
+/// Holds a whole drive that can be run: at least 3 s long, at 100 Hz, with its wheels, if it has any, at rest in the
+/// first 3 s.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The file, for messages.
@@ -71,7 +71,7 @@ impl Recording {
         Self::parse(&name, file)
     }
 
-    /// Parses any input; messages call it `path`.
+    /// Parses any input; errors name it `path`.
     ///
     /// # Errors
     /// [`DataError`] with that path.
@@ -88,7 +88,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The file's name without folder and extension, for tables.
+    /// Returns the file's name without folder and extension, for tables.
     #[must_use]
     pub fn name(&self) -> &str {
         Path::new(&self.path).file_stem().and_then(|stem| stem.to_str()).unwrap_or(&self.path)
@@ -102,7 +102,7 @@ impl Recording {
         (last - first + PERIOD_US) as f64 * 1e-6
     }
 
-    /// Times between neighbouring rows, microseconds.
+    /// Returns the times between neighbouring rows, microseconds.
     fn periods(&self) -> impl Iterator<Item = u64> {
         self.rows.windows(2).map(|pair| pair[1].sample.time.0 - pair[0].sample.time.0)
     }
@@ -129,7 +129,8 @@ impl Recording {
         Ok(())
     }
 
-    /// Second by second, so that a car which pulls away late in the three is caught too.
+    /// Checks that the wheels stand in each of the first three seconds, so that a car which pulls away late in them is
+    /// found too.
     fn check_wheels(&self) -> Result<(), DataError> {
         let still = self.rows.get(..STATIC_SAMPLES as usize).unwrap_or(&self.rows);
         for second in still.chunks(RATE_HZ as usize) {

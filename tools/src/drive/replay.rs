@@ -1,4 +1,5 @@
-//! A recorded drive that runs through the coprocessor as on the board.
+//! This module runs a recorded drive through the coprocessor as the board does: the same code, so the frames are those
+//! that the board would send.
 
 use crate::drive::candump::Log;
 use crate::drive::recording::Recording;
@@ -14,21 +15,21 @@ use gyronet::units::{AngularRate, Micros, Yaw};
 use std::io::{self, Write};
 use std::ops::Range;
 
-/// The board looks at its inputs every millisecond.
+/// The replayed board polls its inputs every millisecond.
 const LOOK_US: u64 = 1_000;
-/// The part of a gap in which the board's messages of a silent sensor are replayed; beyond it time jumps.
+/// The board's messages of a silent sensor are replayed for this long in a gap, microseconds; beyond it time jumps.
 const SILENCE_US: u64 = 60_000_000;
 
-/// The error of a recording that gives no corrected rate.
+/// The reason why a recording gives no corrected rate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
-    /// The vehicle does not stand still when static initialisation needs it to.
+    /// The vehicle does not stand still during static initialisation.
     #[error("{path}: starts moving: line {line}: {source}")]
     StartsMoving {
         /// The recording.
         path: String,
-        /// The line with which the three seconds were over.
+        /// The line at which the three seconds were over.
         line: u64,
         /// The check that failed.
         source: StaticError,
@@ -41,7 +42,7 @@ pub enum ReplayError {
     },
 }
 
-/// The results of one row.
+/// Holds the results of one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Index of the row in the recording.
@@ -52,17 +53,17 @@ pub struct Step {
     pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
-    /// The navigation rate of this row's sample, which was sent some samples later; `None` before static
-    /// initialisation is over, and for the last samples, whose turn never came.
+    /// The navigation rate of this row's sample, which was sent some samples later; `None` before static initialisation
+    /// is over, and for the last samples, for which the drive ended too early.
     pub navigation: Option<YawEstimate>,
-    /// Gyro less static bias less the best estimate of the network, known some samples later;
-    /// the prompt rate where no such came.
+    /// Gyro less static bias less the best estimate of the network, known some samples later; the prompt rate where
+    /// there is none.
     pub settled: AngularRate,
-    /// The frames that were sent with this row, and until the next one where the sensor was silent.
+    /// The frames that were sent with this row, and those sent while the sensor was silent after it.
     pub frames: Vec<TimedFrame>,
 }
 
-/// A drive with its corrected yaw rate.
+/// Holds a drive with its corrected yaw rate.
 #[derive(Debug, Clone)]
 pub struct Replay {
     /// One step for each row that has a place on the grid.
@@ -73,15 +74,15 @@ pub struct Replay {
     pub gyro_bias: [AngularRate; 3],
     /// The yaw that the navigation rates still carry at the end.
     pub owed: Yaw,
-    /// The numbers of events.
+    /// The event counters of the pipeline.
     pub counters: Counters,
     /// Messages that reported "failed" because a value did not fit its signal.
     pub out_of_range: u32,
 }
 
 impl Replay {
-    /// Runs a recording; every window's estimate is delivered at once. `tick` is called once
-    /// for each row. `wheels` stand in for the vehicle's bus.
+    /// Runs a recording; every window's estimate is delivered at once. `tick` is called once for each row. `wheels` are
+    /// used in place of the vehicle's bus.
     ///
     /// # Errors
     /// [`ReplayError`], when static initialisation does not succeed at its first attempt.
@@ -106,7 +107,7 @@ impl Replay {
             if let Some(last) = steps.last_mut() {
                 let until = time.0.min(now.0 + SILENCE_US);
                 for look in (now.0 + LOOK_US..until).step_by(LOOK_US as usize) {
-                    // Time goes on. A silent sensor is reported, and its messages come before this row's.
+                    // Time passes up to this row: a silent sensor is reported, and those messages precede this row's.
                     let _ = coprocessor.poll(Micros(look));
                     last.frames.extend(std::iter::from_fn(|| coprocessor.next_frame()));
                 }
@@ -155,24 +156,24 @@ impl Replay {
         Ok(Self { steps, start, gyro_bias, owed, counters, out_of_range })
     }
 
-    /// The steps that have a navigation rate: from the end of static initialisation on.
+    /// Returns the range of the steps that have a navigation rate: from the end of static initialisation on.
     #[must_use]
     pub fn compared(&self) -> Range<usize> {
         let sent = self.steps[self.start..].iter().take_while(|step| step.navigation.is_some()).count();
         self.start..self.start + sent
     }
 
-    /// The navigation rates of those.
+    /// Returns the navigation rates of the compared steps.
     pub fn navigation(&self) -> impl Iterator<Item = YawEstimate> {
         self.steps[self.compared()].iter().filter_map(|step| step.navigation)
     }
 
-    /// Gyro less static bias less the network's best estimate, of those.
+    /// Returns, for the compared steps, the gyro less static bias less the network's best estimate.
     pub fn settled(&self) -> impl Iterator<Item = AngularRate> {
         self.steps[self.compared()].iter().map(|step| step.settled)
     }
 
-    /// The frames of the whole drive.
+    /// Returns the frames of the whole drive.
     pub fn frames(&self) -> impl Iterator<Item = &TimedFrame> {
         self.steps.iter().flat_map(|step| &step.frames)
     }
@@ -198,7 +199,7 @@ impl Replay {
     }
 }
 
-/// The step of a sample, at most a few back.
+/// Finds the step of a sample, at most a few back.
 fn earlier(steps: &mut [Step], tick: u32) -> Option<&mut Step> {
     steps.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
 }
@@ -210,7 +211,7 @@ mod tests {
     use gyronet::model::{Estimate, SCALE_MIN};
     use std::fmt::Write;
 
-    /// Says that the gyro is always off by 100 codes.
+    /// Estimates that the gyro is always off by 100 codes.
     struct Constant;
 
     impl WindowNetwork for Constant {
@@ -236,15 +237,15 @@ mod tests {
     fn the_first_three_seconds_initialise() {
         let recording = recording(1_000, |_| 0.01, usize::MAX);
         let mut ticks = 0;
-        // Nothing ever moves here: zero-rate updates would take the correction back off.
+        // Nothing ever moves here: zero-rate updates would undo the correction.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
         let drive = Replay::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
         assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
         assert_eq!(drive.gyro_bias[2], recording.rows[1].sample.angular_rate[2]);
-        // A constant is taken out of the corrections.
+        // The corrections are freed of their constant part.
         let sent: i64 = drive.navigation().map(|rate| i64::from(rate.rate.0)).sum();
         assert_eq!((drive.compared(), sent), (300..993, 0));
-        // The flicker of the last seven.
+        // The rest is the flicker of the last seven samples.
         assert_eq!(drive.owed, Yaw(-(1 << 14)));
         let [(_, init), (_, degraded), (_, ready), (_, clipped)] = drive.status_counts();
         assert_eq!((init, clipped), (300, 0));

@@ -1,4 +1,5 @@
-//! Wheel speeds as the frames of a vehicle's bus: those of a recorded drive, and of any other vehicle.
+//! This module makes the frames of a vehicle's bus from wheel speeds: those of a recorded drive, or of any other
+//! vehicle.
 
 use crate::drive::recording::{Recording, Row, WHEEL_STANDS};
 use embedded_can::{Frame, StandardId};
@@ -6,19 +7,19 @@ use gyronet::can::DataFrame;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::sample::WHEELS;
 
-/// Radius of a wheel of the recorded car, m.
+/// A wheel of the recorded car has this radius, m.
 pub const RADIUS: f64 = 0.289;
-/// Recorded wheels (front right, rear right, front left, rear left) as places of
-/// [`gyronet::sample::WheelSample::speeds`].
+/// Gives for each place of [`gyronet::sample::WheelSample::speeds`] the recorded wheel (front right, rear right, front
+/// left, rear left).
 const PLACES: [usize; WHEELS] = [1, 3, 0, 2];
 const FRONT: [usize; 2] = [0, 2];
 const REAR: [usize; 2] = [1, 3];
-/// Rows from one frame to the next: 20 ms.
+/// A frame is sent every so many rows: 20 ms.
 pub const FRAME_ROWS: usize = 2;
-/// Rows after which a wheel without a new rate is silent: 100 ms.
+/// A wheel without a new rate is silent after this many rows: 100 ms.
 const SILENT_ROWS: usize = 10;
 
-/// The receiver of these frames, as the image has it.
+/// Returns the receiver of these frames, as the image has it.
 ///
 /// # Panics
 /// Never: the settings come with the library.
@@ -27,8 +28,8 @@ pub fn receiver() -> WheelReceiver {
     WheelReceiver::new(WheelSettings::TOYOTA).expect("settings that come with the library")
 }
 
-/// The frame of four wheel speeds in km/h (front left, front right, rear left, rear right), in the layout of
-/// [`WheelSettings::TOYOTA`]; `None` where one is not known.
+/// Makes the frame of four wheel speeds in km/h (front left, front right, rear left, rear right), in the layout of
+/// [`WheelSettings::TOYOTA`]; `None` if one is not known.
 #[must_use]
 pub fn frame([front_left, front_right, rear_left, rear_right]: [Option<f64>; WHEELS]) -> Option<DataFrame> {
     let mut data = [0; 8];
@@ -39,10 +40,10 @@ pub fn frame([front_left, front_right, rear_left, rear_right]: [Option<f64>; WHE
     DataFrame::new(StandardId::new(0xAA)?, &data)
 }
 
-/// The wheel frames of one recorded drive.
+/// Makes the wheel frames of one recorded drive.
 #[derive(Debug, Clone)]
 pub struct WheelFrames {
-    /// The recorded wheel that stands for each place: its own, or another where it has none.
+    /// The recorded wheel used for each place: its own, or another if that was not recorded.
     source: [usize; WHEELS],
     /// The newest speed of each recorded wheel in km/h, and the row that it came with.
     newest: [Option<(f64, usize)>; WHEELS],
@@ -77,7 +78,7 @@ impl WheelFrames {
             .map(|wheel| self.newest[wheel].filter(|(_, at)| now - at < SILENT_ROWS).map(|(speed, _)| speed))
     }
 
-    /// Takes a row and returns its frame: one with every [`FRAME_ROWS`]th row, where all wheels are known.
+    /// Takes a row and returns its frame: one with every [`FRAME_ROWS`]th row, if all wheels are known.
     pub fn next(&mut self, row: &Row) -> Option<DataFrame> {
         let is_due = self.row.is_multiple_of(FRAME_ROWS);
         let speeds = self.speeds(row);
@@ -85,18 +86,18 @@ impl WheelFrames {
     }
 }
 
-/// Speed of the vehicle at each row of a recording, for dead reckoning.
+/// Holds the speed of the vehicle at each row of a recording, for dead reckoning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Speeds {
-    /// Wheels that it is the mean of.
+    /// The number of wheels that the speed is the mean of.
     pub wheels: usize,
-    /// The speed at each row, m/s, forward positive; a wheel's last known rate holds on.
+    /// The speed at each row, m/s, forward positive; a wheel keeps its last known rate.
     pub metre_per_sec: Vec<f64>,
 }
 
 impl Speeds {
-    /// The mean of the rear wheels, which do not steer; of the front ones where no other is recorded. `None`
-    /// where the recording has no wheels.
+    /// Computes the mean speed of the rear wheels, which do not steer, or of the front ones if no rear one is recorded;
+    /// `None` if the recording has no wheels.
     #[must_use]
     pub fn new(recording: &Recording) -> Option<Self> {
         let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());

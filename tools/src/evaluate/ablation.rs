@@ -1,5 +1,5 @@
-//! The worth of each part of the compensation: the navigation rate of one configuration after another, all of which the
-//! board can run.
+//! This module measures the worth of each part of the compensation: the error of the navigation rate with one
+//! configuration after another, all of which the board can run.
 
 use crate::drive::recording::Recording;
 use crate::drive::replay::{Replay, ReplayError, Step};
@@ -14,16 +14,16 @@ use gyronet::sample::Standstill;
 use gyronet::units::AngularRate;
 use serde::Serialize;
 
-/// A configuration and its name.
+/// Holds a configuration and its name.
 #[derive(Debug, Clone)]
 pub struct Variant {
     /// The name in tables.
     pub name: String,
     /// The configuration.
     pub config: PipelineConfig,
-    /// Windows go through the network; otherwise its corrections are zero.
+    /// Whether windows go through the network; otherwise its corrections are zero.
     pub network: bool,
-    /// The vehicle's bus has wheel speeds.
+    /// Whether the vehicle's bus has wheel speeds.
     pub wheels: bool,
 }
 
@@ -33,30 +33,30 @@ impl Variant {
     }
 }
 
-/// A network that corrects nothing.
+/// Stands in for a network and corrects nothing.
 pub(crate) struct Uncorrected;
 
 impl WindowNetwork for Uncorrected {
     fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
         let corrections = [AngularRate::ZERO; gyronet::model::window::WINDOW];
-        // 1e-3 rad/s: with it a second's sigma is that of an uncorrected rate.
+        // The scale is 1e-3 rad/s: with it a second's sigma is that of an uncorrected rate.
         Estimate { corrections, scale: AngularRate(134_218), ..Estimate::NONE }
     }
 }
 
-/// The default, with estimates chosen in this way.
+/// Returns the default configuration in another mode.
 fn with_mode(mode: Mode) -> PipelineConfig {
     let compensate = CompensateConfig { mode, ..CompensateConfig::DEFAULT };
     PipelineConfig { compensate, ..PipelineConfig::DEFAULT }
 }
 
-/// A configuration with another lag of the rate for navigation.
+/// Returns a configuration with another lag of the navigation rate.
 pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
     let compensate = CompensateConfig { lag, ..config.compensate };
     PipelineConfig { compensate, ..config }
 }
 
-/// Part by part.
+/// Returns a variant for each part of the compensation.
 #[must_use]
 pub fn parts() -> Vec<Variant> {
     let alone = |config| PipelineConfig { zero_rate: None, ..config };
@@ -74,7 +74,7 @@ pub fn parts() -> Vec<Variant> {
     ]
 }
 
-/// The default at every lag.
+/// Returns the default configuration at every lag.
 #[must_use]
 pub fn lags() -> Vec<Variant> {
     (0..)
@@ -86,7 +86,7 @@ pub fn lags() -> Vec<Variant> {
         .collect()
 }
 
-/// The score of one variant, on one drive or as a mean.
+/// Holds the score of one variant, on one drive or as a mean.
 #[derive(Debug, Clone, Serialize)]
 pub struct Score {
     /// The variant's name.
@@ -102,7 +102,8 @@ pub struct Score {
     pub sigma_rad: f64,
 }
 
-/// The reference's own error in whole seconds in which the wheels stand; smaller errors cannot be measured with it.
+/// Holds the reference's own error in whole seconds in which the wheels stand; smaller errors cannot be measured with
+/// it.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Floor {
     /// Whole seconds.
@@ -144,7 +145,7 @@ pub fn run(
         .collect()
 }
 
-/// Means over drives, each counting the same; `None` of no drive.
+/// Returns the means over drives, each counting the same; `None` without drives.
 #[must_use]
 pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
     let first = drives.first()?;
@@ -164,7 +165,7 @@ pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
     (0..first.len()).map(of).collect()
 }
 
-/// Returns the reference while the wheels stand; `None` without wheels, or where they never do.
+/// Returns the reference's error while the wheels stand; `None` without wheels, or where they never stand.
 #[must_use]
 pub fn floor(recording: &Recording) -> Option<Floor> {
     let wheels = Some(WheelFrames::new(recording)?);

@@ -9,7 +9,7 @@ use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::sample::PERIOD_US;
 use serde::Serialize;
 
-/// The cost of one sample. What happens once a second at standstill is not in it.
+/// Holds the cost of one sample, without the work that is done once a second at standstill.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cost {
     /// Multiplications per sample.
@@ -18,7 +18,7 @@ pub struct Cost {
     pub delay_ms: u64,
 }
 
-/// The shapes of the networks.
+/// Holds the shapes of the networks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shapes {
     /// GyroNet in f32.

@@ -1,13 +1,13 @@
-//! The classical baseline: a low pass of linear phase behind static initialisation.
+//! This module is the classical baseline: a low pass of linear phase after static initialisation.
 //!
-//! A Hamming window over a sinc. Its delay of half its length is taken out, as that of the rate for navigation is, so
-//! what it shows is what smoothing alone gains with the same inputs and no more delay. Length and corner are the best
-//! ones on the training drives (`host-tests/tests/tools/fir_choice.rs` holds them against a grid).
+//! It is a Hamming window over a sinc. Its delay of half its length is compensated, as that of the navigation rate is,
+//! so it shows what smoothing alone gains with the same inputs and no more delay. Length and corner are the best ones
+//! on the training drives (`host-tests/tests/tools/fir_choice.rs` compares them with a grid).
 
 use gyronet::sample::RATE_HZ;
 use std::f64::consts::PI;
 
-/// A symmetric low pass with an odd number of taps.
+/// Filters with a symmetric low pass with an odd number of taps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LowPass {
     /// The taps, with a sum of 1.
@@ -15,18 +15,18 @@ pub struct LowPass {
 }
 
 impl LowPass {
-    /// Samples before and behind the one in the middle.
+    /// The chosen filter has this many samples before and after the one in the middle.
     pub const HALF: usize = 5;
-    /// The corner, Hz.
+    /// The chosen filter has this corner frequency, Hz.
     pub const CORNER_HZ: f64 = 5.0;
 
-    /// The filter of the rows.
+    /// Makes the filter that the tables use.
     #[must_use]
     pub fn chosen() -> Self {
         Self::new(Self::HALF, Self::CORNER_HZ)
     }
 
-    /// A filter that sees `half` samples on either side.
+    /// Makes a filter over `half` samples on either side.
     #[must_use]
     pub fn new(half: usize, corner_hz: f64) -> Self {
         let tap = |k: usize| {
@@ -53,8 +53,8 @@ impl LowPass {
         self.taps.len() / 2 + 1
     }
 
-    /// Returns the filtered values, each at the time of its input: the delay is taken out. The first and the last value
-    /// stand for those before and behind.
+    /// Returns the filtered values, each at the time of its input: the delay is compensated. The first and the last
+    /// value are repeated beyond the ends.
     #[must_use]
     pub fn filter(&self, input: &[f64]) -> Vec<f64> {
         let Some(last) = input.len().checked_sub(1) else { return Vec::new() };
@@ -82,7 +82,7 @@ mod tests {
         );
     }
 
-    /// A sine of 1 Hz comes out smaller and at the same time.
+    /// A sine of 1 Hz comes out smaller but not later.
     #[test]
     fn a_sine_lines_up_with_its_input() {
         let sine = |shift: f64| -> Vec<f64> {

@@ -1,26 +1,27 @@
-//! The heading error of a yaw rate over 1 s, 10 s, 60 s and a whole drive, against a reference of either kind.
+//! This module computes the heading error of a yaw rate over 1 s, 10 s, 60 s and a whole drive, against a reference of
+//! either kind.
 //!
 //! A yaw rate as reference gives every figure. A course over ground (GNSS) is the direction of travel, not the heading:
-//! latency, side slip and noise make it wrong by 0.05 to 0.1 rad from one second to the next. So its errors are medians
-//! of 10 s, which still scatter by 0.02 rad: it says nothing about 1 s and 10 s, and those figures stay empty.
+//! latency, side slip and noise give it errors of 0.05 to 0.1 rad from one second to the next. So errors against it are
+//! medians of 10 s, which still scatter by 0.02 rad: it cannot judge 1 s and 10 s, and those figures stay empty.
 
 use super::metrics::{integral, wrap};
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 
-/// Samples of a second.
+/// A second has this many samples.
 const SECOND: usize = RATE_HZ as usize;
-/// Seconds over which the error against a course is a median.
+/// The error against a course is a median over this many seconds.
 const BLOCK_S: usize = 10;
-/// Fewest values of the course in them.
+/// A median needs at least this many values of the course.
 const BLOCK_VALUES: usize = 3;
-/// Seconds of known course at whose median both headings are laid on each other.
+/// Both headings are aligned at their median over this many seconds of known course.
 const ALIGNED_S: usize = 20;
 /// Largest median error of [`HeadingErrorSeries::typical_10s`] that any bias can explain, rad.
 pub const PLAUSIBLE_10S_RAD: f64 = 0.5;
 
-/// The truth that a drive has.
+/// Holds the truth that a drive has.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reference {
     /// The yaw rate of each sample, rad/s (`ref_gyr_z`).
@@ -30,7 +31,7 @@ pub enum Reference {
 }
 
 impl Reference {
-    /// Returns the name of its column.
+    /// Returns the name of the reference's column.
     #[must_use]
     pub fn column(&self) -> &'static str {
         match self {
@@ -59,20 +60,20 @@ impl Reference {
     }
 }
 
-/// The heading error over a drive.
+/// Holds the heading error over a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadingErrorSeries {
     /// Seconds from one error to the next.
     step_s: usize,
     /// The shortest window that the reference can judge, s.
     shortest_s: usize,
-    /// rad; `None` where the reference is not known.
+    /// The errors, rad; `None` where the reference is not known.
     errors: Vec<Option<f64>>,
     /// The error at the end, rad.
     last: f64,
 }
 
-/// The figures of a heading error; `None` where the reference cannot give one, or the drive is too short.
+/// Holds the figures of a heading error; `None` where the reference cannot give one, or the drive is too short.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct HeadingError {
     /// Mean over windows of 1 s, a new one every second, of the absolute error of the change of heading.
@@ -111,7 +112,7 @@ impl HeadingErrorSeries {
         median(self.changes(10).map(f64::abs).collect())
     }
 
-    /// Changes of the error over windows that begin with each step.
+    /// Returns the changes of the error over windows that begin with each step.
     fn changes(&self, seconds: usize) -> impl Iterator<Item = f64> {
         let later = self.errors.iter().skip(seconds / self.step_s);
         self.errors.iter().zip(later).filter_map(|(from, to)| Some((*to)? - (*from)?))
@@ -125,7 +126,7 @@ impl HeadingError {
         self.mean_1s_rad.or(self.rms_rad)
     }
 
-    /// Mean of each figure over the drives that have it.
+    /// Returns the mean of each figure over the drives that have it.
     #[must_use]
     pub fn mean(errors: &[Self]) -> Self {
         let mean = |of: fn(&Self) -> Option<f64>| mean(errors.iter().filter_map(of));
@@ -167,8 +168,8 @@ fn against_course(estimate: &[f64], course: &[Option<f64>]) -> Option<HeadingErr
     enough.then_some(HeadingErrorSeries { step_s: BLOCK_S, shortest_s: 6 * BLOCK_S, errors, last })
 }
 
-/// Returns the integral of a yaw rate less the course, where that is known. The difference is what is unwrapped: it
-/// changes slowly, whatever the vehicle turns while the course is not known.
+/// Returns the integral of a yaw rate less the course, where that is known. The difference is unwrapped and not the
+/// course, because it changes slowly however the vehicle turns while the course is not known.
 #[must_use]
 pub fn off_course(estimate: &[f64], course: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut last = None;
@@ -254,7 +255,7 @@ mod tests {
             assert!((figure - due).abs() < 2e-3, "{figure} is not {due}");
         };
         near(error.mean_60s_rad, 0.06);
-        // From the middle of the first 20 s to that of the last 10 s.
+        // The error grows from the middle of the first 20 s to that of the last 10 s.
         near(error.final_rad, 0.105);
         let blocks: Vec<f64> =
             [0, 1, 2, 3, 7, 8, 9, 10, 11].map(|k| bias * (10.0 * f64::from(k) - 5.0)).to_vec();

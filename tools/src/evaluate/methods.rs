@@ -1,9 +1,9 @@
-//! The ways of getting a yaw rate that are compared with each other: one list of names for the tables of drives and for
-//! the paper's.
+//! This module lists the methods of computing a yaw rate that are compared with each other, with one set of names for
+//! the tables of drives and for the paper's.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// The gyro that a method starts from.
+/// Names the gyro that a method starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gyro {
     /// The gyro of the inertial sensor.
@@ -12,7 +12,7 @@ pub enum Gyro {
     Fog,
 }
 
-/// A way of getting a yaw rate.
+/// Names a method of computing a yaw rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Method {
     /// The name in JSON.
@@ -36,9 +36,9 @@ impl Method {
     pub const RAW: Self = mems("raw", "raw gyro");
     /// The gyro less its mean over the first 3 s.
     pub const STATIC: Self = mems("static", "static initialisation");
-    /// Static initialisation and zero-rate updates: the pipeline without a network.
+    /// The pipeline without a network: static initialisation and zero-rate updates.
     pub const STATIC_ZERO_RATE: Self = mems("static_zero_rate", "static, zero-rate updates");
-    /// Static initialisation and a low pass ([`crate::evaluate::fir`]), its delay taken out.
+    /// Static initialisation and a low pass ([`crate::evaluate::fir`]), its delay compensated.
     pub const FIR: Self = mems("fir", "FIR low pass");
     /// Static initialisation, zero-rate updates and the same low pass.
     pub const FIR_ZERO_RATE: Self = mems("fir_zero_rate", "FIR, zero-rate updates");
@@ -53,8 +53,8 @@ impl Method {
     pub const PROMPT: Self = mems("prompt", "sent at once");
     /// The rate that the board sends in its own yaw messages, some samples later.
     pub const NAVIGATION: Self = mems("default", "sent for navigation");
-    /// A well-known orientation filter ([`crate::evaluate::vqf`]). On a drive it starts from static initialisation; in
-    /// the paper's tables it stands in for the vendor's filter and finds the bias itself.
+    /// The well-known orientation filter VQF ([`crate::evaluate::vqf`]). On a drive it starts from static
+    /// initialisation; in the paper's tables it stands in for the vendor's filter and finds the bias itself.
     pub const VQF: Self = mems("vqf", "VQF filter");
     /// The same filter, with limits of rest that a shaking vehicle keeps.
     pub const VQF_VEHICLE: Self = mems("vqf_vehicle", "VQF filter, vehicle's limits of rest");
@@ -96,12 +96,12 @@ impl Method {
         Self::NAVIGATION,
     ];
 
-    /// The classical ones among them.
+    /// The classical methods among them.
     pub const CLASSICAL: [Self; 6] =
         [Self::RAW, Self::STATIC, Self::STATIC_ZERO_RATE, Self::FIR, Self::FIR_ZERO_RATE, Self::VQF];
 }
 
-/// A value for each method of a drive.
+/// Holds a value for each method of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PerMethod<T>([T; Method::ON_A_DRIVE.len()]);
 

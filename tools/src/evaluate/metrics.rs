@@ -1,14 +1,14 @@
-//! The yaw errors of the paper's Table I: over one second, and at the end of the drive.
+//! This module computes the yaw errors of the paper's Table I: over one second, and at the end of the drive.
 
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// Samples of one window of [`YawError::mean_1s_rad`].
+/// One window of [`YawError::mean_1s_rad`] has this many samples.
 pub const WINDOW: usize = RATE_HZ as usize;
 
-/// Yaw error of one method on one drive.
+/// Holds the yaw error of one method on one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct YawError {
     /// Mean over consecutive 1 s windows, none overlapping another, of the absolute error of
@@ -23,7 +23,7 @@ pub struct YawError {
 impl YawError {
     /// Compares a yaw rate with the true one, sample by sample, both in rad/s.
     ///
-    /// `None` where there is not one whole window, or the two differ in length.
+    /// `None` if there is no whole window, or the two differ in length.
     #[must_use]
     pub fn new(estimate: &[f64], reference: &[f64]) -> Option<Self> {
         if estimate.len() != reference.len() || estimate.len() < WINDOW {
@@ -37,7 +37,7 @@ impl YawError {
         Some(Self { mean_1s_rad, final_rad: wrap(unwrapped).abs(), final_unwrapped_rad: unwrapped.abs() })
     }
 
-    /// Mean of each number over several drives; `None` of no drive.
+    /// Returns the mean of each number over several drives; `None` without drives.
     #[must_use]
     pub fn mean(errors: &[Self]) -> Option<Self> {
         let count = (!errors.is_empty()).then_some(errors.len() as f64)?;
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn opposite_errors_cancel_in_the_end_but_not_in_the_mean() {
-        // +0.02 rad/s for one second, -0.01 for another, then half a second of 0.04.
+        // The rate is off by +0.02 rad/s for one second, by -0.01 for another, then by 0.04 for half a second.
         let estimate: Vec<f64> = (0..250)
             .map(|k| {
                 0.3 + if k < 100 {

@@ -1,4 +1,4 @@
-//! The yaw rates of one drive by each method.
+//! This module computes the yaw rates of one drive by each method, from the same samples and through the same pipeline.
 
 use crate::drive::recording::{Recording, Row};
 use crate::drive::replay::{Replay, ReplayError};
@@ -17,7 +17,7 @@ use gyronet::pipeline::PipelineConfig;
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
-/// A network of any kind and its shape.
+/// Holds a network of any kind and its shape.
 pub struct Network<'a> {
     run: &'a mut dyn WindowNetwork,
     shape: Shape,
@@ -36,7 +36,7 @@ impl WindowNetwork for Network<'_> {
     }
 }
 
-/// The networks of the rows.
+/// Holds the networks that the methods run.
 pub struct Networks<'a> {
     /// GyroNet in f32.
     pub float: Network<'a>,
@@ -48,18 +48,18 @@ pub struct Networks<'a> {
     pub sent: Option<Network<'a>>,
 }
 
-/// Yaw rates of one drive by each method, from the first sample after static initialisation.
+/// Holds the yaw rates of one drive by each method, from the first sample after static initialisation.
 #[derive(Debug, Clone)]
 pub struct Rates {
     /// Time of each sample since the recording's first, s.
     pub seconds: Vec<f64>,
-    /// rad/s.
+    /// The rates by each method, rad/s.
     pub rates: PerMethod<Vec<f64>>,
     /// The cost of each method.
     pub costs: PerMethod<Cost>,
     /// The truth, where the drive has one.
     pub reference: Option<Reference>,
-    /// The drive began while the vehicle moved, so a simulated standstill went before it.
+    /// Whether the drive began while the vehicle moved, so that a simulated standstill was put before it.
     pub simulated_rest: bool,
     /// The drive as the board would run it.
     pub drive: Replay,
@@ -67,11 +67,11 @@ pub struct Rates {
     pub run_time: Duration,
 }
 
-/// Most times that [`Rates::new`] goes through a recording.
+/// [`Rates::new`] runs through a recording at most this many times.
 pub const RUNS: usize = 5;
 
 impl Rates {
-    /// Runs every method. All networks go through the very same pipeline, and the pipeline without a network is that of
+    /// Runs every method. All networks go through the same pipeline, and the pipeline without a network is that of
     /// [`Method::STATIC_ZERO_RATE`]. `tick` is called for each row of each run.
     ///
     /// # Errors
@@ -125,7 +125,7 @@ impl Rates {
             .steps
             .iter()
             .zip(&still)
-            // Before there is a rate, and behind the last one.
+            // The static rate stands in before the first navigation rate and after the last one.
             .map(|(step, still)| step.navigation.map_or(*still, |sent| sent.rate.rad_per_sec()))
             .collect();
         let rates = PerMethod::new(|method| match method {
@@ -142,7 +142,7 @@ impl Rates {
             Method::GYRONET_INT => gyronet.clone(),
             Method::LINEAR => settled(&linear),
             Method::PROMPT => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
-            // Method::NAVIGATION, the last one.
+            // The last one is `Method::NAVIGATION`.
             _ => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
         });
         let costs = PerMethod::new(|method| Cost::new(method, &shapes));

@@ -1,4 +1,4 @@
-//! The errors and costs of each method, drive by drive, as a table and as JSON.
+//! This module reports the errors and costs of each method, drive by drive, as a table and as JSON.
 
 use crate::drive::DT;
 use crate::drive::recording::Recording;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// The error of a drive that cannot be evaluated.
+/// The reason why a drive cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
@@ -54,13 +54,13 @@ pub enum EvaluateError {
     },
 }
 
-/// A method's errors and cost.
+/// Holds a method's errors and cost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
     /// The errors.
     #[serde(flatten)]
     pub error: HeadingError,
-    /// The mean of what it takes off beyond static initialisation and zero-rate updates, deg/h.
+    /// The mean of its corrections beyond static initialisation and zero-rate updates, deg/h.
     pub mean_correction_deg_h: f64,
     /// Its cost.
     #[serde(flatten)]
@@ -108,7 +108,7 @@ pub fn columns(rows: &PerMethod<Row>) -> impl Iterator<Item = (Method, [String; 
     })
 }
 
-/// One of our rates beside the best classical method that has the same inputs and no more delay.
+/// Compares one of our rates with the best classical method that has the same inputs and no more delay.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparison {
     /// The classical method.
@@ -117,7 +117,7 @@ pub struct Comparison {
     pub ratio: f64,
 }
 
-/// Both rates that are sent, each beside the best classical method.
+/// Compares both rates that are sent, each with the best classical method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparisons {
     /// The rate for navigation.
@@ -127,7 +127,7 @@ pub struct Comparisons {
 }
 
 impl Comparisons {
-    /// `None` where there is no error to compare.
+    /// Makes the comparisons; `None` if there is no error to compare.
     #[must_use]
     pub fn new(rows: &PerMethod<Row>) -> Option<Self> {
         let compare = |ours: Method| {
@@ -153,7 +153,7 @@ impl fmt::Display for Comparisons {
     }
 }
 
-/// All methods on one drive.
+/// Holds the results of all methods on one drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriveErrors {
     /// The recording's name.
@@ -166,9 +166,9 @@ pub struct DriveErrors {
     pub missing: u32,
     /// The column of the reference.
     pub reference: &'static str,
-    /// The vehicle's wheels are known.
+    /// Whether the vehicle's wheels are known.
     pub wheels: bool,
-    /// The standstill at the start is simulated.
+    /// Whether the standstill at the start is simulated.
     pub simulated_rest: bool,
     /// Our rates beside the best classical method.
     pub over_best_classical: Option<Comparisons>,
@@ -219,7 +219,7 @@ impl DriveErrors {
     }
 }
 
-/// The mean of some drives, each counting the same; each figure over those that have it.
+/// Holds the mean of some drives, each counting the same; a figure is the mean over those that have it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mean {
     /// The folder of the drives, or "all".
@@ -246,10 +246,10 @@ impl Mean {
     }
 }
 
-/// The methods on several drives and their means.
+/// Holds the results of the methods on several drives, and their means.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// One for each drive.
+    /// The results of each drive.
     pub drives: Vec<DriveErrors>,
     /// The mean of each folder's drives.
     pub sets: Vec<Mean>,
@@ -384,7 +384,7 @@ mod tests {
         assert_eq!(row.keys().map(String::as_str).collect::<Vec<_>>(), due);
         assert!(row["mean_1s_rad"].is_null() && row["mean_10s_rad"].is_null());
         assert_eq!((&row["rms_rad"], &row["final_rad"]), (&0.5.into(), &1.0.into()));
-        // A mean is over those that have the figure.
+        // A mean covers only the drives that have the figure.
         assert_eq!(json["mean"]["raw"]["mean_1s_rad"], 2.0);
         assert_eq!(json["mean"]["raw"]["rms_rad"], 2.0);
         let sets = json["sets"].as_array().unwrap().iter().map(|set| (&set["set"], &set["drives"]));
@@ -407,7 +407,7 @@ mod tests {
         assert!(lines[1].contains("0.80 of the best classical method (fir_zero_rate)"), "{text}");
         let rows = lines.iter().filter(|line| line.starts_with("  ") && !line.contains("classical"));
         let widths: Vec<usize> = rows.map(|line| line.len()).collect();
-        // Three drives and one mean of two.
+        // The table has three drives and one mean of two.
         assert_eq!(widths.len(), 4 * (1 + Method::ON_A_DRIVE.len()));
         assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
         assert!(text.contains("mean of 2 drives of a") && !text.contains("mean of 1"), "{text}");

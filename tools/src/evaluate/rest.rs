@@ -1,8 +1,9 @@
-//! A simulated standstill for a recording that begins while the vehicle moves and has a course as reference.
+//! This module simulates a standstill for a recording that begins while the vehicle moves and has a course as
+//! reference.
 //!
-//! No board can start on such a drive. What can still be compared is the correction behind a good start: 3 s at rest go
-//! before the recording, in which each axis shows its mean over the drive, the yaw gyro less what the course has
-//! turned. It is the best constant bias that any initialisation can find, the same one for every method.
+//! No board can start on such a drive. The corrections after a good start can still be compared: 3 s at rest are put
+//! before the recording, in which each axis shows its mean over the drive, the yaw gyro less the turn of the course. It
+//! is the best constant bias that any initialisation can find, the same one for every method.
 
 use crate::drive::recording::{Recording, Row};
 use crate::evaluate::heading_error::bias_by_course;
@@ -10,7 +11,7 @@ use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 
-/// Amplitude by which each axis flickers: equal readings are stuck ones.
+/// Each axis flickers by this amplitude, because equal readings would count as stuck.
 const FLICKER: f64 = 1e-3;
 
 /// Returns the recording with that standstill before it; `None` without 20 s of course.

@@ -1,17 +1,17 @@
-//! The absolute trajectory error (ATE) of a dead-reckoned path against the true one, as it lies and after alignment.
+//! This module computes the absolute trajectory error (ATE) of a dead-reckoned path against the true one, as it lies
+//! and after alignment.
 //!
-//! The paper says "using evo" and neither rmse nor mean: both are here. Alignment is Umeyama's
-//! (IEEE PAMI 13(4), 1991) without scale, in the plane: with the centred points as vectors, the
-//! rotation is `atan2(sum of cross products, sum of dot products)`. evo aligns in three
-//! dimensions, which is the same on planar paths, except that it may mirror a path and refuses a
-//! straight one; a vehicle cannot be mirrored, and drives straight.
+//! The paper says "using evo" but not whether rmse or mean, so both are computed. Alignment is Umeyama's (IEEE PAMI
+//! 13(4), 1991) without scale, in the plane: with the centred points as vectors, the rotation is `atan2(sum of cross
+//! products, sum of dot products)`. evo aligns in three dimensions, which is the same on planar paths, except that it
+//! may mirror a path and refuses a straight one; a vehicle cannot be mirrored, and drives straight.
 
 use serde::Serialize;
 
-/// A point of a plane, m.
+/// Holds a point of a plane, m.
 pub type Point = [f64; 2];
 
-/// Error of a path.
+/// Holds the error of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TrajectoryError {
     /// Root of the mean squared distance, m.
@@ -21,7 +21,7 @@ pub struct TrajectoryError {
 }
 
 impl TrajectoryError {
-    /// Point by point; `None` where there are none, or not as many of both.
+    /// Compares point by point; `None` if there are no points, or the paths differ in length.
     #[must_use]
     pub fn new(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         if estimate.len() != truth.len() || estimate.is_empty() {
@@ -48,7 +48,7 @@ impl TrajectoryError {
     }
 }
 
-/// A turn about the origin, then a shift.
+/// Describes a turn about the origin, then a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
     /// The turn to the left, rad.

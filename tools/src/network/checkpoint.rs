@@ -15,15 +15,16 @@ use std::path::Path;
 
 /// A network that has checkpoints.
 pub trait Network {
-    /// Returns the names and shapes of its tensors, as large as `found` says that those of the file are.
+    /// Returns the names and shapes of the network's tensors; `found` gives the shapes in the file, where sizes may
+    /// vary.
     fn shapes(found: Found<'_>) -> Vec<Shape>;
 }
 
-/// GyroNet: a linear part, or two LSTMs one above the other and a fully connected layer, or both.
+/// Stands for GyroNet: a linear part, or two LSTMs one above the other and a fully connected layer, or both.
 #[derive(Debug, Clone)]
 pub struct GyroNet;
 
-/// FoGNet: two stacks of LSTMs, and four fully connected layers.
+/// Stands for FoGNet: two stacks of LSTMs, and four fully connected layers.
 #[derive(Debug, Clone)]
 pub struct FogNet;
 
@@ -67,7 +68,7 @@ impl Network for FogNet {
     }
 }
 
-/// A checkpoint in memory.
+/// Holds a checkpoint in memory.
 #[derive(Debug, Clone)]
 pub struct Checkpoint<N> {
     tensors: Tensors,
@@ -83,7 +84,7 @@ impl<N: Network> Checkpoint<N> {
         Ok(Self { tensors: Tensors::read(path, N::shapes)?, network: PhantomData })
     }
 
-    /// Parses bytes; messages call them `name`.
+    /// Parses bytes; errors name them `name`.
     ///
     /// # Errors
     /// [`CheckpointError`] with that name.
@@ -102,11 +103,11 @@ impl<N: Network> Checkpoint<N> {
     }
 }
 
-/// The tensor of GyroNet's linear part.
+/// GyroNet's linear part is the tensor of this name.
 const LINEAR: &str = "linear.weight";
 
 impl Checkpoint<GyroNet> {
-    /// Returns the parts that there are.
+    /// Returns the parts that the network has.
     #[must_use]
     pub fn shape(&self) -> blob::Shape {
         let units = self.bilstms().map_or(0, |network| network.lstm1[0].units());

@@ -1,12 +1,12 @@
-//! The error that quantisation adds: the integer network is compared with the f32 network, window by window.
+//! This module measures the error that quantisation adds: the integer network is compared with the f32 network, window
+//! by window.
 
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::seconds::SecondsWindow;
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate, WindowNetwork};
 
-/// Runs two networks on every window, passes on the first one's estimate and sums up how far
-/// they are apart.
+/// Runs two networks on every window, returns the first one's estimate and sums up their differences.
 #[derive(Debug)]
 pub struct Both<'n, I, F> {
     integer: &'n mut I,
@@ -14,7 +14,7 @@ pub struct Both<'n, I, F> {
     error: QuantizationError,
 }
 
-/// Sums over all outputs of all windows.
+/// Sums the differences over all outputs of all windows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct QuantizationError {
     /// Windows compared.
@@ -27,7 +27,7 @@ pub struct QuantizationError {
 }
 
 impl QuantizationError {
-    /// RMS of the difference over RMS of the f32 output; zero before the first window.
+    /// Returns the RMS of the difference over the RMS of the f32 output; zero before the first window.
     #[must_use]
     pub fn relative_rms(&self) -> f64 {
         if self.squared_reference > 0.0 {
@@ -37,7 +37,7 @@ impl QuantizationError {
         }
     }
 
-    /// RMS of the scales' ratio less one; zero before the first window.
+    /// Returns the RMS of the scales' ratio less one; zero before the first window.
     #[must_use]
     pub fn scale_rms(&self) -> f64 {
         if self.windows > 0 { (self.squared_scale / self.windows as f64).sqrt() } else { 0.0 }

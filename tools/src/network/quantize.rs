@@ -1,9 +1,10 @@
-//! Quantisation: an f32 checkpoint becomes a weight file with int8 rows, packed in the order in which the kernels read.
+//! Quantisation turns an f32 checkpoint into a weight file with int8 rows, packed in the order in which the kernels
+//! read.
 //!
-//! A gate row gets one scale, chosen so that its largest weight becomes at most 127 and its
-//! multiplier is a whole number: the scale itself is then exact. Rows that share a halfword as
-//! the high part must not sum to more than 2^23 for any input ([`gyronet::nn`]); where the
-//! largest-weight scale would allow that, the scale is raised until it does not.
+//! A gate row gets one scale, chosen so that its largest weight becomes at most 127 and its multiplier is a whole
+//! number: the scale itself is then exact. Rows that share a halfword as the high part must not sum to more than 2^23
+//! for any input ([`gyronet::nn`]); where the scale of the largest weight would allow that, the scale is raised until
+//! it cannot happen.
 
 pub mod fognet;
 mod rows;
@@ -16,17 +17,17 @@ use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2, linear::Linear};
 use gyronet::units::{AngularRate, SpecificForce};
 use serde_json::json;
 
-/// Network inputs are clamped to this many standard deviations; `gyronet quantize --drives` says
-/// how many that hits.
+/// Network inputs are clamped to this many standard deviations; `gyronet quantize --drives` reports how many inputs
+/// are.
 pub const INPUT_CLAMP_STD: f64 = 24.0;
 
-/// The error of a checkpoint that cannot be quantised.
+/// The reason why a checkpoint cannot be quantised.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum QuantizeError {
     /// A row's weights are beyond +-3.96, the largest that int8 and a 16-bit multiplier hold.
     #[error("layer {layer} row {row}: weight {weight} is too large for the int8 format (limit 3.96)")]
     WeightTooLarge {
-        /// 1 or 2; FoGNet's LSTM2 has 3 and 4.
+        /// Layer, 1 or 2; FoGNet's LSTM2 has 3 and 4.
         layer: usize,
         /// PyTorch's row: gate x units + unit.
         row: usize,
@@ -46,7 +47,7 @@ pub enum QuantizeError {
     Blob(#[from] blob::BlobError),
 }
 
-/// Figures of a quantisation.
+/// Holds the figures of a quantisation.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Rows in all.
@@ -98,14 +99,14 @@ pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), Q
     file.extend(body);
     let words = seal(&mut file);
     report.bytes = file.len();
-    // The file must pass the very checks that the firmware makes.
+    // The file must pass the same checks as in the firmware.
     Blob::new_checked(bytemuck::cast_slice(&words))?;
     Ok((file, report))
 }
 
-/// Writes the rows of the linear part; `units` of a feature make a rate code of a code of it. Rounded are the sums over
-/// the samples of each feature, from the oldest on: so a weight is off by an LSB at most, and what should add up to
-/// nothing for an input that does not change still does.
+/// Writes the rows of the linear part; `units` converts codes of each feature to rate codes. The cumulative sums over
+/// the samples of each feature are rounded, from the oldest on: so a weight is off by at most an LSB, and weights that
+/// cancel for a constant input still do.
 fn linear(out: &mut Vec<u8>, weights: &[f32], units: &[f64; FEATURES]) -> Result<(), QuantizeError> {
     for row in weights.chunks_exact(LINEAR_INPUTS) {
         let mut sums = [(0.0, 0); FEATURES];
@@ -133,7 +134,7 @@ fn output(out: &mut Vec<u8>, tensors: &Tensors, shape: Shape) -> Result<(), Quan
     rows::dense(out, "log of the scale", (log_scale, bias[1]), (log2, Dense::SHIFT))
 }
 
-/// The header that all networks have; `codes` of a feature make its unit.
+/// Makes the header that all networks have; `codes` of a feature make its unit.
 fn header(
     tensors: &Tensors,
     [network, sizes @ .., linear]: Topology,
@@ -158,14 +159,14 @@ fn header(
     Ok(out)
 }
 
-/// Puts the checksum behind a file; returns it in whole words, as the library reads it.
+/// Appends the checksum to a file; returns the file in whole words, as the library reads it.
 fn seal(file: &mut Vec<u8>) -> Vec<u32> {
     let crc = blob::CRC.checksum(file);
     file.extend(crc.to_le_bytes());
     file.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
 }
 
-/// Rounds to int32; refuses what does not fit.
+/// Rounds to int32; refuses a value that does not fit.
 fn fixed(what: &str, value: f64) -> Result<i32, QuantizeError> {
     let code = value.round();
     if code.is_finite() && code.abs() < f64::from(i32::MAX) {
@@ -175,7 +176,7 @@ fn fixed(what: &str, value: f64) -> Result<i32, QuantizeError> {
     }
 }
 
-/// Training's provenance and the checkpoint's hash, padded to whole words.
+/// Returns the provenance from training and the checkpoint's hash, padded to whole words.
 fn provenance(tensors: &Tensors) -> Vec<u8> {
     let training = serde_json::from_str(&tensors.provenance).unwrap_or(serde_json::Value::Null);
     let mut text = json!({ "checkpoint_sha256": tensors.sha256, "training": training }).to_string();

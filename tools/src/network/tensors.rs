@@ -1,4 +1,5 @@
-//! A checkpoint file (safetensors) and the tensors that a network needs from it: present, of the right shape, finite.
+//! This module reads a checkpoint file (safetensors) and checks the tensors that a network needs: present, of the right
+//! shape, finite.
 
 use gyronet::nn::reference::LstmWeights;
 use safetensors::{Dtype, SafeTensors};
@@ -6,7 +7,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The error of a checkpoint that cannot be used.
+/// The reason why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// The file cannot be read.
@@ -17,7 +18,7 @@ pub enum CheckpointError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The file is no safetensors file.
+    /// The file is not a safetensors file.
     #[error("{name}: not a safetensors file: {source}")]
     Format {
         /// The file.
@@ -25,7 +26,7 @@ pub enum CheckpointError {
         /// The reader's error.
         source: safetensors::SafeTensorError,
     },
-    /// A tensor that GyroNet needs is not there.
+    /// A tensor that the network needs is missing.
     #[error("{name}: tensor {tensor} is missing")]
     Missing {
         /// The file.
@@ -33,7 +34,7 @@ pub enum CheckpointError {
         /// The tensor.
         tensor: String,
     },
-    /// A tensor has another shape or element type than GyroNet's.
+    /// A tensor has a different shape or element type from the network's.
     #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
     Shape {
         /// The file.
@@ -52,24 +53,24 @@ pub enum CheckpointError {
         name: String,
         /// The tensor.
         tensor: String,
-        /// Element.
+        /// Index of the element.
         at: usize,
     },
 }
 
-/// Name and shape of a tensor, as PyTorch has them.
+/// Holds the name and shape of a tensor, as PyTorch has them.
 pub type Shape = (String, Vec<usize>);
 
 /// Returns the shape of a tensor of the file at hand, if it is there.
 pub type Found<'f> = &'f dyn Fn(&str) -> Option<Vec<usize>>;
 
-/// A vector, or a matrix by rows.
+/// Describes a vector, or a matrix by rows.
 pub(crate) fn tensor(name: &str, shape: &[usize]) -> Shape {
     (name.to_owned(), shape.to_vec())
 }
 
-/// The tensors of a bidirectional LSTM: `units` in each direction, gates i, f, g, o below each other;
-/// a layer above another sees both directions of it.
+/// Describes the tensors of a bidirectional LSTM: `units` in each direction, gates i, f, g, o below each other; a layer
+/// above another takes both its directions as input.
 pub(crate) fn bilstm(name: &str, inputs: usize, units: usize, layers: usize) -> Vec<Shape> {
     let directions = (0..layers).flat_map(|layer| ["", "_reverse"].map(|direction| (layer, direction)));
     let tensors = directions.flat_map(|(layer, direction)| {
@@ -86,12 +87,12 @@ pub(crate) fn bilstm(name: &str, inputs: usize, units: usize, layers: usize) -> 
     tensors.collect()
 }
 
-/// The tensors of a fully connected layer.
+/// Describes the tensors of a fully connected layer.
 pub(crate) fn dense(name: &str, inputs: usize, outputs: usize) -> [Shape; 2] {
     [tensor(&format!("{name}.weight"), &[outputs, inputs]), tensor(&format!("{name}.bias"), &[outputs])]
 }
 
-/// The tensors of a network in memory.
+/// Holds the tensors of a network in memory.
 #[derive(Debug, Clone)]
 pub struct Tensors {
     tensors: BTreeMap<String, Vec<f32>>,
@@ -102,7 +103,7 @@ pub struct Tensors {
 }
 
 impl Tensors {
-    /// Names of the tensors in a file, whatever they are.
+    /// Returns the names of all tensors in a file.
     pub(crate) fn names(path: &Path) -> Result<Vec<String>, CheckpointError> {
         let bytes =
             std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
@@ -153,7 +154,7 @@ impl Tensors {
         self.tensors.contains_key(name)
     }
 
-    /// The values of a tensor, row-major.
+    /// Returns the values of a tensor, row-major.
     ///
     /// # Panics
     /// For a name that the network does not have.
@@ -162,7 +163,7 @@ impl Tensors {
         self.tensors.get(name).unwrap_or_else(|| panic!("the network has no tensor {name}"))
     }
 
-    /// Weights of one layer of an LSTM, forward or backward.
+    /// Returns the weights of one layer of an LSTM, forward or backward.
     pub(crate) fn direction(&self, lstm: &str, layer: usize, backward: bool) -> LstmWeights<'_> {
         let tensor = |what: &str| {
             self.tensor(&format!("{lstm}.{what}_l{layer}{}", if backward { "_reverse" } else { "" }))

@@ -1,9 +1,9 @@
-//! A weight file (`.blob`) from disk, aligned as the library needs it.
+//! This module reads a weight file (`.blob`) from disk, aligned as the library needs it.
 
 use gyronet::model::{Blob, BlobError, FogBlob};
 use std::path::Path;
 
-/// The error of a weight file that cannot be used.
+/// The reason why a weight file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightFileError {
@@ -25,7 +25,7 @@ pub enum WeightFileError {
     },
 }
 
-/// The bytes of a weight file that has passed all of the library's checks.
+/// Holds the bytes of a weight file that has passed all of the library's checks.
 #[derive(Debug, Clone)]
 pub struct WeightFile {
     path: String,
@@ -35,7 +35,7 @@ pub struct WeightFile {
 }
 
 impl WeightFile {
-    /// Reads and checks a file of GyroNet's.
+    /// Reads and checks a weight file of GyroNet.
     ///
     /// # Errors
     /// [`WeightFileError`], which names the file.
@@ -43,7 +43,7 @@ impl WeightFile {
         Self::parse(&path.display().to_string(), &bytes(path)?)
     }
 
-    /// Reads and checks a file of FoGNet's.
+    /// Reads and checks a weight file of FoGNet.
     ///
     /// # Errors
     /// [`WeightFileError`], which names the file.
@@ -51,7 +51,7 @@ impl WeightFile {
         Self::parse_fognet(&path.display().to_string(), &bytes(path)?)
     }
 
-    /// Checks bytes of GyroNet's; `path` is for messages.
+    /// Checks the bytes of a weight file of GyroNet; errors name it `path`.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`] with that path.
@@ -61,7 +61,7 @@ impl WeightFile {
         Ok(file)
     }
 
-    /// Checks bytes of FoGNet's; `path` is for messages.
+    /// Checks the bytes of a weight file of FoGNet; errors name it `path`.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`] with that path.
@@ -71,7 +71,7 @@ impl WeightFile {
         Ok(file)
     }
 
-    /// GyroNet's weights.
+    /// Returns GyroNet's weights.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`]; never, once [`WeightFile::parse`] has succeeded.
@@ -79,7 +79,7 @@ impl WeightFile {
         Blob::new_checked(self.bytes()).map_err(|source| self.refused(source))
     }
 
-    /// FoGNet's weights.
+    /// Returns FoGNet's weights.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`]; never, once [`WeightFile::parse_fognet`] has succeeded.

@@ -1,4 +1,4 @@
-//! Bursts of an ADIS16465-2, through the driver and a simulated SPI bus.
+//! This module sends bursts of an ADIS16465-2 through the driver and a simulated SPI bus.
 //!
 //! The part sends 16 bits of each reading and no time: the driver stamps a sample with the time of its read.
 
@@ -11,11 +11,11 @@ use gyronet::units::STANDARD_GRAVITY;
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The model with a range of 500 deg/s.
+/// The simulated model has a range of 500 deg/s.
 pub const MODEL: Model = Model::Adis16465_2;
-/// Bytes on the bus for one read: the command and the burst.
+/// One read takes this many bytes on the bus: the command and the burst.
 const READ_BYTES: u64 = 2 + BURST as u64;
-/// Counts of 0.1 degrees C; a room's.
+/// The part reports room temperature, counts of 0.1 deg C.
 const TEMPERATURE: i16 = 250;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
@@ -32,13 +32,13 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     Ok((samples, bytes))
 }
 
-/// The steps of a rate in rad/s and of an acceleration in m/s^2.
+/// Returns the steps of a rate in rad/s and of an acceleration in m/s^2.
 pub fn steps() -> [f64; 2] {
     let [per_rad, per_force] = counts();
     [1.0 / per_rad, 1.0 / per_force]
 }
 
-/// Counts in one rad/s and in one m/s^2.
+/// Returns the counts in one rad/s and in one m/s^2.
 fn counts() -> [f64; 2] {
     let per_rad = f64::from(MODEL.counts_per_dps()).to_degrees();
     [per_rad, f64::from(MODEL.counts_per_g()) / f64::from(STANDARD_GRAVITY)]
@@ -57,7 +57,7 @@ pub fn burst(number: usize, sample: &ImuSample) -> Burst {
     }
 }
 
-/// A bus on which every read gives the same bytes until others are set.
+/// Simulates a bus on which every read gives the same bytes until others are set.
 #[derive(Debug, Clone, Default)]
 pub struct Bus(Arc<Mutex<[u8; BURST]>>);
 

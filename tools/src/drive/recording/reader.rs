@@ -1,4 +1,4 @@
-//! The rows of a recording, one in memory at a time.
+//! This module reads the rows of a recording one at a time, so that a long drive needs no more memory than a short one.
 
 use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault, ValueError};
@@ -14,14 +14,14 @@ const REFERENCE: &str = "ref_gyr_z";
 const COURSE: &str = "ref_yaw";
 const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
 
-/// Device time on the wire: 10 kHz.
+/// The sensor's time on the wire counts at 10 kHz.
 const TICKS_PER_SECOND: f64 = 1e4;
 const MICROS_PER_TICK: u64 = 100;
 
-/// A named column and where it is.
+/// Holds the name of a column and its index.
 type Column = (&'static str, usize);
 
-/// The places of the columns.
+/// Holds the places of the columns.
 #[derive(Debug, Clone)]
 struct Columns {
     time: Column,
@@ -56,7 +56,7 @@ impl Columns {
     }
 }
 
-/// Rows of a recording, each checked by itself and against the time of the one before. [`super::Recording`]
+/// Reads the rows of a recording, each checked by itself and against the time of the one before. [`super::Recording`]
 /// checks the drive as a whole.
 pub struct Reader<R> {
     path: String,
@@ -130,7 +130,7 @@ impl<R: std::io::Read> Iterator for Reader<R> {
     }
 }
 
-/// The fields of one row.
+/// Gives access to the fields of one row.
 struct Fields<'a> {
     path: &'a str,
     line: u64,
@@ -142,7 +142,7 @@ impl Fields<'_> {
         DataError::value(self.path, self.line, column, self.record.get(at).unwrap_or_default(), error)
     }
 
-    /// The number, which may yet be NaN or infinite; `None` for an empty field.
+    /// Returns the number, which may still be NaN or infinite; `None` for an empty field.
     fn number<T: FromStr>(&self, column: Column) -> Result<Option<T>, DataError> {
         match self.record.get(column.1).unwrap_or_default() {
             "" => Ok(None),

@@ -1,11 +1,12 @@
-//! Every typed error, from a recording made for it.
+//! These tests provoke each typed error with a recording made for it.
 
 use super::*;
 use std::fmt::Write;
 
 const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel1_rate,wheel3_rate,remark";
 
-/// A car that stands still; `edit` may change a line before it is written (line 2 is the first).
+/// Returns the recording of a car that stands still; `edit` may change a line before it is written (line 2 is the
+/// first).
 fn standing(rows: usize, edit: impl Fn(usize, String) -> String) -> String {
     let mut text = format!("{HEADER}\n");
     for k in 0..rows {
@@ -23,7 +24,7 @@ fn parse(text: &str) -> Result<Recording, DataError> {
     Recording::parse("drives/a.csv", text.as_bytes())
 }
 
-/// The message for a good recording in which `line` had `from` replaced by `to`.
+/// Returns the error message for a good recording in which `from` is replaced by `to` in `line`.
 fn message(line: usize, from: &str, to: &str) -> String {
     let text = standing(400, |at, row| if at == line { row.replacen(from, to, 1) } else { row });
     parse(&text).unwrap_err().to_string()

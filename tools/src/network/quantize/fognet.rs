@@ -1,5 +1,5 @@
-//! FoGNet's weight file. What is linear in the gyro's increments is multiplied out in f64 and
-//! stays exact ([`gyronet::model::fognet`]); the LSTMs and their rows are quantised as GyroNet's.
+//! This module makes FoGNet's weight file. The part that is linear in the gyro's increments is multiplied out in f64
+//! and stays exact ([`gyronet::model::fognet`]); the LSTMs and their rows are quantised as GyroNet's.
 
 use super::{QuantizeError, Report, fixed, header, provenance, rows, seal};
 use crate::network::checkpoint::{Checkpoint, FogNet};
@@ -38,7 +38,7 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     let f1 = (tensors.tensor("fc1.weight"), tensors.tensor("fc1.bias")[0]);
     rows::dense(&mut body, "FC1", f1, (f64::from(HIDDEN_MAX), Dense::SHIFT))?;
     lstm(&mut body, "lstm2", 3)?;
-    // Its bias is in the offset.
+    // The bias of FC2 is in the offset.
     let f2 = (tensors.tensor("fc2.weight"), 0.0);
     rows::dense(&mut body, "FC2", f2, (of_f2 * f64::from(Angle::PER_RAD), CORRECTION_SHIFT))?;
 

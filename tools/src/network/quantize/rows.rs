@@ -1,11 +1,11 @@
-//! LSTM directions and output rows in int8 and int16, in the order in which the kernels read them.
+//! This module writes LSTM directions and output rows in int8 and int16, in the order in which the kernels read them.
 
 use super::{QuantizeError, Report, fixed};
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::reference::LstmWeights;
 use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, pack};
 
-/// A quantised gate row.
+/// Holds a quantised gate row.
 #[derive(Debug, Clone)]
 struct Row {
     bias: i32,
@@ -14,7 +14,7 @@ struct Row {
     recurrent: Vec<i8>,
 }
 
-/// Writes one direction in reading order ([`gyronet::nn::lstm`]). `layer` is for messages.
+/// Writes one direction in reading order ([`gyronet::nn::lstm`]). `layer` is for errors.
 pub(super) fn direction(
     out: &mut Vec<u8>,
     weights: &LstmWeights<'_>,
@@ -98,7 +98,7 @@ fn quantize_row(
     }
 }
 
-/// Pairs of columns: gates (i, f), then (g, o), the second gate of each in the high byte.
+/// Writes pairs of columns: gates (i, f), then (g, o), the second gate of each in the high byte.
 fn pack_columns(out: &mut Vec<u8>, [i, f, g, o]: [&[i8]; GATES]) {
     for k in (0..i.len()).step_by(2) {
         for (low, high) in [(i, f), (g, o)] {
@@ -108,8 +108,8 @@ fn pack_columns(out: &mut Vec<u8>, [i, f, g, o]: [&[i8]; GATES]) {
     }
 }
 
-/// A row of an output layer; `codes` of its output, with that many fraction bits in the
-/// multiplier, make one unit.
+/// Writes a row of an output layer; `codes` of its output, with that many fraction bits in the multiplier, make one
+/// unit.
 pub(super) fn dense(
     out: &mut Vec<u8>,
     what: &str,
@@ -118,7 +118,7 @@ pub(super) fn dense(
 ) -> Result<(), QuantizeError> {
     let largest = weights.iter().fold(0.0f64, |max, w| max.max(f64::from(w.abs())));
     let sum: f64 = weights.iter().chain([&bias]).map(|w| f64::from(w.abs())).sum();
-    // Weights of 14 bits, unless the sum, in units of scale x 2^-10, would pass 31.
+    // Weights have 14 bits, unless the sum, in units of scale x 2^-10, would exceed 31.
     let scale = (largest / f64::from(1 << 14)).max(1.001 * sum / f64::from(1 << 21)).max(f64::MIN_POSITIVE);
     for weight in weights {
         out.extend(((f64::from(*weight) / scale).round() as i16).to_le_bytes());
