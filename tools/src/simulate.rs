@@ -1,5 +1,5 @@
-//! A simulated drive: a car that stands, pulls away, bends, turns and stops, seen by a MEMS
-//! part with errors of known size. Its yaw rate is known exactly.
+//! This module simulates a drive: a car stands, pulls away, follows bends, turns and stops, and a MEMS part with errors
+//! of known size measures it. Its yaw rate is known exactly.
 //!
 //! [`route`] says where the driver wants to go, [`car`] moves on a plane with grade, bank and
 //! suspension, [`vibration`] shakes the part, [`mems`] adds the part's own errors, [`csv`]
@@ -8,9 +8,8 @@
 //! ([`odometer`]); [`vehicles`] has every number with its source. The truth is what a perfect part at the same place
 //! would say were the car not shaking: vibration turns the car nowhere and counts as an error.
 //!
-//! What it is not: a model of one make of part or car. It shows that everything works, and
-//! how well static initialisation does on it; whether a network helps on a real car only a
-//! recording of that car shows.
+//! It is not a model of a particular part or car. It shows that everything works, and how well static initialisation
+//! does on it; only a recording of a real car shows whether a network helps there.
 //!
 //! The same seed gives the same bytes on every machine: the random numbers are ChaCha8's and
 //! the transcendental functions are libm's, in Rust.
@@ -34,7 +33,7 @@ use car::Car;
 use mems::Mems;
 use vibration::Vibration;
 
-/// The parameters of a simulation.
+/// Holds the parameters of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Length, s.
@@ -50,7 +49,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// 90 s; car, shaking and part of the kind that the recordings show.
+    /// The default drive lasts 90 s; car, shaking and part resemble those of the recordings.
     pub const DEFAULT: Self = Self {
         seconds: 90,
         seed: 1,
@@ -60,7 +59,7 @@ impl Config {
     };
 }
 
-/// A sample of a simulated drive: x forward, y left, z up, but for the part's tilt.
+/// Holds a sample of a simulated drive: x forward, y left, z up, except for the part's tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Since the start, s.
@@ -71,13 +70,13 @@ pub struct Sample {
     pub angular_rate: [f64; 3],
     /// The truth, rad/s.
     pub reference: [f64; 3],
-    /// Front right, rear right, front left, rear left, rad/s.
+    /// Rates of the wheels front right, rear right, front left, rear left, rad/s.
     pub wheels: [f64; 4],
-    /// Forward, m/s.
+    /// Speed, forward positive, m/s.
     pub speed: f64,
 }
 
-/// Samples of a drive, without end.
+/// Generates samples of a drive without end.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     car: Car,
@@ -107,7 +106,7 @@ impl Iterator for Simulation {
         self.tick += 1;
         let motion = self.car.step();
         let shake = self.vibration.step(motion.speed);
-        // A tilted part sees everything tilted; so would the perfect one beside it.
+        // A tilted part measures everything tilted; so would a perfect one beside it.
         let reference = self.mems.tilt(motion.angular_rate);
         let force = add(self.mems.tilt(motion.specific_force), shake.specific_force);
         let (specific_force, angular_rate) = self.mems.measure(force, add(reference, shake.angular_rate));

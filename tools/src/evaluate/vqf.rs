@@ -2,31 +2,31 @@
 //! estimation with bias estimation and magnetic disturbance rejection, Information Fusion 91 (2023), 187-204.
 //!
 //! It integrates the gyro, corrects the inclination by the acceleration that is low-passed in the almost inertial
-//! frame, and estimates the gyro's bias at rest and in motion; the crate `vqf-rs` is a port of its authors' code. Used
-//! here without a magnetometer and with the published parameters: 3 s for the acceleration, rest below 2 deg/s and
-//! 0.5 m/s^2 for 1.5 s. On drives it estimates no bias in motion: that takes accelerations for granted which average out
-//! in 3 s, as no car's do, and makes the 1 s error 1.5 times as large on the training drives.
+//! frame, and estimates the gyro's bias at rest and in motion; the crate `vqf-rs` is a port of its authors' code. It is
+//! used here without a magnetometer and with the published parameters: 3 s for the acceleration, rest below 2 deg/s and
+//! 0.5 m/s^2 for 1.5 s. On drives it estimates no bias in motion: that assumes accelerations that average out in 3 s,
+//! which a car's do not, and makes the 1 s error 1.5 times as large on the training drives.
 
 use super::metrics::wrap;
 use crate::drive::DT;
 use vqf_rs::{Quaternion, VQF};
 
-/// Multiplications of one value through a second-order low pass.
+/// A second-order low pass takes this many multiplications a value.
 const LOW_PASS: usize = 5;
-/// Those of a product of two quaternions, and of one normalised.
+/// A product of two quaternions takes 16 multiplications, normalising one 8.
 const QUATERNION: usize = 16 + 8;
-/// A quaternion as a matrix, and a vector turned by it.
+/// Converting a quaternion to a matrix takes 9 multiplications, turning a vector by it 9.
 const ROTATION: usize = 9 + 9;
 
-/// Multiplications and divisions of a sample without a bias in motion, step by step of the algorithm: rest detection,
-/// strapdown integration, acceleration in the inertial frame, inclination.
+/// A sample without a bias in motion takes this many multiplications and divisions, in the order of the algorithm: rest
+/// detection, strapdown integration, acceleration in the inertial frame, inclination.
 pub const MULTIPLICATIONS: usize = (6 * LOW_PASS + 2 * 3)
     + (3 + 6 + QUATERNION)
     + (ROTATION + 3 * LOW_PASS)
     + (ROTATION + 6 + 4 + QUATERNION);
 
 /// Runs a filter over gyro (rad/s) and specific force (m/s^2), and returns the rate of its heading at each sample,
-/// rad/s. The first sample has none.
+/// rad/s. The first rate is zero.
 pub fn rates(mut filter: VQF, samples: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> Vec<f64> {
     let mut last = None;
     samples

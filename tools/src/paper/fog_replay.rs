@@ -1,5 +1,5 @@
-//! A sequence through the coprocessor: the turns that the board sends by default; and through FoGNet alone, as in the
-//! paper, on the gyro as it is.
+//! This module runs a sequence through the coprocessor, for the turns that the board sends by default, and through
+//! FoGNet alone on the uncorrected gyro, as in the paper.
 
 use crate::drive::DT;
 use crate::drive::wheel_frames;
@@ -15,10 +15,10 @@ use gyronet::model::window::Features;
 use gyronet::sample::{FogSample, PERIOD_US, RATE_HZ};
 use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
 
-/// Steps of static initialisation: 3 s.
+/// Static initialisation takes this many steps: 3 s.
 const STATIC_STEPS: usize = 300;
 
-/// The results of a sequence.
+/// Holds the results of a sequence.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FogReplay {
     /// Corrected turn of each step, rad.
@@ -29,7 +29,7 @@ pub struct FogReplay {
     pub windows: u64,
     /// Input values that were clamped.
     pub clamped_inputs: u64,
-    /// Estimates that were not believed.
+    /// Estimates that were rejected as implausible.
     pub implausible: u64,
     /// Windows that a gap ended.
     pub broken: u64,
@@ -48,7 +48,7 @@ pub fn run(
     for (step, inertial) in sequence.steps.iter().zip(inertial) {
         let wheels = step.wheels.map(|way| {
             let speed = way * f64::from(RATE_HZ) * f64::from(1u32 << WheelSpeed::FRACTION_BITS);
-            // Saturates: faster than sound.
+            // The cast saturates only beyond the speed of sound.
             WheelSpeed(speed.round() as i32)
         });
         let frame = FogFrame {
@@ -72,7 +72,7 @@ pub fn run(
     drive
 }
 
-/// The default lane of a sequence's gyro and latitude.
+/// Returns the default configuration for a sequence's gyro and latitude.
 #[must_use]
 pub fn default_config(sequence: &Sequence) -> FogConfig {
     let errors = match sequence.layout {
@@ -104,13 +104,13 @@ pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>,
             let [left, right] = way.map(|way| Some(way.abs() / (wheel_frames::FRAME_ROWS as f64 * DT) * 3.6));
             way = [0.0; 2];
             if let Some(frame) = wheel_frames::frame([left, right, left, right]) {
-                // A speed that no frame can carry is not valid, and the wheels fall silent.
+                // A speed that does not fit a frame is not sent as valid, so the wheels become silent.
                 let _ = coprocessor.can(&frame, time);
             }
         }
         let increment = [None, None, Some(angle(step.fog))];
         let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
-        // Times are in order.
+        // Times are in order, so no sample is refused.
         let _ = coprocessor.fog(sample, time);
         while coprocessor.next_frame().is_some() {
             let Some(estimate) = coprocessor.fog_estimate() else { continue };
@@ -122,8 +122,8 @@ pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>,
     (sent, *coprocessor.fog_counters())
 }
 
-/// The inertial sensor's features of each step, its gyro less its mean over the first 3 s; none
-/// where a reading is one that no part can give.
+/// Returns the inertial sensor's features of each step, its gyro less its mean over the first 3 s; `None` for a reading
+/// beyond the range of any part.
 fn features(sequence: &Sequence) -> Vec<Option<Features>> {
     let codes = |step: &Step| {
         let [fx, fy, fz] = step.specific_force.map(|f| SpecificForce::from_metre_per_sec2(f).ok());
@@ -144,7 +144,7 @@ fn features(sequence: &Sequence) -> Vec<Option<Features>> {
     features
 }
 
-/// Nearest code of an angle in rad; a double's 53 bits are more than the gyro's.
+/// Returns the nearest code of an angle in rad; a double's 53 bits are more than the gyro's.
 fn angle(rad: f64) -> Angle {
     Angle((rad * f64::from(Angle::PER_RAD)).round() as i64)
 }
@@ -156,7 +156,7 @@ mod tests {
     use gyronet::model::fognet::FogEstimate;
     use gyronet::model::seconds::SecondsWindow;
 
-    /// Says that a constant bias and nothing else is wrong.
+    /// Estimates a constant bias and no other error.
     struct Bias;
 
     impl MinuteNetwork for Bias {

@@ -1,5 +1,5 @@
-//! Sequences of KAIST Complex Urban and NCLT, real or simulated: several files of different
-//! rates made into one drive on a 100 Hz grid.
+//! This module reads sequences of KAIST Complex Urban and NCLT, real or simulated: it merges several files of different
+//! rates into one drive on a 100 Hz grid.
 //!
 //! Files are read side by side, a row of each at a time: an hour of a 1 kHz gyro needs no more
 //! memory than its 100 Hz steps. The grid begins with the first row of the inertial sensor that
@@ -29,17 +29,17 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use track::Stream;
 
-/// A value across a longer time than this is marked, s.
+/// A value interpolated across a longer gap than this is marked, s.
 pub const MAX_GAP: f64 = 0.1;
-/// Least length of a sequence: static initialisation and a second, s.
+/// A sequence must last at least this long: static initialisation and a second, s.
 const NEEDED: f64 = 4.0;
 
-/// A step of the grid. Axes: x forward, y left, z up; heading counter-clockwise from east.
+/// Holds a step of the grid. Axes are x forward, y left, z up; heading is counter-clockwise from east.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// m/s^2.
+    /// Specific force, m/s^2.
     pub specific_force: [f32; 3],
-    /// rad/s.
+    /// Angular rate, rad/s.
     pub angular_rate: [f32; 3],
     /// The inertial sensor was silent around here for longer than [`MAX_GAP`].
     pub imu_gap: bool,
@@ -51,36 +51,36 @@ pub struct Step {
     pub position: [f64; 2],
     /// True heading, not wrapped, rad.
     pub yaw: f64,
-    /// Heading as the inertial sensor's vendor has it, not wrapped, rad.
+    /// Heading by the filter of the inertial sensor's vendor, not wrapped, rad.
     pub vendor_yaw: f64,
 }
 
-/// A drive on the 100 Hz grid.
+/// Holds a drive on the 100 Hz grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
     /// Name of its folder.
     pub name: String,
     /// Its folder.
     pub path: PathBuf,
-    /// Whose layout it has.
+    /// The data set whose layout it has.
     pub layout: Layout,
     /// The specification that it was simulated from, if it is simulated.
     pub simulated: Option<Spec>,
-    /// [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
+    /// Whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
     pub has_gyro: bool,
-    /// [`Step::vendor_yaw`] comes from a vendor's filter.
+    /// Whether [`Step::vendor_yaw`] comes from a vendor's filter.
     pub has_vendor: bool,
-    /// Distance of the wheels, m, where the data say it.
+    /// Distance of the wheels, m, if the data contain it.
     pub wheel_base: Option<f64>,
-    /// 10 ms apart.
+    /// The steps, 10 ms apart.
     pub steps: Vec<Step>,
     /// Steps with a gap of the inertial sensor, the gyro, the wheels and the truth.
     pub in_gap: [u64; 4],
-    /// One for each file: inertial sensor, gyro, wheels, truth.
+    /// The summaries of the files: inertial sensor, gyro, wheels, truth.
     pub files: [StreamSummary; 4],
 }
 
-/// Files of either layout.
+/// Holds the open files of either layout.
 struct Files {
     imu: Box<dyn Stream<7>>,
     fog: Box<dyn Stream<1>>,
@@ -91,7 +91,7 @@ struct Files {
     wheel_base: Option<f64>,
 }
 
-/// Whose layout a folder has.
+/// Returns the data set whose layout a folder has.
 ///
 /// # Errors
 /// [`DataFault::UnknownLayout`], or [`DataFault::Io`] where there is no folder.
@@ -106,10 +106,10 @@ pub fn layout(folder: &Path) -> Result<Layout, DataError> {
     }
 }
 
-/// The sequences of a folder: itself, or those right below it, by name.
+/// Finds the sequences of a folder: the folder itself, or those directly below it, by name.
 ///
 /// # Errors
-/// [`DataError`]: neither is one.
+/// [`DataError`] if neither is a sequence.
 pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     if layout(folder).is_ok() {
         return Ok(vec![folder.to_owned()]);
@@ -124,7 +124,7 @@ pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     if found.is_empty() { Err(error(DataFault::UnknownLayout)) } else { Ok(found) }
 }
 
-/// Bytes that reading a sequence will read; 0 of what is not there.
+/// Returns the number of bytes that reading a sequence will read; missing files count 0.
 #[must_use]
 pub fn size(folder: &Path) -> u64 {
     let mut paths: Vec<PathBuf> = kaist::PATHS.iter().chain(&nclt::PATHS).map(|p| folder.join(p)).collect();
@@ -133,7 +133,7 @@ pub fn size(folder: &Path) -> u64 {
 }
 
 impl Sequence {
-    /// Reads a folder. `watch` is called now and then with the number of bytes read.
+    /// Reads a folder. `watch` is called from time to time with the number of bytes read.
     ///
     /// # Errors
     /// [`DataError`], which names the file and, where there is one, the line.
@@ -145,7 +145,7 @@ impl Sequence {
             Layout::Kaist => kaist::open(folder, &progress)?,
             Layout::Nclt => nclt::open(folder, &progress)?,
         };
-        // Simulated, the heading beside the sensor's data is nobody's filter.
+        // In a simulated sequence the heading beside the sensor's data comes from no vendor's filter.
         let has_vendor = files.has_vendor && simulated.is_none();
         let origin = files.origin()?;
         let mut steps = Vec::new();
@@ -180,19 +180,20 @@ impl Sequence {
         Ok(Self { name, path, layout, simulated, has_gyro, has_vendor, wheel_base, steps, in_gap, files })
     }
 
-    /// Length, s.
+    /// Returns the length, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         self.steps.len() as f64 * DT
     }
 
-    /// Latitude, for the Earth's rate: of the simulation, or of where the data set was made.
+    /// Returns the latitude for the Earth's rate: that of the simulation, or of the place where the data set was
+    /// recorded.
     #[must_use]
     pub fn latitude_deg(&self) -> f64 {
         self.layout.vehicle().world.latitude_deg
     }
 
-    /// The true change of heading in each step, rad; the first has none.
+    /// Returns the true change of heading in each step, rad; zero in the first.
     #[must_use]
     pub fn turns(&self) -> Vec<f64> {
         let first = self.steps.first().map_or(0.0, |step| step.yaw);
@@ -200,16 +201,16 @@ impl Sequence {
         self.steps.iter().map(|step| step.yaw - std::mem::replace(&mut last, step.yaw)).collect()
     }
 
-    /// Rates of the left and the right wheel in a step, rad/s, of the radius that the data set's
-    /// vehicle has.
+    /// Returns the rates of the left and the right wheel in a step, rad/s, by the wheel radius of the data set's
+    /// vehicle.
     #[must_use]
     pub fn wheel_rates(&self, step: &Step) -> [f64; 2] {
         let radius = self.layout.vehicle().world.car.wheel_radius;
         step.wheels.map(|way| way / DT / radius)
     }
 
-    /// The drive as the pipeline's other commands have it. Steps in a gap of the inertial sensor
-    /// are left out, as a board would not get them. Wheels are rear right and rear left.
+    /// Converts the drive to a recording, as the other commands use it. Steps in a gap of the inertial sensor are left
+    /// out, because a board would not receive them. Wheels are rear right and rear left.
     ///
     /// # Errors
     /// [`DataFault::NoGyro`].
@@ -222,7 +223,7 @@ impl Sequence {
             let [wx, wy, wz] = step.angular_rate.map(AngularRate::from_rad_per_sec);
             let sample = ImuSample {
                 time: Micros(k as u64 * PERIOD_US),
-                // What no part can measure is as good as no sample: the pipeline counts the gap.
+                // A reading beyond any part's range counts as no sample: the pipeline counts the gap.
                 specific_force: [fx.ok()?, fy.ok()?, fz.ok()?],
                 angular_rate: [wx.ok()?, wy.ok()?, wz.ok()?],
                 temperature: None,
@@ -245,7 +246,7 @@ impl Sequence {
     }
 }
 
-/// The values of all files at one time.
+/// Holds the values of all files at one time.
 #[derive(Debug, Clone, Copy)]
 struct Values {
     imu: [f64; 7],
@@ -272,7 +273,7 @@ impl Values {
 }
 
 impl Files {
-    /// Time of the first row of the inertial sensor that all files have reached.
+    /// Returns the time of the first row of the inertial sensor that all files have reached.
     fn origin(&mut self) -> Result<f64, DataError> {
         let others = [self.fog.first(), self.wheels.first(), self.truth.first()];
         let begin = others.into_iter().fold(self.imu.first(), f64::max);
@@ -280,7 +281,7 @@ impl Files {
         Ok(self.imu.reached().max(begin))
     }
 
-    /// Values at a time and which of them lie in a gap; `None` where a file has ended.
+    /// Returns the values at a time and which of them lie in a gap; `None` where a file has ended.
     fn at(&mut self, time: f64) -> Result<Option<(Values, [bool; 4])>, DataError> {
         let Some(imu) = self.imu.at(time)? else { return Ok(None) };
         let Some(fog) = self.fog.at(time)? else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! The paper's tables for given sequences, beside the paper's own figures.
+//! These modules make the paper's tables for given sequences, beside the paper's own figures.
 //!
 //! [`estimates`] makes headings of a sequence, [`results`] compares them with the truth and takes
 //! means, [`table`] lays them out as the paper's tables, beside its figures ([`paper`]), [`text`]

@@ -1,5 +1,5 @@
-//! A part's rounding changes the corrected yaw: the change is measured against the direct replay, and bounded from
-//! the part's steps alone.
+//! This module compares the corrected yaw of a drive through a part with the direct replay: a part's rounding changes
+//! it, and a bound follows from the part's steps alone.
 //!
 //! With readings rounded to steps of q, N samples of dt after static initialisation:
 //!
@@ -27,12 +27,12 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::{AngularRate, SpecificForce};
 
-/// Seeds of the network's answer.
+/// The network's response is measured with this many seeds.
 pub const STAND_INS: u64 = 2;
 const SIGMAS: f64 = 4.0;
 const NETWORK_MARGIN: f64 = 2.0;
 
-/// Two replays of a drive, row by row.
+/// Holds the differences of two replays of a drive, row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
     /// Largest difference of the accumulated yaw, rad.
@@ -48,13 +48,13 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Compares the rates that were sent at once.
+    /// Compares the prompt rates.
     #[must_use]
     pub fn of_rates(direct: &Replay, via: &Replay) -> Self {
         Self::of(direct, via, |step| step.vehicle.prompt.rate)
     }
 
-    /// Compares the corrections in them.
+    /// Compares the corrections in the prompt rates.
     fn of_corrections(direct: &Replay, via: &Replay) -> Self {
         Self::of(direct, via, |step| step.vehicle.prompt.correction)
     }
@@ -89,14 +89,14 @@ impl Difference {
     }
 }
 
-/// The bound of the difference, term by term.
+/// Holds the bound of the difference, term by term.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bound {
     /// The yaw from the rounding of each sample, rad.
     pub rounding: f64,
     /// The yaw from the static bias, rad.
     pub bias: f64,
-    /// The yaw from the network's answer, rad.
+    /// The yaw from the network's response, rad.
     pub network: f64,
     /// The rms of the rates from all of them, rad/s.
     pub rate_rms: f64,
@@ -153,7 +153,7 @@ impl Bound {
     }
 }
 
-/// The recording with even noise of a step's width on every channel.
+/// Returns the recording with uniform noise of a step's width on every channel.
 fn stand_in(recording: &Recording, quantisation: Quantisation, seed: u64) -> Recording {
     let mut random = Random::new(seed, 0);
     let mut noise = |codes: f64| libm::round(random.between(-0.5, 0.5) * codes) as i32;

@@ -1,5 +1,5 @@
-//! Increments of a three-axis fibre-optic gyro at 1 kHz, summed on the grid by
-//! [`Streams`]; the accelerometer, which the part has not, comes beside it as recorded.
+//! This module sends increments of a three-axis fibre-optic gyro at 1 kHz, which [`Streams`] sums on the grid; the part
+//! has no accelerometer, so the recorded one is used beside it.
 //!
 //! A row's rate is that of the 10 ms before it: ten messages with a tenth of its angle each, in
 //! format B. The board's clock is the number of the row's grid step, so that a recording whose
@@ -14,9 +14,9 @@ use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::units::Micros;
 
-/// Messages a row.
+/// A row becomes this many messages.
 pub const MESSAGES: u64 = 10;
-/// Time from one message to the next, microseconds.
+/// Messages are this far apart, microseconds.
 pub const MESSAGE_US: u64 = PERIOD_US / MESSAGES;
 pub const BOTH: Fitted = Fitted { imu: true, fog: true };
 
@@ -24,7 +24,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut gyro = Gyro { part: Dsp1760::new(Dsp1760Config::DEFAULT), bytes: 0 };
     let mut streams = Streams::new(BOTH);
     let mut samples = Vec::with_capacity(recording.rows.len());
-    // A row before the first one, so that its increments have their time.
+    // One row is put before the first, so that the increments have their time.
     let mut last = recording.rows.first().map_or(0, |row| row.sample.time.0);
     let mut tick = 1;
     for row in &recording.rows {
@@ -35,7 +35,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
             // The pipeline restarts after such a gap, and so does the board's grid.
             streams = Streams::new(BOTH);
         } else {
-            // The board asks on while nothing comes.
+            // The board keeps polling while nothing comes.
             for missing in 1..steps {
                 while streams.next_step(Micros((tick + missing) * PERIOD_US)).is_some() {}
             }
@@ -57,7 +57,7 @@ struct Gyro {
 }
 
 impl Gyro {
-    /// Ten messages up to `end`, then the other sensor's sample; the step that they complete.
+    /// Sends ten messages up to `end`, then the other sensor's sample; returns the step that they complete.
     fn turn(&mut self, streams: &mut Streams, end: u64, sample: &ImuSample) -> Result<Step, String> {
         for n in 1..=MESSAGES {
             let now = end - PERIOD_US + n * MESSAGE_US;
@@ -76,7 +76,7 @@ impl Gyro {
     }
 }
 
-/// A tenth of a row's turn, at `now`.
+/// Makes the message of a tenth of a row's turn, at `now`.
 pub fn message(now: u64, sample: &ImuSample) -> Message {
     let seconds = MESSAGE_US as f64 * 1e-6;
     Message {

@@ -1,5 +1,5 @@
-//! FIFO packets of 20 bits, through the driver and a simulated SPI bus: reset, identity,
-//! settings, packets and the register that is checked with each of them.
+//! This module sends FIFO packets of 20 bits through the driver and a simulated SPI bus: reset, identity, settings,
+//! packets and the register that is checked with each of them.
 
 use super::{Part, Sent, ViaError};
 use crate::drive::recording::Recording;
@@ -14,18 +14,18 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// 1/131 deg/s: of its 20 bits the part uses 19 for a rate.
+/// A rate has steps of 1/131 deg/s: the part uses 19 of its 20 bits.
 pub const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
-/// 1/8192 g: 18 bits for an acceleration.
+/// An acceleration has steps of 1/8192 g: the part uses 18 of its 20 bits.
 pub const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
-/// Counts of a 20-bit reading in one step.
+/// One step is this many counts of a 20-bit reading.
 const RATE_COUNTS: f64 = 2.0;
 const FORCE_COUNTS: f64 = 4.0;
-/// The ends of an acceleration's range; what would be lower means "no reading".
+/// The range of an acceleration ends at these counts; lower ones mean "no reading".
 pub const ENDS: [f64; 2] = [-524_256.0, 524_284.0];
 /// The part's counter of 16 bits wraps.
 const WRAP: u64 = 1 << 16;
-/// Microseconds of a turn of the counter, which counts 32/30 us.
+/// The counter, in units of 32/30 us, wraps after this many microseconds.
 pub const WRAP_US: f64 = WRAP as f64 * 32.0 / 30.0;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
@@ -39,8 +39,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
         bus.fill(packet(&row.sample).emit());
         let sample = part.next_sample().map_err(|e| error(e.to_string()))?;
         let sample = sample.ok_or_else(|| error("its FIFO seems empty".to_owned()))?;
-        // The part's clock begins anywhere, and the turns that it makes in a silence show in the
-        // arrival alone.
+        // The part's clock begins anywhere, and only the arrival times show its wraps in a silence.
         let (sent, read) = (counts(row.sample.time), counts(sample.time));
         let turns = sent.saturating_sub(read) / WRAP;
         samples.push(ImuSample { time: micros(read + turns * WRAP), ..sample });
@@ -59,7 +58,7 @@ const fn micros(counts: u64) -> Micros {
     Micros((counts * 32 + 15) / 30)
 }
 
-/// The packet of a sample, its readings rounded to the part's steps and clipped at its ends.
+/// Makes the packet of a sample, with its readings rounded to the part's steps and clipped at its ends.
 pub fn packet(sample: &ImuSample) -> Packet {
     let reading = |value: f64, step: f64, counts: f64| {
         Some((libm::round(value / step) * counts).clamp(ENDS[0], ENDS[1]) as i32)
@@ -75,7 +74,7 @@ pub fn packet(sample: &ImuSample) -> Packet {
     }
 }
 
-/// The part on its bus: registers that hold what is written, and a FIFO.
+/// Simulates the part on its bus: registers that hold what is written, and a FIFO.
 #[derive(Debug, Default)]
 struct Simulated {
     registers: std::collections::HashMap<(u8, u8), u8>,
@@ -106,12 +105,12 @@ impl Simulated {
     }
 }
 
-/// The simulated part, shared by the driver and whoever fills its FIFO.
+/// Shares the simulated part between the driver and the code that fills its FIFO.
 #[derive(Debug, Clone, Default)]
 pub struct Bus(Arc<Mutex<Simulated>>);
 
 impl Bus {
-    /// The part puts bytes into its FIFO.
+    /// Puts bytes into the part's FIFO.
     pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
         self.part().fifo.extend(bytes);
     }
@@ -143,7 +142,7 @@ impl SpiDevice for Bus {
                     part.bytes += to.len() as u64;
                     part.read(selected, to);
                 }
-                // The driver does none of these.
+                // The driver uses none of these.
                 Operation::Transfer(..) | Operation::TransferInPlace(_) | Operation::DelayNs(_) => {}
             }
         }
@@ -151,7 +150,7 @@ impl SpiDevice for Bus {
     }
 }
 
-/// Time stands still.
+/// Does not wait.
 pub struct NoDelay;
 
 impl DelayNs for NoDelay {

@@ -1,4 +1,4 @@
-//! MTData2 messages in single precision, byte by byte through the parser.
+//! This module sends MTData2 messages in single precision through the parser, byte by byte.
 
 use super::{Part, Sent, ViaError};
 use crate::drive::recording::Recording;
@@ -6,17 +6,17 @@ use gyronet::sample::ImuSample;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 
-/// All six clipping bits of the status word.
+/// All six clipping bits of the status word are set.
 pub const CLIPPED: u32 = 0x3F << 8;
-/// Self-test passed, filter valid.
+/// The status word of a good sample: self-test passed, filter valid.
 const GOOD: u32 = 3;
-/// Microseconds of a tick of SampleTimeFine.
+/// A tick of SampleTimeFine lasts this long, microseconds.
 const TICK_US: u64 = 100;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut mti = Mti::new();
     let (mut samples, mut bytes) = (Vec::with_capacity(recording.rows.len()), 0);
-    // What the first of the part's 32-bit ticks leaves out of the recording's time: whole wraps.
+    // The part's first 32-bit tick lacks the whole wraps of the recording's time.
     let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
     let epoch = first - first % (TICK_US << 32);
     for (row, frame) in recording.rows.iter().zip(messages(recording)) {
@@ -30,7 +30,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     Ok((samples, bytes))
 }
 
-/// The bytes of each row's message.
+/// Returns the bytes of each row's message.
 pub fn messages(recording: &Recording) -> impl Iterator<Item = Vec<u8>> {
     let rows = recording.rows.iter().enumerate();
     rows.map(|(number, row)| message(number, &row.sample).emit().to_vec())

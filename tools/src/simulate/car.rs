@@ -1,4 +1,4 @@
-//! The motion of the car: on a plane, with road grade and bank and a body on springs.
+//! This module moves the car: on a plane, with road grade and bank and a body on springs.
 //!
 //! Axes: x forward, y left, z up; heading, pitch and roll in that order. The part sits at the
 //! centre: no lever arm. Formulas: any text on vehicle dynamics, for example Rajamani, Vehicle
@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 /// m/s^2.
 pub(super) const GRAVITY: f64 = 9.80665;
 
-/// A car and its driver.
+/// Holds the parameters of a car and its driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Wheel radius, m: that of the recordings' car.
@@ -41,13 +41,13 @@ pub struct Config {
     pub road_grade: f64,
     /// Amplitude of the road's bank, rad: the same.
     pub road_bank: f64,
-    /// Wave lengths of the bank, m. Where grade and bank share one, pitch and roll turn in step
-    /// for hours, and their product turns a gyro steadily away: by several deg/h. No road does.
+    /// Wave lengths of the bank, m. If grade and bank share one, pitch and roll stay in phase for hours, and their
+    /// product makes a gyro drift by several deg/h, which no real road does.
     pub bank_waves: [f64; 2],
 }
 
 impl Config {
-    /// A passenger car in a town.
+    /// The default is a passenger car in a town.
     pub const DEFAULT: Self = Self {
         wheel_radius: 0.289,
         track: 1.5,
@@ -61,12 +61,12 @@ impl Config {
         suspension_damping: 0.35,
         road_grade: 0.008,
         road_bank: 0.008,
-        // In 90 s, with these amplitudes, what they share is far below the gyro's bias.
+        // In 90 s, with these amplitudes, the drift from the shared wave is far below the gyro's bias.
         bank_waves: GRADE_WAVES,
     };
 }
 
-/// The readings of a perfect, level part at the car's centre.
+/// Holds the readings of a perfect, level part at the car's centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// m/s^2.
@@ -87,7 +87,7 @@ pub struct Motion {
     pub roll: f64,
 }
 
-/// An angle on a spring: follows what pulls it, and swings.
+/// Simulates an angle on a spring, which follows its target and swings.
 #[derive(Debug, Clone, Copy, Default)]
 struct Spring {
     angle: f64,
@@ -103,7 +103,7 @@ impl Spring {
     }
 }
 
-/// A slope of the road along the way: two waves.
+/// Describes a slope of the road along the way: two waves.
 #[derive(Debug, Clone, Copy)]
 struct Slope {
     amplitude: f64,
@@ -111,7 +111,7 @@ struct Slope {
     phase: [f64; 2],
 }
 
-/// Wave lengths of the grade, m.
+/// The grade has these wave lengths, m.
 const GRADE_WAVES: [f64; 2] = [310.0, 97.0];
 
 impl Slope {
@@ -119,7 +119,7 @@ impl Slope {
         Self { amplitude, waves, phase: [random.between(0.0, TAU), random.between(0.0, TAU)] }
     }
 
-    /// Angle at a place and its change per metre.
+    /// Returns the angle at a place and its change per metre.
     fn at(&self, metres: f64) -> (f64, f64) {
         let (mut angle, mut change) = (0.0, 0.0);
         for (wave, phase) in self.waves.into_iter().zip(self.phase) {
@@ -131,14 +131,14 @@ impl Slope {
     }
 }
 
-/// A car on its way.
+/// Simulates a car on its way.
 #[derive(Debug, Clone)]
 pub struct Car {
     config: Config,
     way: Way,
     leg: Leg,
     next: Leg,
-    /// Metres into a road, seconds into a stand.
+    /// The position in the leg: metres of a road, seconds of a stand.
     along: f64,
     travelled: f64,
     speed: f64,
@@ -179,7 +179,7 @@ impl Car {
         }
     }
 
-    /// Ten milliseconds on.
+    /// Advances by 10 ms.
     pub fn step(&mut self) -> Motion {
         self.drive();
         let heading_rate = self.speed * self.leg.curvature(self.along);
@@ -204,7 +204,7 @@ impl Car {
         }
     }
 
-    /// Rates of the wheels, front right, rear right, front left, rear left, rad/s.
+    /// Returns the rates of the wheels front right, rear right, front left, rear left, rad/s.
     pub fn wheels(&mut self, motion: &Motion) -> [f64; 4] {
         let half = motion.heading_rate * self.config.track / 2.0;
         [half, half, -half, -half].map(|outer| {
@@ -213,7 +213,7 @@ impl Car {
         })
     }
 
-    /// Speed and place.
+    /// Advances speed and place.
     fn drive(&mut self) {
         let command = match self.leg {
             Leg::Stand { seconds } => {
@@ -228,9 +228,9 @@ impl Car {
             Leg::Road { metres, speed, .. } => {
                 let left = (metres - self.along).max(0.0);
                 let brake_in_time = (self.next.speed().powi(2) + 2.0 * self.config.braking * left).sqrt();
-                // Creep over the line, so that every leg ends.
+                // The car creeps over the line, so that every leg ends.
                 let wanted = speed.min(brake_in_time).max(0.5);
-                // 0.8 s to make up for a difference: a calm foot.
+                // A difference is made up for in 0.8 s, by a calm driver.
                 ((wanted - self.speed) / 0.8).clamp(-1.5 * self.config.braking, self.config.acceleration)
             }
         };
@@ -254,14 +254,14 @@ impl Car {
     }
 }
 
-/// A vector of the level frame as seen from a body that is pitched, then rolled.
+/// Returns a vector of the level frame in the axes of a body that is pitched, then rolled.
 pub(super) fn turned_in([x, y, z]: [f64; 3], pitch: f64, roll: f64) -> [f64; 3] {
     let (sp, cp, sr, cr) = (libm::sin(pitch), libm::cos(pitch), libm::sin(roll), libm::cos(roll));
     let (x, z) = (x * cp - z * sp, x * sp + z * cp);
     [x, y * cr + z * sr, -y * sr + z * cr]
 }
 
-/// Body rates from heading rate and (angle, rate) of pitch and roll.
+/// Returns the body rates from heading rate and (angle, rate) of pitch and roll.
 fn body_rates(heading: f64, (pitch, pitch_rate): (f64, f64), (roll, roll_rate): (f64, f64)) -> [f64; 3] {
     let (sp, cp, sr, cr) = (libm::sin(pitch), libm::cos(pitch), libm::sin(roll), libm::cos(roll));
     [roll_rate - heading * sp, pitch_rate * cr + heading * cp * sr, -pitch_rate * sr + heading * cp * cr]

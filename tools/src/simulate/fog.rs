@@ -1,10 +1,10 @@
-//! A fibre-optic gyro: angle random walk, a bias that wanders, scale, misalignment.
+//! This module simulates a fibre-optic gyro: angle random walk, a bias that wanders, scale, misalignment.
 
 use super::mems::{axes, seen};
 use super::purpose::Purpose;
 use crate::random::Random;
 
-/// Sizes of its errors. Those marked sigma are drawn for each device or run, and axis.
+/// Holds the sizes of its errors. Those marked sigma are drawn for each device or run, and axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Angle random walk, rad/sqrt(s).
@@ -21,7 +21,7 @@ pub struct Config {
     pub misalignment: f64,
 }
 
-/// A gyro with the errors of its device and run.
+/// Simulates a gyro with the errors of its device and run.
 #[derive(Debug, Clone)]
 pub struct Fog {
     config: Config,
@@ -31,10 +31,10 @@ pub struct Fog {
 }
 
 impl Fog {
-    /// The device of one seed in the run of another.
+    /// Makes the device of one seed in the run of another.
     #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
-        // Not the numbers that the other part of the same device seed gets.
+        // The stream differs from that of the other part with the same device seed.
         let mut fixed = Purpose::Fog.stream(device);
         let mut random = Purpose::Fog.stream(run);
         let matrix = axes(config.scale, config.misalignment, &mut fixed);
@@ -55,7 +55,7 @@ impl Fog {
         })
     }
 
-    /// The bias wanders on, by so many seconds: once for many increments.
+    /// Advances the bias by so many seconds: once for many increments.
     pub fn wander(&mut self, seconds: f64) {
         let walk = self.random.normals();
         for (bias, walk) in self.bias.iter_mut().zip(walk) {

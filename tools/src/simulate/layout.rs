@@ -1,10 +1,10 @@
-//! Whole sequences in the layouts of KAIST Complex Urban and NCLT: the folders that their users
-//! have, with the truth known exactly.
+//! This module writes whole sequences in the layouts of KAIST Complex Urban and NCLT: the same folders, with the truth
+//! known exactly.
 //!
-//! Everything about a sequence follows from its [`Spec`]: the run's seed makes route, road,
-//! traffic, tyres, noise and the biases at power-on; the device's seed makes scale,
-//! misalignment and the lasting bias of both gyros. Sequences of one data set share a device, as
-//! the paper's do. Beside the data lies [`MARKER`], which says that it is simulated and of what.
+//! Everything about a sequence follows from its [`Spec`]: the run's seed makes route, road, traffic, tyres, noise and
+//! the biases at power-on; the device's seed makes scale, misalignment and the lasting bias of both gyros. Sequences of
+//! one data set share a device, as the paper's do. Beside the data lies [`MARKER`], which says that they are simulated
+//! and gives the specification.
 
 mod delay;
 mod kaist;
@@ -25,10 +25,10 @@ use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::Path;
 
-/// File of a sequence's folder that says that it is simulated.
+/// This file in a sequence's folder says that it is simulated.
 pub const MARKER: &str = "simulated.json";
 
-/// The layout of a data set.
+/// Names the layout of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
@@ -39,7 +39,7 @@ pub enum Layout {
 }
 
 impl Layout {
-    /// The vehicle.
+    /// Returns the data set's vehicle.
     #[must_use]
     pub fn vehicle(self) -> Vehicle {
         match self {
@@ -49,10 +49,10 @@ impl Layout {
     }
 }
 
-/// The specification of a sequence; written into [`MARKER`].
+/// Specifies a sequence; it is written into [`MARKER`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spec {
-    /// Whose layout.
+    /// The data set whose layout it has.
     pub layout: Layout,
     /// The sequence's name, and its folder's.
     pub name: String,
@@ -64,7 +64,7 @@ pub struct Spec {
     pub run: u64,
 }
 
-/// A named set of sequences.
+/// Names a set of sequences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Set {
     /// Eight sequences, as the paper's urban06 to 13.
@@ -75,11 +75,11 @@ pub enum Set {
     Transfer,
 }
 
-/// Length of a sequence of a set, s.
+/// A sequence of a set lasts this long, s.
 pub const SECONDS: u32 = 20 * 60;
 
 impl Set {
-    /// Its sequences. No run is in two sets.
+    /// Returns the specifications of its sequences. No run is in two sets.
     #[must_use]
     pub fn specs(self, layout: Layout) -> Vec<Spec> {
         let (word, count, device, first) = match self {
@@ -93,7 +93,7 @@ impl Set {
     }
 }
 
-/// All parts of the vehicle on their way.
+/// Simulates all parts of the vehicle on a drive.
 struct Drive {
     world: World,
     mems: Mems,
@@ -118,7 +118,7 @@ impl Drive {
         }
     }
 
-    /// Specific force and angular rate as the inertial sensor says them.
+    /// Returns specific force and angular rate as the inertial sensor reports them.
     fn imu(&mut self, truth: &Truth) -> ([f64; 3], [f64; 3]) {
         let force = super::add(truth.motion.specific_force, truth.shake.specific_force);
         let rate = super::add(truth.inertial_rate, truth.shake.angular_rate);

@@ -1,14 +1,14 @@
-//! A piece of the way, and its bends.
+//! A leg is a piece of the way, straight or bent.
 
-/// A piece of the way.
+/// Describes a piece of the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Leg {
-    /// Waiting.
+    /// The vehicle waits.
     Stand {
         /// The duration.
         seconds: f64,
     },
-    /// Driving.
+    /// The vehicle drives.
     Road {
         /// Length.
         metres: f64,
@@ -20,7 +20,7 @@ pub enum Leg {
 }
 
 impl Leg {
-    /// Highest speed in it, m/s.
+    /// Returns the highest speed in the leg, m/s.
     #[must_use]
     pub fn speed(&self) -> f64 {
         match *self {
@@ -29,7 +29,7 @@ impl Leg {
         }
     }
 
-    /// 1/m at a place of the leg: the wheel is turned in and back smoothly, as sine squared.
+    /// Returns the curvature at a place of the leg, 1/m: the driver steers in and back smoothly, as sine squared.
     #[must_use]
     pub fn curvature(&self, along: f64) -> f64 {
         match *self {

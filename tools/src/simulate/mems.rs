@@ -1,14 +1,14 @@
-//! The errors of the part: bias that wanders, white noise, scale, misalignment.
+//! This module adds the errors of the MEMS part: a bias that wanders, white noise, scale, misalignment.
 //!
-//! This is the paper's sensor model (equations 1 and 2) with scale, misalignment and, where the
-//! configuration has it, what the gyro says of a force.
+//! This is the paper's sensor model (equations 1 and 2) with scale, misalignment and, where the configuration has it,
+//! the gyro's sensitivity to force.
 
 use super::DT;
 use super::car::turned_in;
 use super::purpose::Purpose;
 use crate::random::Random;
 
-/// The sizes of a part's errors. Those marked sigma are drawn for each seed and axis.
+/// Holds the sizes of a part's errors. Those marked sigma are drawn for each seed and axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// White noise, rad/s/sqrt(Hz): the Xsens MTi of the KAIST drives as OpenVINS has it
@@ -38,7 +38,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// A good MEMS part.
+    /// The default is a good MEMS part.
     pub const DEFAULT: Self = Self {
         gyro_noise: 1.7453e-4,
         gyro_walk: 1e-5,
@@ -53,7 +53,7 @@ impl Config {
     };
 }
 
-/// Errors of three axes of one kind.
+/// Holds the errors of three axes of one kind.
 #[derive(Debug, Clone, Copy)]
 struct Triad {
     /// The matrix from a vector to the readings of the axes.
@@ -64,7 +64,7 @@ struct Triad {
     walk: f64,
 }
 
-/// Scale and misalignment: what three axes make of a vector.
+/// Draws the matrix of scale and misalignment that three axes apply to a vector.
 pub(super) fn axes(scale: f64, misalignment: f64, random: &mut Random) -> [[f64; 3]; 3] {
     std::array::from_fn(|row| {
         std::array::from_fn(|column| {
@@ -74,7 +74,7 @@ pub(super) fn axes(scale: f64, misalignment: f64, random: &mut Random) -> [[f64;
     })
 }
 
-/// A vector as three axes see it.
+/// Returns a vector as three axes measure it.
 pub(super) fn seen(matrix: &[[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| row.iter().zip(vector).map(|(m, v)| m * v).sum())
 }
@@ -96,7 +96,7 @@ impl Triad {
     }
 }
 
-/// A part with the errors of its seed.
+/// Simulates a part with the errors of its seed.
 #[derive(Debug, Clone)]
 pub struct Mems {
     random: Random,
@@ -108,7 +108,7 @@ pub struct Mems {
 }
 
 impl Mems {
-    /// Another part for each seed.
+    /// Makes the part of a seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Mems.stream(seed);
@@ -121,8 +121,8 @@ impl Mems {
         Self { random, gyro, accel, gyro_of_force: [[0.0; 3]; 3], mount: config.mount }
     }
 
-    /// The part of a device seed in one run: its scale, misalignment and what its gyro says of a
-    /// force are the device's, its bias at power-on and its noise the run's.
+    /// Makes the part of a device seed in one run: scale, misalignment and the gyro's sensitivity to force come from
+    /// the device, bias at power-on and noise from the run.
     #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
         let mut fixed = Purpose::Device.stream(device);
@@ -137,14 +137,14 @@ impl Mems {
         Self { random, gyro, accel, gyro_of_force, mount: config.mount }
     }
 
-    /// A vector of the car, seen from the part's nominal axes.
+    /// Returns a vector of the car in the part's nominal axes.
     #[must_use]
     pub fn tilt(&self, vector: [f64; 3]) -> [f64; 3] {
         let [pitch, roll] = self.mount;
         turned_in(vector, pitch, roll)
     }
 
-    /// Specific force and angular rate as the part says them.
+    /// Returns specific force and angular rate as the part reports them.
     pub fn measure(&mut self, force: [f64; 3], rate: [f64; 3]) -> ([f64; 3], [f64; 3]) {
         let of_force = seen(&self.gyro_of_force, force);
         let rate = std::array::from_fn(|axis| rate[axis] + of_force[axis]);

@@ -1,5 +1,5 @@
-//! Wheel encoders of a rear axle: wheels are not as large as the calibration says, and slip
-//! when they drive or brake.
+//! This module simulates the wheel encoders of a rear axle: wheels differ in size from the calibration, and slip when
+//! they drive or brake.
 //!
 //! Slip is in proportion to the force: slip = a / (g k), with the normalised stiffness k of the
 //! tyres (Rajamani, Vehicle Dynamics and Control, chapter 4).
@@ -8,22 +8,22 @@ use super::car::GRAVITY;
 use super::purpose::Purpose;
 use std::f64::consts::PI;
 
-/// The calibration, and its errors.
+/// Holds the calibration and the sizes of its errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Diameters as calibrated, left and right, m.
     pub diameter: [f64; 2],
-    /// Distance between the wheels as calibrated, m; the true one.
+    /// Distance between the wheels as calibrated, m; it is also the true one.
     pub base: f64,
-    /// Error of both diameters in common, sigma, as a part.
+    /// Error common to both diameters, sigma, relative.
     pub common_error: f64,
-    /// Error of each diameter beside it, sigma, as a part.
+    /// Further error of each diameter, sigma, relative.
     pub wheel_error: f64,
     /// Normalised longitudinal stiffness: longitudinal acceleration over g that gives a slip of 1.
     pub slip_stiffness: f64,
 }
 
-/// Wheels of one run.
+/// Simulates the wheels of one run.
 #[derive(Debug, Clone)]
 pub struct Odometer {
     config: Config,
@@ -34,7 +34,7 @@ pub struct Odometer {
 }
 
 impl Odometer {
-    /// Tyres of one run: pressure and load change from day to day.
+    /// Draws the tyres of one run, because pressure and load change from day to day.
     #[must_use]
     pub fn new(config: &Config, run: u64) -> Self {
         let mut random = Purpose::Odometer.stream(run);
@@ -52,13 +52,13 @@ impl Odometer {
         }
     }
 
-    /// Revolutions since the start, left and right.
+    /// Returns the revolutions since the start, left and right.
     #[must_use]
     pub fn turns(&self) -> [f64; 2] {
         self.turns
     }
 
-    /// Way since the start as the calibration makes it of the revolutions, left and right, m.
+    /// Returns the way since the start, left and right, computed from the revolutions with the calibration, m.
     #[must_use]
     pub fn metres(&self) -> [f64; 2] {
         std::array::from_fn(|wheel| self.turns[wheel] * PI * self.config.diameter[wheel])

@@ -1,8 +1,9 @@
-//! The streams of random numbers of a simulation: each purpose has one of its own.
+//! Each purpose in a simulation has a stream of random numbers of its own, so that a change of one leaves the others as
+//! they are.
 
 use crate::random::Random;
 
-/// The purpose of a stream.
+/// Names the purpose of a stream.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Purpose {
     Route,

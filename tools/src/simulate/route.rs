@@ -1,4 +1,4 @@
-//! The route of the driver: streets with bends, wide corners and stops, one after another.
+//! This module makes the driver's route: streets with bends, wide corners and stops, one after another.
 //!
 //! The car turns by at most some 0.3 rad/s, as in the recordings; nobody parks.
 
@@ -8,17 +8,17 @@ use super::town::Town;
 use crate::random::Random;
 use std::f64::consts::FRAC_PI_2;
 
-/// The source of the legs.
+/// Gives the legs of a drive.
 #[derive(Debug, Clone)]
 pub enum Way {
     /// The short course of [`Route`].
     Course(Route),
-    /// A town.
+    /// A way through a town.
     Town(Town),
 }
 
 impl Way {
-    /// The leg after the last one; standing for ever where there is none.
+    /// Returns the next leg; if there is none, a stand without end.
     pub(super) fn next_leg(&mut self) -> Leg {
         let next = match self {
             Self::Course(route) => route.next(),
@@ -28,17 +28,17 @@ impl Way {
     }
 }
 
-/// A route without end.
+/// Generates a route without end.
 #[derive(Debug, Clone)]
 pub struct Route {
     random: Random,
     legs: u32,
-    /// +1: the next corner is a left one.
+    /// Side of the next corner: +1 is left.
     side: f64,
 }
 
 impl Route {
-    /// Another one for each seed.
+    /// Makes the route of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
@@ -50,7 +50,7 @@ impl Route {
 impl Iterator for Route {
     type Item = Leg;
 
-    /// It begins with standing; then street, corner, street with a bend, stop, and again.
+    /// Returns the next leg: standing first, then street, corner, street with a bend, stop, and so on.
     fn next(&mut self) -> Option<Leg> {
         let between = |random: &mut Random, low, high| random.between(low, high);
         let random = &mut self.random;

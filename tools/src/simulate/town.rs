@@ -1,5 +1,5 @@
-//! A town: blocks of streets of different speed, some bent, and junctions at which the driver
-//! waits, goes straight on, or turns.
+//! This module makes a way through a town: blocks of streets of different speed, some bent, and junctions at which the
+//! driver waits, goes straight on, or turns.
 //!
 //! Corners are as fast as comfort allows: the tightest point of a corner and the lateral
 //! acceleration give the speed.
@@ -10,7 +10,7 @@ use crate::random::Random;
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
-/// The parameters of the town and its traffic.
+/// Holds the parameters of the town and its traffic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Speed limits, m/s, each with the share of the streets that have it.
@@ -33,7 +33,7 @@ pub struct Config {
     pub before: [f64; 2],
 }
 
-/// A way through a town, without end.
+/// Generates a way through a town without end.
 #[derive(Debug, Clone)]
 pub struct Town {
     config: Config,
@@ -42,7 +42,7 @@ pub struct Town {
 }
 
 impl Town {
-    /// Another one for each seed.
+    /// Makes the way of a seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
@@ -64,12 +64,12 @@ impl Town {
             }
             share += part;
         }
-        // Drivers differ from the limit, and from each other.
+        // Drivers deviate from the limit, and from each other.
         let speed = limit * random.between(0.85, 1.05);
         let metres = random.between(from, to) * limit / slowest;
         let bent = random.between(0.0, 1.0) < bends;
         let sign = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
-        // A bend of a street can be driven at its speed.
+        // A bend must be drivable at the street's speed.
         let sharpest = 0.5 * lateral * metres / (2.0 * speed * speed);
         let turn = if bent { sign * random.between(0.1, 0.9) * sharpest.min(1.0) } else { 0.0 };
         self.legs.push_back(Leg::Road { metres, speed, turn });

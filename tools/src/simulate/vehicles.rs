@@ -1,4 +1,4 @@
-//! Vehicles and parts of the two data sets, with the source of every number.
+//! This module holds the vehicles and parts of the two data sets, with the source of every number.
 //!
 //! None of the numbers was chosen by a result. (M) marks what was written down from memory of a
 //! data sheet that was not at hand; (A) what nobody has published and was assumed.
@@ -36,25 +36,25 @@
 
 use super::{car, fog, mems, odometer, town, vibration, world};
 
-/// 1 deg/h in rad/s.
+/// 1 deg/h is this in rad/s.
 const DEG_PER_HOUR: f64 = std::f64::consts::PI / 180.0 / 3600.0;
-/// 1 deg/s in rad/s, 1 deg in rad.
+/// 1 deg is this in rad, 1 deg/s in rad/s.
 const DEG: f64 = std::f64::consts::PI / 180.0;
-/// sqrt(1 h) in sqrt(s).
+/// sqrt(1 h) is this in sqrt(s).
 const ROOT_HOUR: f64 = 60.0;
 
-/// The delays of messages.
+/// Describes the delays of messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delays {
     /// The mean delay, s.
     pub mean: f64,
-    /// Time between two blockages, s, and their length, s, both on average; none where infinite.
+    /// Mean time between two blockages, s, and their mean length, s; with an infinite time there are none.
     pub blockage: [f64; 2],
     /// The longest blockage, s.
     pub longest: f64,
 }
 
-/// A vehicle with its parts.
+/// Describes a vehicle with its parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {
     /// Its motion.
@@ -71,7 +71,7 @@ pub struct Vehicle {
     pub delays: Delays,
 }
 
-/// The car of KAIST Complex Urban.
+/// Describes the car of KAIST Complex Urban.
 pub const KAIST: Vehicle = Vehicle {
     world: world::Config {
         car: car::Config {
@@ -124,7 +124,7 @@ pub const KAIST: Vehicle = Vehicle {
     delays: Delays { mean: 1e-4, blockage: [f64::INFINITY, 0.0], longest: 0.0 },
 };
 
-/// The Segway of NCLT. Its parts shake as the car's do: nothing better is known.
+/// Describes the Segway of NCLT. Its parts shake as the car's do, for want of better data.
 pub const NCLT: Vehicle = Vehicle {
     world: world::Config {
         car: car::Config {
@@ -132,7 +132,7 @@ pub const NCLT: Vehicle = Vehicle {
             track: 0.6,
             acceleration: 0.5,
             braking: 0.5,
-            // It leans where it wants to go: much more than a car.
+            // It leans in the direction of acceleration, much more than a car.
             pitch_gradient: 0.05,
             suspension_hz: 0.8,
             road_grade: 0.03,

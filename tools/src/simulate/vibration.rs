@@ -1,16 +1,15 @@
-//! The vibration of the part: the idling engine, and the road.
+//! This module shakes the part: by the idling engine, and by the road.
 //!
-//! Each source is a narrow band of noise (a damped oscillator driven by white noise) that moves
-//! all axes at once, each with its own size and phase. The angle is what shakes; the rate is
-//! its change from sample to sample. So the shaking rate adds up to nothing, as it does on a
-//! car, and what it does to a yaw taken after one second is an angle of about rate / (2 pi f).
+//! Each source is a narrow band of noise (a damped oscillator driven by white noise) that moves all axes at once, each
+//! with its own size and phase. The angle shakes, and the rate is its change from sample to sample. So the shaking rate
+//! adds up to zero, as on a car, and its effect on a yaw after one second is an angle of about rate / (2 pi f).
 
 use super::DT;
 use super::purpose::Purpose;
 use crate::random::Random;
 use std::f64::consts::{PI, TAU};
 
-/// A source of vibration.
+/// Describes a source of vibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
     /// Middle of its band, Hz.
@@ -23,7 +22,7 @@ pub struct Source {
     pub specific_force: [f64; 3],
 }
 
-/// All sources of vibration. The sizes are those of the recordings: standing 0.006 to 0.009 rad/s and 0.1 to 0.45
+/// Holds all sources of vibration. The sizes are those of the recordings: standing 0.006 to 0.009 rad/s and 0.1 to 0.45
 /// m/s^2, moving about 0.02 rad/s and 0.5 m/s^2; the bands are those that stand out in their spectra.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
@@ -31,12 +30,12 @@ pub struct Config {
     pub engine: Source,
     /// The vibration from the road at [`Config::road_speed`], in proportion at other speeds.
     pub road: [Source; 3],
-    /// m/s.
+    /// The speed for which `road` is given, m/s.
     pub road_speed: f64,
 }
 
 impl Config {
-    /// A small diesel on town roads.
+    /// The default is a small diesel on town roads.
     pub const DEFAULT: Self = Self {
         engine: Source {
             hz: 23.4,
@@ -71,7 +70,7 @@ impl Config {
     };
 }
 
-/// Shaking of one moment.
+/// Holds the shaking at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shake {
     /// m/s^2.
@@ -80,7 +79,7 @@ pub struct Shake {
     pub angular_rate: [f64; 3],
 }
 
-/// A narrow band of noise: a phasor that turns and forgets. Both parts have variance 1.
+/// Simulates a narrow band of noise: a phasor that turns and decays under white noise. Both parts have variance 1.
 #[derive(Debug, Clone, Copy)]
 struct Band {
     re: f64,
@@ -97,14 +96,14 @@ impl Band {
         self.im = keep * im + fresh * random.normal();
     }
 
-    /// The band with a phase for each axis.
+    /// Returns the band with a phase for each axis.
     fn axes(&self, phase: f64) -> [f64; 3] {
-        // Three phases that are far from each other.
+        // The three phases are far from each other.
         [phase, phase + 2.0, phase + 4.2].map(|p| self.re * libm::cos(p) + self.im * libm::sin(p))
     }
 }
 
-/// A source at work.
+/// Simulates a source.
 #[derive(Debug, Clone, Copy)]
 struct Shaker {
     source: Source,
@@ -119,7 +118,7 @@ impl Shaker {
 
     fn step(&mut self, strength: f64, random: &mut Random, shake: &mut Shake) {
         self.band.step(&self.source, random);
-        // A sine of this rate moves by so much more than its angle in one sample.
+        // The factor is the angle's amplitude over the rate's, for a sine sampled at the grid.
         let angle_per_rate = DT / (2.0 * libm::sin(PI * self.source.hz * DT));
         let (turn, push) = (self.band.axes(0.0), self.band.axes(1.0));
         for axis in 0..3 {
@@ -131,7 +130,7 @@ impl Shaker {
     }
 }
 
-/// The vibration of the vehicle.
+/// Simulates the vibration of the vehicle.
 #[derive(Debug, Clone)]
 pub struct Vibration {
     random: Random,
@@ -148,12 +147,12 @@ impl Vibration {
         let engine = Shaker::new(config.engine, &mut random);
         let road = config.road.map(|source| Shaker::new(source, &mut random));
         let mut vibration = Self { random, engine, road, road_speed: config.road_speed };
-        // The first angle comes from nowhere: no sample is made of it.
+        // The first angle has no predecessor, so no sample is made of it.
         vibration.step(0.0);
         vibration
     }
 
-    /// Ten milliseconds on, at a speed in m/s.
+    /// Advances by 10 ms at a speed in m/s.
     pub fn step(&mut self, speed: f64) -> Shake {
         let mut shake = Shake::default();
         self.engine.step(1.0, &mut self.random, &mut shake);

@@ -1,8 +1,8 @@
-//! The truth: position and heading of the vehicle, and the readings of perfect parts.
+//! This module computes the truth: position and heading of the vehicle, and the readings of perfect parts.
 //!
-//! World: x east, y north, z up. Heading is counted from east to the left, pitch is nose down,
-//! roll is left side up, in that order. Rates are constant over each 10 ms, so the truth at the
-//! grid steps is exact: the yaw is the sum of the heading rates.
+//! The world's axes are x east, y north, z up. Heading is counted from east to the left, pitch is nose down, roll is
+//! left side up, in that order. Rates are constant over each 10 ms, so the truth at the grid steps is exact: the yaw is
+//! the sum of the heading rates.
 //!
 //! The tyres of the rear axle slip sideways in a turn, by an angle in proportion to the lateral
 //! acceleration (Rajamani, Vehicle Dynamics and Control, chapter 2): the vehicle does not go
@@ -13,10 +13,10 @@ use super::car::{self, Car, GRAVITY, Motion};
 use super::route::Way;
 use super::vibration::{self, Shake, Vibration};
 
-/// The Earth's rate of rotation, rad/s (WGS 84).
+/// The Earth rotates at this rate, rad/s (WGS 84).
 pub const EARTH_RATE: f64 = 7.292_115e-5;
 
-/// The place of the drive.
+/// Holds the parameters of the drive's world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// The vehicle.
@@ -29,7 +29,7 @@ pub struct Config {
     pub latitude_deg: f64,
 }
 
-/// The truth at one moment.
+/// Holds the truth at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
     /// Since the start, s.
@@ -47,21 +47,21 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// A vector of the world in the vehicle's axes.
+    /// Returns a vector of the world in the vehicle's axes.
     #[must_use]
     pub fn in_vehicle(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let (sin, cos) = (libm::sin(self.yaw), libm::cos(self.yaw));
         car::turned_in([x * cos + y * sin, y * cos - x * sin, z], self.motion.pitch, self.motion.roll)
     }
 
-    /// The rotation from the vehicle's axes to the world's, row by row.
+    /// Returns the rotation from the vehicle's axes to the world's, row by row.
     #[must_use]
     pub fn rotation(&self) -> [[f64; 3]; 3] {
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| self.in_vehicle(axis))
     }
 }
 
-/// Moments of a drive, every 10 ms, without end.
+/// Generates the truth of a drive every 10 ms, without end.
 #[derive(Debug, Clone)]
 pub struct World {
     config: Config,

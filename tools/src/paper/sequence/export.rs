@@ -1,11 +1,12 @@
-//! A sequence as one CSV: the columns of [`crate::drive::recording`], and further columns that only a sequence has.
+//! This module writes a sequence as one CSV: the columns of [`crate::drive::recording`], and further columns that only
+//! a sequence has.
 
 use super::Sequence;
 use crate::drive::DT;
 use std::io::{self, Write};
 
-/// The header. Wheels are rear right and rear left; `fog_rad`, `left_m` and
-/// `right_m` are since the row before.
+/// The file begins with this header. Wheels are rear right and rear left; `fog_rad`, `left_m` and `right_m` are since
+/// the row before.
 pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel2_rate,wheel4_rate,\
                           fog_rad,left_m,right_m,ref_x_m,ref_y_m,ref_yaw_rad,vendor_yaw_rad";
 
@@ -21,7 +22,7 @@ pub fn write_csv(sequence: &Sequence, mut out: impl Write) -> io::Result<u64> {
         if step.imu_gap {
             continue;
         }
-        // In whole hundredths: 0.01 times a count has digits to spare.
+        // The time is printed in whole hundredths, because 0.01 times a count would show rounding.
         write!(out, "{}.{:02}", k / 100, k % 100)?;
         for value in step.specific_force.iter().chain(&step.angular_rate) {
             write!(out, ",{}", buffer.format(*value))?;

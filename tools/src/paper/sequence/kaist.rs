@@ -1,7 +1,7 @@
-//! KAIST Complex Urban: `sensor_data/{xsens_imu,fog,encoder}.csv`,
-//! `calibration/EncoderParameter.txt`, `global_pose.csv`. No headers, nanoseconds since 1970;
-//! x forward, y left, z up. The early sequences (campus00, urban00 to 05) have no gyro: 8 columns
-//! in xsens_imu.csv instead of 17.
+//! This module reads KAIST Complex Urban: `sensor_data/{xsens_imu,fog,encoder}.csv`,
+//! `calibration/EncoderParameter.txt`, `global_pose.csv`. Files have no headers; stamps are nanoseconds since 1970; x
+//! forward, y left, z up. The early sequences (campus00, urban00 to 05) have no gyro: 8 columns in xsens_imu.csv
+//! instead of 17.
 //!
 //! Sources: the readers irapkaist/file_player and tsyxyz/kaist2bag, and the data set's page.
 
@@ -17,26 +17,26 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 const NANOS: f64 = 1e9;
-/// Quaternion x, y, z, w; then angular rate and specific force, after the Euler angles.
+/// The used columns are the quaternion x, y, z, w, and, after the Euler angles, angular rate and specific force.
 const IMU: Format<10> = Format {
     columns: 17,
     used: [1, 2, 3, 4, 8, 9, 10, 11, 12, 13],
     stamps_per_second: NANOS,
     nominal_hz: RATE_HZ as f64,
 };
-/// The early sequences have the vendor's orientation alone.
+/// The early sequences have only the vendor's orientation.
 const ORIENTATION: Format<4> =
     Format { columns: 8, used: [1, 2, 3, 4], stamps_per_second: NANOS, nominal_hz: RATE_HZ as f64 };
-/// The yaw increment.
+/// The used column is the yaw increment.
 const FOG: Format<1> = Format { columns: 4, used: [3], stamps_per_second: NANOS, nominal_hz: 1000.0 };
 const ENCODER: Format<2> = Format { columns: 3, used: [1, 2], stamps_per_second: NANOS, nominal_hz: 100.0 };
-/// r11, r21, x and y of three rows of rotation and position.
+/// The used columns are r11, r21, x and y of three rows of rotation and position.
 const POSE: Format<4> =
     Format { columns: 13, used: [1, 5, 4, 8], stamps_per_second: NANOS, nominal_hz: 100.0 };
-/// A wheel that is faster than this has had its counter reset, m/s.
+/// A faster wheel than this means that its counter was reset, m/s.
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
-/// The files to be read.
+/// These files are read.
 pub(super) const PATHS: [&str; 4] =
     ["sensor_data/xsens_imu.csv", "sensor_data/fog.csv", "sensor_data/encoder.csv", "global_pose.csv"];
 
@@ -73,8 +73,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
         epoch,
         Box::new(move |row: &Row<4>, _, _| {
             let [r11, r21, x, y] = row.fields;
-            // The quotient of the two is that of the nearest true rotation too, however few digits
-            // they were printed with.
+            // The two have the same quotient in the nearest true rotation, however few digits they were printed with.
             [x, y, heading.angle(libm::atan2(r21, r11))]
         }),
     )?;
@@ -89,7 +88,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
     })
 }
 
-/// The inertial sensor and its first stamp.
+/// Holds the inertial sensor and its first stamp.
 type Imu = (Box<dyn Stream<7>>, i64);
 
 fn whole(path: &Path, progress: &Progress) -> Result<Imu, DataError> {
@@ -113,12 +112,12 @@ fn orientation(path: &Path, progress: &Progress) -> Result<Imu, DataError> {
     Ok((Box::new(track), epoch))
 }
 
-/// Heading of a quaternion.
+/// Returns the heading of a quaternion.
 fn yaw([x, y, z, w]: [f64; 4]) -> f64 {
     libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 }
 
-/// Columns of the first row: which of the two kinds of file it is.
+/// Returns the number of columns of the first row, which tells the two kinds of file apart.
 fn columns(path: &Path) -> Result<usize, DataError> {
     let name = path.display().to_string();
     let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
@@ -129,12 +128,12 @@ fn columns(path: &Path) -> Result<usize, DataError> {
     Ok(line.split(',').count())
 }
 
-/// The parameters of the calibration file.
+/// Holds the parameters of the calibration file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct EncoderParameters {
     /// Counts of a revolution.
     resolution: f64,
-    /// Left and right, m.
+    /// Diameter of the left and the right wheel, m.
     diameter: [f64; 2],
     /// The distance between the wheels, m.
     base: f64,
@@ -144,7 +143,7 @@ impl EncoderParameters {
     fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
-        // Keyed on the second word of a line, as the data set's own readers do.
+        // The second word of a line is the key, as in the data set's own readers.
         let number = |parameter: &'static str, key: &str| {
             let line = text.lines().find(|line| line.split_whitespace().nth(1) == Some(key));
             let value: Option<f64> = line
@@ -164,11 +163,11 @@ impl EncoderParameters {
     }
 }
 
-/// Counts as metres since the first row, across resets.
+/// Converts counts to metres since the first row, across resets.
 struct Encoder {
     parameters: EncoderParameters,
     last: Option<(f64, [f64; 2])>,
-    /// m and m/s.
+    /// Way and speed of both wheels, m and m/s.
     metres: [f64; 2],
     speed: [f64; 2],
 }
@@ -178,15 +177,15 @@ impl Encoder {
         Self { parameters, last: None, metres: [0.0; 2], speed: [0.0; 2] }
     }
 
-    /// Metres, and whether a counter was reset since the row before: then both wheels are taken to
-    /// have turned on as they did.
+    /// Returns metres, and whether a counter was reset since the row before: then both wheels are assumed to have kept
+    /// their speed.
     fn metres(&mut self, counts: [f64; 2], time: f64) -> ([f64; 2], bool) {
         let (last_time, last) = self.last.replace((time, counts)).unwrap_or((time, counts));
         let EncoderParameters { resolution, diameter, .. } = self.parameters;
         let seconds = time - last_time;
         let way = |wheel: usize| (counts[wheel] - last[wheel]) / resolution * diameter[wheel] * PI;
         let moved = [way(0), way(1)];
-        // Counts come in whole numbers: one of them in 1 us is no speed.
+        // Counts are whole numbers, so one count in 1 us says nothing about the speed.
         let reset = moved.iter().any(|way| way.abs() > IMPOSSIBLE_SPEED * seconds.max(0.01));
         if !reset && seconds > 0.0 {
             self.speed = moved.map(|way| way / seconds);

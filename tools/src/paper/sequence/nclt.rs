@@ -1,9 +1,9 @@
-//! NCLT: `ms25.csv`, `kvh.csv`, `wheels.csv`, `groundtruth_DATE.csv`. No headers, microseconds
-//! since 1970; x forward, y right, z down, heading clockwise from north. What comes out is x
-//! forward, y left, z up, heading counter-clockwise from east, as KAIST has it.
+//! This module reads NCLT: `ms25.csv`, `kvh.csv`, `wheels.csv`, `groundtruth_DATE.csv`. Files have no headers; stamps
+//! are microseconds since 1970; axes are x forward, y right, z down, heading clockwise from north. The output is x
+//! forward, y left, z up, heading counter-clockwise from east, as in KAIST.
 //!
-//! The gyro gives its integral, so that a message that is lost takes nothing with it. Source:
-//! the readers bierschi/nclt2ros and ethz-asl/nclt_tools.
+//! The gyro sends its integral, so that a lost message loses no angle. Source: the readers bierschi/nclt2ros and
+//! ethz-asl/nclt_tools.
 
 use super::Files;
 use super::rows::{Format, Progress, Row, Rows};
@@ -13,15 +13,15 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
 const MICROS: f64 = 1e6;
-/// Specific force and angular rate, after the magnetic field.
+/// The used columns are specific force and angular rate, after the magnetic field.
 const IMU: Format<6> =
     Format { columns: 10, used: [4, 5, 6, 7, 8, 9], stamps_per_second: MICROS, nominal_hz: 47.0 };
 const FOG: Format<1> = Format { columns: 2, used: [1], stamps_per_second: MICROS, nominal_hz: 100.0 };
 const WHEELS: Format<2> = Format { columns: 3, used: [1, 2], stamps_per_second: MICROS, nominal_hz: 41.0 };
-/// North, east and heading.
+/// The used columns are north, east and heading.
 const POSE: Format<3> = Format { columns: 7, used: [1, 2, 6], stamps_per_second: MICROS, nominal_hz: 100.0 };
 
-/// The file of the truth has the date in its name.
+/// Finds the file of the truth, which has the date in its name.
 pub(super) fn truth(folder: &Path) -> Result<PathBuf, DataError> {
     let entries =
         std::fs::read_dir(folder).map_err(|source| DataError::of(folder.display(), source.into()))?;
@@ -35,7 +35,7 @@ pub(super) fn truth(folder: &Path) -> Result<PathBuf, DataError> {
     names.into_iter().find(is_truth).ok_or_else(missing)
 }
 
-/// The files to be read, beside the truth.
+/// These files are read beside the truth.
 pub(super) const PATHS: [&str; 3] = ["ms25.csv", "kvh.csv", "wheels.csv"];
 
 pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataError> {
@@ -60,7 +60,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
         Rows::open(&wheels, WHEELS, progress.clone())?,
         epoch,
         Box::new(move |row: &Row<2>, time, _| {
-            // A speed is that of the time since the row before.
+            // A speed applies to the time since the row before.
             let seconds = time - last.replace(time).unwrap_or(time);
             for (metres, speed) in metres.iter_mut().zip(row.fields) {
                 *metres += speed * seconds;

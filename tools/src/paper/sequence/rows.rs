@@ -1,4 +1,4 @@
-//! Rows of numbers without a header: a stamp and fields, one row in memory at a time.
+//! This module reads rows of numbers without a header: a stamp and fields, one row in memory at a time.
 
 use super::summary::StreamSummary;
 use crate::drive::error::{DataError, DataFault, ValueError};
@@ -8,28 +8,28 @@ use std::fs::File;
 use std::path::Path;
 use std::rc::Rc;
 
-/// A value beyond this is none of any part or map: metres of UTM are some 4e6.
+/// A value beyond this is refused: no part or map has one; metres of UTM are some 4e6.
 const MAX_VALUE: f64 = 1e12;
-/// A file that is silent for longer is not one drive, s.
+/// A file with a longer gap is not a single drive, s.
 const MAX_SILENCE: f64 = 600.0;
 
-/// Bytes read so far of all files of a sequence, for whoever watches.
+/// Counts the bytes read so far of all files of a sequence, for a progress display.
 pub(super) type Progress = Rc<Cell<u64>>;
 
-/// The format of a file.
+/// Describes the format of a file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Format<const N: usize> {
-    /// Columns, the stamp's included.
+    /// The number of columns, the stamp's included.
     pub columns: usize,
     /// The columns that are used; the stamp's is 0.
     pub used: [usize; N],
     /// Stamps per second.
     pub stamps_per_second: f64,
-    /// Samples per second that the part is said to give.
+    /// The nominal number of samples per second.
     pub nominal_hz: f64,
 }
 
-/// A row: its stamp, and the fields that are used.
+/// Holds a row: its stamp, and the fields that are used.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<const N: usize> {
     pub line: u64,
@@ -37,7 +37,7 @@ pub(super) struct Row<const N: usize> {
     pub fields: [f64; N],
 }
 
-/// A file being read.
+/// Reads a file row by row.
 pub(super) struct Rows<const N: usize> {
     path: String,
     format: Format<N>,
@@ -68,12 +68,12 @@ impl<const N: usize> Rows<N> {
         &self.path
     }
 
-    /// Stamps as seconds.
+    /// Converts stamps to seconds.
     pub fn seconds(&self, stamps: i64) -> f64 {
         stamps as f64 / self.format.stamps_per_second
     }
 
-    /// The next good row. Rows that are passed over are counted in the summary.
+    /// Returns the next good row. Skipped rows are counted in the summary.
     pub fn next_row(&mut self) -> Result<Option<Row<N>>, DataError> {
         loop {
             let io = |error: csv::Error| DataError::of(&self.path, std::io::Error::other(error).into());

@@ -1,13 +1,13 @@
-//! The summary of a sequence's files: every row that is skipped is counted here.
+//! This module summarises a sequence's files; every skipped row is counted here.
 
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// A gap is so many times the nominal period.
+/// A gap is longer than this many nominal periods.
 const GAP_PERIODS: f64 = 2.5;
 
-/// A count, and the line of its first occurrence.
+/// Holds a count, and the line of its first occurrence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Seen {
     /// Times.
@@ -23,7 +23,7 @@ impl Seen {
     }
 }
 
-/// Smallest and largest time between two stamps in a second, ms.
+/// Holds the smallest and largest time between two stamps in a second, ms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// Smallest.
@@ -32,7 +32,7 @@ pub struct Spread {
     pub most_ms: f64,
 }
 
-/// The summary of one file.
+/// Holds the summary of one file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StreamSummary {
     /// Its name.
@@ -45,11 +45,11 @@ pub struct StreamSummary {
     pub gaps: u64,
     /// The longest time between two stamps, s.
     pub longest_gap_s: f64,
-    /// Rows passed over because their stamp is that of the row before.
+    /// Rows skipped because their stamp is that of the row before.
     pub duplicates: Seen,
-    /// Rows passed over because a field is NaN or infinite.
+    /// Rows skipped because a field is NaN or infinite.
     pub not_finite: Seen,
-    /// Times that the counts jumped; the wheels were taken to turn on as before.
+    /// Times that the counts jumped; the wheels were assumed to keep their speed.
     pub resets: Seen,
     /// Times between stamps, for each second of the file.
     #[serde(skip)]
@@ -58,7 +58,7 @@ pub struct StreamSummary {
     clock: Clock,
 }
 
-/// The state of the stamps.
+/// Tracks the stamps of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Clock {
     per_second: f64,

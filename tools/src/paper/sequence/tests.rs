@@ -2,7 +2,7 @@ use super::*;
 use crate::simulate::layout;
 use std::path::PathBuf;
 
-/// A sequence in a folder of its own, which goes with it.
+/// Holds a sequence in a folder of its own, which is removed with it.
 struct Scratch(PathBuf);
 
 impl Scratch {
@@ -41,7 +41,7 @@ const FOG: &str = "sensor_data/fog.csv";
 const IMU: &str = "sensor_data/xsens_imu.csv";
 const ENCODER: &str = "sensor_data/encoder.csv";
 
-/// The field of a line.
+/// Replaces a field of a line.
 fn set(line: &mut String, column: usize, to: &str) {
     let mut fields: Vec<&str> = line.split(',').collect();
     fields[column] = to;
@@ -57,7 +57,7 @@ fn kaist_is_read_whole() {
     assert_eq!(sequence.in_gap, [0; 4]);
     assert_eq!(sequence.simulated.as_ref().map(|spec| spec.run), Some(5));
     assert!(!sequence.has_vendor, "the heading of a simulation is no vendor's");
-    // What the gyro turned is what its file adds up to.
+    // The gyro's turn is the sum of its file.
     let text = fs::read_to_string(scratch.0.join(FOG)).unwrap();
     let all: f64 = text.lines().map(|l| l.rsplit(',').next().unwrap().parse::<f64>().unwrap()).sum();
     let steps: f64 = sequence.steps.iter().map(|step| step.fog).sum();
@@ -240,7 +240,7 @@ fn nan_and_duplicates_are_counted_and_bridged() {
     assert!(text.contains("2 rows with NaN passed over (first: line 100)"), "{text}");
     assert!(text.contains("1 duplicate stamps passed over (first: line 302)"), "{text}");
     assert_eq!(sequence.steps.len(), whole.steps.len());
-    // The gyro's NaN takes no angle with it that its neighbours do not have.
+    // The gyro's NaN loses no angle that its neighbours do not have.
     scratch.edit(FOG, |lines| set(&mut lines[0], 3, "NaN"));
     assert_eq!(scratch.read().unwrap().files[1].not_finite.count, 1);
 }

@@ -1,31 +1,30 @@
-//! A stream that can be asked for its value at any time, in ascending order: on the straight
-//! line between the rows before and after.
+//! This module interpolates streams: a stream returns its value at any time, in ascending order, on the straight line
+//! between the rows before and after.
 //!
-//! What adds up (angle of a gyro, way of a wheel) is a stream of its sums, so that no part of it
-//! is lost or counted twice whatever the stamps do.
+//! Quantities that add up (angle of a gyro, way of a wheel) are streams of their sums, so that no part is lost or
+//! counted twice, whatever the stamps are.
 
 use super::rows::{Row, Rows};
 use super::summary::StreamSummary;
 use crate::drive::error::{DataError, DataFault};
 
-/// Makes a row's fields, at a time in s, into the values that are interpolated; keeps what it
-/// needs of the past.
+/// Converts a row's fields, at a time in s, to the values that are interpolated; it may keep state from row to row.
 pub(super) type Convert<const N: usize, const M: usize> =
     Box<dyn FnMut(&Row<N>, f64, &mut StreamSummary) -> [f64; M]>;
 
-/// A stream of M values, of whatever file.
+/// Gives M values of a file at ascending times.
 pub(super) trait Stream<const M: usize> {
-    /// Time of the first row, s since the epoch.
+    /// Returns the time of the first row, s since the epoch.
     fn first(&self) -> f64;
-    /// The value at a time, s since the epoch; `None` at the end of the file.
+    /// Returns the value at a time, s since the epoch; `None` at the end of the file.
     fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError>;
-    /// Time of the newest row that was read.
+    /// Returns the time of the newest row that was read.
     fn reached(&self) -> f64;
-    /// Reads the rest, so that the summary is of the whole file.
+    /// Reads the rest, so that the summary covers the whole file.
     fn finish(self: Box<Self>) -> Result<StreamSummary, DataError>;
 }
 
-/// A value in between.
+/// Holds an interpolated value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Value<const M: usize> {
     pub values: [f64; M],
@@ -33,7 +32,7 @@ pub(super) struct Value<const M: usize> {
     pub gap: f64,
 }
 
-/// A stream of M values from N fields of a file.
+/// Interpolates M values from N fields of a file.
 pub(super) struct Track<const N: usize, const M: usize> {
     rows: Rows<N>,
     convert: Convert<N, M>,
@@ -44,7 +43,7 @@ pub(super) struct Track<const N: usize, const M: usize> {
 }
 
 impl<const N: usize, const M: usize> Track<N, M> {
-    /// Reads the first row; without an epoch, that is it.
+    /// Reads the first row; without an epoch, its stamp becomes the epoch.
     pub fn new(mut rows: Rows<N>, epoch: Option<i64>, mut convert: Convert<N, M>) -> Result<Self, DataError> {
         let first = rows.next_row()?;
         let Some(row) = first else { return Err(DataError::of(rows.path(), DataFault::Empty)) };
@@ -54,7 +53,7 @@ impl<const N: usize, const M: usize> Track<N, M> {
         Ok(Self { rows, convert, epoch, first: time, before: now, after: now })
     }
 
-    /// Stamp of time zero.
+    /// Returns the stamp of time zero.
     pub fn epoch(&self) -> i64 {
         self.epoch
     }
@@ -96,7 +95,7 @@ impl<const N: usize, const M: usize> Stream<M> for Track<N, M> {
     }
 }
 
-/// An angle that goes on beyond pi: each step is taken the short way.
+/// Unwraps an angle beyond pi: each step is taken the short way.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Unwrap {
     last: Option<f64>,

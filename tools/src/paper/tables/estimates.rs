@@ -1,11 +1,10 @@
-//! The ways of getting a heading that the paper's tables compare: each makes of a sequence what
-//! was turned in every 10 ms.
+//! This module runs the methods that the paper's tables compare: each computes from a sequence the angle turned in
+//! every 10 ms.
 //!
-//! The paper's vendor filter runs inside the sensor and cannot be had. [`Method::VQF`] stands in for it
-//! where the data have no heading of the vendor's own: an orientation filter of the same kind
-//! (gyro integrated, levelled by the accelerometer, bias learnt at rest; Laidig and Seel, VQF,
-//! Information Fusion 91, 2023), without a magnetometer, once with its published defaults and once
-//! with limits of rest that a vehicle with its engine running keeps.
+//! The paper's vendor filter runs inside the sensor and is not available. [`Method::VQF`] stands in for it where the
+//! data have no vendor's heading: an orientation filter of the same kind (gyro integrated, levelled by the
+//! accelerometer, bias learnt at rest; Laidig and Seel, VQF, Information Fusion 91, 2023), without a magnetometer, once
+//! with its published defaults and once with limits of rest that a vehicle with its engine running keeps.
 
 use crate::drive::DT;
 use crate::drive::recording::Recording;
@@ -27,23 +26,23 @@ use gyronet::sample::PERIOD_US;
 use gyronet::units::AngularRate;
 use std::time::Instant;
 
-/// The estimate of a method on a sequence.
+/// Holds the estimate of a method on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// The method.
     pub method: Method,
-    /// Turned in each step from the first that is compared, rad.
+    /// The angle turned in each step, from the first that is compared, rad.
     pub turns: Vec<f64>,
     /// The run time, s.
     pub run_time: f64,
 }
 
-/// The estimates of all methods on a sequence.
+/// Holds the estimates of all methods on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {
     /// The first step that is compared: static initialisation is over.
     pub start: usize,
-    /// One for each method that could be run.
+    /// The estimates of the methods that could be run.
     pub methods: Vec<Estimate>,
     /// The reason why some methods could not be run.
     pub refused: Option<String>,
@@ -95,7 +94,7 @@ impl Estimates {
         self.add_pseudo_fog(sequence, network, tick);
     }
 
-    /// FoGNet on GyroNet's rate, where there is one; `tick` is called for each step.
+    /// Adds FoGNet on GyroNet's rate, if there is one; `tick` is called for each step.
     fn add_pseudo_fog(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, tick: impl FnMut()) {
         let Some(looped) = self.methods.iter().find(|estimate| estimate.method == Method::GYRONET_LOOP)
         else {
@@ -110,7 +109,7 @@ impl Estimates {
         self.methods.push(Estimate { method: Method::PSEUDO_FOG, turns, run_time });
     }
 
-    /// The methods that start from the inertial sensor.
+    /// Runs the methods that start from the inertial sensor.
     fn inertial(
         &mut self,
         sequence: &Sequence,
@@ -120,7 +119,7 @@ impl Estimates {
     ) {
         let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
-        // The paper's network alone: no zero-rate updates behind it.
+        // This is the paper's network alone, without zero-rate updates.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
         let (drive, alone_s) = timed(|| Replay::run(recording, &config, None, network, &mut tick));
         let wheels = WheelFrames::new(recording);
@@ -166,7 +165,7 @@ impl Estimates {
         self.add(Method::VQF, || vqf::rates(vqf::published(), samples()));
         self.add(Method::VQF_VEHICLE, || {
             let mut filter = vqf::published();
-            // Three times the spread that static initialisation allows: VQF looks at each sample.
+            // The limits are three times the spread that static initialisation allows, because VQF checks each sample.
             let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
             let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
             filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
@@ -174,7 +173,7 @@ impl Estimates {
         });
     }
 
-    /// Rates of all steps, rad/s.
+    /// Adds a method from the rates of all steps, rad/s.
     fn add(&mut self, method: Method, rates: impl FnOnce() -> Vec<f64>) {
         let (rates, run_time) = timed(rates);
         let turns = rates[self.start..].iter().map(|rate| rate * DT).collect();
@@ -182,20 +181,20 @@ impl Estimates {
     }
 }
 
-/// Returns what some work gives, and how long it took, s.
+/// Returns the result of some work and its run time, s.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let started = Instant::now();
     let result = work();
     (result, started.elapsed().as_secs_f64())
 }
 
-/// One of the rates of each step; where the board got no sample, the gyro's value in between, less
-/// what was last taken off.
+/// Returns one of the rates of each step; where the board got no sample, the interpolated gyro less the last
+/// correction.
 fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
     let mut steps = drive.steps.iter().peekable();
     let mut taken_off = 0.0;
     let rate = |(k, gyro): (usize, &f64)| {
-        // A sample's time is its step's.
+        // A sample's time is that of its step.
         while let Some(step) = steps.next_if(|step| step.time.0 <= k as u64 * PERIOD_US) {
             taken_off = gyro - which(step).rad_per_sec();
         }
@@ -204,7 +203,7 @@ fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate)
     gyro.iter().enumerate().map(rate).collect()
 }
 
-/// Rates of an unwrapped heading; the first step has none.
+/// Returns the rates of an unwrapped heading; zero in the first step.
 fn rates(headings: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut last = None;
     headings.map(|yaw| (yaw - last.replace(yaw).unwrap_or(yaw)) / DT).collect()

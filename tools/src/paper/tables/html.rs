@@ -1,4 +1,4 @@
-//! One HTML page with all tables and pictures; nothing is loaded from elsewhere.
+//! This module writes one HTML page with all tables and pictures; nothing is loaded from elsewhere.
 
 use super::pictures::Picture;
 use super::table::{Row, Table};

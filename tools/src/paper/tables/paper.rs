@@ -1,10 +1,10 @@
-//! The paper's printed results, and the means that its own rows give (X. Zhao et al., Learning to Compensate for
-//! the Drift and Error of Gyroscope in Vehicle Localization).
+//! This module holds the paper's printed results, and the means of its own rows (X. Zhao et al., Learning to Compensate
+//! for the Drift and Error of Gyroscope in Vehicle Localization).
 
-/// A line of figures.
+/// Holds a line of figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// Its name there.
+    /// The name of the line in the paper.
     pub name: &'static str,
     /// The figures.
     pub figures: &'static [f64],
@@ -74,7 +74,7 @@ pub const RUN_TIME: [Line; 3] =
 pub const NCLT: [Line; 2] =
     [line("FoG + odometry", &[41.98, 18.15]), line("FoGNet + odometry", &[38.64, 16.66])];
 
-/// Average of some lines, figure by figure.
+/// Returns the average of some lines, figure by figure.
 #[must_use]
 pub fn average(lines: &[Line]) -> Vec<f64> {
     let columns = lines.first().map_or(0, |line| line.figures.len());

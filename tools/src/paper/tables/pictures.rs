@@ -1,4 +1,4 @@
-//! The paper's figures 6, 7, 9, 10 and 11 for a sequence.
+//! This module draws the paper's figures 6, 7, 9, 10 and 11 for a sequence.
 
 use super::results::{Path, SequenceErrors};
 use crate::drive::DT;
@@ -8,24 +8,24 @@ use crate::plot::curve::range;
 use crate::plot::svg::{Axis, COLORS, Figure, Marks, Panel, PlotError, Stroke};
 use crate::simulate::layout::Layout;
 
-/// Width and height, pixels.
+/// A picture has this width and height, pixels.
 const SIZE: (u32, u32) = (1000, 640);
-/// The room around the lines, as a share of what they span.
+/// The margin around the lines is this share of their extent.
 const AIR: f64 = 0.05;
 
-/// A line with its name; `None` for the truth.
+/// Holds a line with its name; `None` for the truth.
 type Curve<'a> = (Option<&'a str>, Vec<(f64, f64)>);
 
-/// The words of a figure of one panel.
+/// Holds the labels of a figure with one panel.
 struct Labels<'a> {
     title: &'a str,
     x: &'a str,
     y: &'a str,
-    /// A metre is as long either way.
+    /// Whether both axes have the same scale.
     same_scale: bool,
 }
 
-/// A picture of a sequence.
+/// Holds a picture of a sequence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
     /// The part of its file's name that says what it shows.
@@ -43,7 +43,7 @@ pub struct Picture {
 pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Result<Vec<Picture>, PlotError> {
     let simulated = if errors.simulated { " (simulated)" } else { "" };
     let name = format!("{}{simulated}", errors.name);
-    // A gyro with its bias runs off any scale that shows the others.
+    // A gyro with its bias does not fit a scale that shows the others.
     let in_scale = |path: &&Path| path.method.is_none_or(|method| method != Method::RAW);
     let of = |gyro: Gyro| {
         let is_wanted = move |path: &&Path| path.method.is_none_or(|method| method.gyro == gyro);

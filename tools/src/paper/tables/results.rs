@@ -1,4 +1,4 @@
-//! Errors of every method on every sequence, and their means, from which the tables and the JSON are made.
+//! This module computes the errors of every method on every sequence, and their means, for the tables and the JSON.
 
 use super::estimates::Estimates;
 use crate::evaluate::methods::Method;
@@ -10,7 +10,7 @@ use gyronet::odometry::Track;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Errors of a method: of a sequence, or the mean of several.
+/// Holds the errors of a method on a sequence, or the mean over several.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Errors {
     /// Mean error of the yaw change in 1 s, rad.
@@ -31,31 +31,31 @@ pub struct Errors {
     pub run_time_s: f64,
 }
 
-/// Errors by the key of the method.
+/// Maps the key of a method to its errors.
 pub type ByMethod = BTreeMap<&'static str, Errors>;
 
-/// A path of a method, with the label of the method; the truth's method is `None`.
+/// Holds the path of a method; the truth's method is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
-    /// Whose.
+    /// The method.
     pub method: Option<Method>,
     /// Heading at each step, not wrapped, rad.
     pub yaw: Vec<f64>,
-    /// m.
+    /// The points of the path, m.
     pub points: Vec<Point>,
 }
 
-/// Errors on one sequence.
+/// Holds the errors on one sequence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceErrors {
     /// The sequence's name.
     pub name: String,
-    /// Whose layout.
+    /// The data set whose layout it has.
     pub layout: Layout,
-    /// The sequence is simulated.
+    /// Whether the sequence is simulated.
     pub simulated: bool,
-    /// Its sensors are not those of the paper's first sequences: urban18 and later, or a simulated device other than
-    /// the first.
+    /// Whether its sensors differ from those of the paper's first sequences: urban18 and later, or a simulated device
+    /// other than the first.
     pub other_devices: bool,
     /// The length of the comparison, s.
     pub seconds: f64,
@@ -72,13 +72,13 @@ pub struct SequenceErrors {
 }
 
 impl SequenceErrors {
-    /// Compares, and hands out the paths for pictures: the truth's first.
+    /// Compares the estimates with the truth; also returns the paths for pictures, the truth's first.
     #[must_use]
     pub fn new(sequence: &Sequence, estimates: &Estimates) -> (Self, Vec<Path>) {
         let steps = &sequence.steps[estimates.start..];
         let turns = &sequence.turns()[estimates.start..];
         let truth: Vec<Point> = steps.iter().map(|step| step.position).collect();
-        // Before the first turn that is compared.
+        // The heading is that before the first compared turn.
         let heading = steps.first().map_or(0.0, |step| step.yaw) - turns.first().copied().unwrap_or(0.0);
         let begin = estimates.start.checked_sub(1).map_or([0.0; 2], |k| sequence.steps[k].position);
         let (mut methods, mut order) = (ByMethod::new(), Vec::new());
@@ -163,7 +163,7 @@ impl Errors {
     }
 }
 
-/// Mean of each method over the sequences that all of them could be run on by it.
+/// Returns the mean of each method that could be run on all the sequences.
 #[must_use]
 pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod {
     let mut all: BTreeMap<&'static str, Vec<Errors>> = BTreeMap::new();
@@ -174,14 +174,14 @@ pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod
             all.entry(key).or_default().push(*errors);
         }
     }
-    // A mean over fewer sequences than another's cannot stand beside it.
+    // Means over different numbers of sequences cannot be compared.
     all.into_iter().filter(|(_, e)| e.len() == count).map(|(key, e)| (key, Errors::mean(&e))).collect()
 }
 
-/// The results in JSON.
+/// Holds the results in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
-    /// Some sequence is simulated.
+    /// Whether some sequence is simulated.
     pub simulated: bool,
     /// One entry for each sequence.
     pub sequences: Vec<SequenceErrors>,

@@ -1,11 +1,12 @@
-//! The paper's tables with our figures: rows of words and numbers, which [`super::text`] and [`super::html`] print.
+//! This module makes the paper's tables with our figures: rows of words and numbers, which [`super::text`] and
+//! [`super::html`] print.
 
 use super::paper::{self, Line};
 use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
 use crate::evaluate::methods::{Gyro, Method};
 use crate::simulate::layout::Layout;
 
-/// A row: a name and figures; `None` where there is none.
+/// Holds a row: a name and figures; `None` for a missing one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// The name of the row.
@@ -14,20 +15,20 @@ pub struct Row {
     pub figures: Vec<Option<f64>>,
 }
 
-/// A table.
+/// Holds a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Its number in the paper and its subject.
     pub title: String,
-    /// It holds figures of simulated drives.
+    /// Whether it holds figures of simulated drives.
     pub simulated: bool,
     /// Names of the columns of figures.
     pub columns: Vec<String>,
     /// Decimals of the figures.
     pub decimals: usize,
-    /// Ours.
+    /// Our rows.
     pub rows: Vec<Row>,
-    /// The paper's, with columns of its own.
+    /// The columns of the paper's rows.
     pub paper_columns: Vec<String>,
     /// The paper's rows.
     pub paper_rows: Vec<Row>,
@@ -66,7 +67,7 @@ fn some(set: &[&SequenceErrors], table: impl FnOnce(&[&SequenceErrors]) -> Table
     (!set.is_empty()).then(|| table(set))
 }
 
-/// The methods that some sequence has, in their order.
+/// Returns the methods that some sequence has, in their order.
 fn methods_of(set: &[&SequenceErrors], is_wanted: impl Fn(&Method) -> bool) -> Vec<Method> {
     let mut methods: Vec<Method> = Vec::new();
     for method in set.iter().flat_map(|sequence| &sequence.order) {
@@ -93,7 +94,7 @@ fn figures(errors: Option<&Errors>, of: &[fn(&Errors) -> f64]) -> Vec<Option<f64
     of.iter().map(|of| errors.map(of)).collect()
 }
 
-/// Table I, for either data set: the paper has it for KAIST alone.
+/// Makes Table I for either data set; the paper has it for KAIST alone.
 fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
     let means: ByMethod = mean(set.iter().copied());
     let of: [fn(&Errors) -> f64; 3] = [|e| e.mean_1s_rad, |e| e.final_rad, |e| e.final_unwrapped_rad];
@@ -134,7 +135,7 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
 
 const ATE: [fn(&Errors) -> f64; 2] = [|e| e.ate_m, |e| e.aligned_ate_m];
 
-/// Table II.
+/// Makes Table II.
 fn urban(set: &[&SequenceErrors]) -> Table {
     let is_wanted = |method: &Method| {
         method.gyro == Gyro::Fog || [Method::STATIC.key, Method::GYRONET.key].contains(&method.key)
@@ -173,7 +174,7 @@ fn urban(set: &[&SequenceErrors]) -> Table {
     }
 }
 
-/// Table IV.
+/// Makes Table IV.
 fn rivals(set: &[&SequenceErrors]) -> Table {
     let row = |name: &str, by: &ByMethod| Row {
         name: name.to_owned(),
@@ -201,17 +202,17 @@ fn rivals(set: &[&SequenceErrors]) -> Table {
     }
 }
 
-/// The differences of our FoGNet from the paper's.
+/// Explains the differences of our FoGNet from the paper's.
 const FOGNET_SIGN: &str = "Our FoGNet gives what the gyro has erred by, which is taken off; the paper's gives the prediction less the \
                            measurement, which is added.";
-/// The training data of the weights of the table's FoGNet.
+/// Names the training data of the weights of the table's FoGNet.
 const WEIGHTS: &str = "The bundled weights were trained on simulated sequences of KAIST's layout.";
 
 fn pairs<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
     labels.flat_map(|label| [format!("{label}: ATE"), String::from("aligned")]).collect()
 }
 
-/// Table III; without rows where no method of the list pads.
+/// Makes Table III; it has no rows if no method of the list pads.
 fn padding(set: &[&SequenceErrors]) -> Table {
     let means = mean(set.iter().copied());
     let rows =
@@ -230,7 +231,7 @@ fn padding(set: &[&SequenceErrors]) -> Table {
     }
 }
 
-/// Tables V and VII.
+/// Makes Tables V and VII.
 fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
     let means = mean(set.iter().copied());
     let rows = methods_of(set, |_| true).into_iter().map(|method| Row {
@@ -249,7 +250,7 @@ fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
     }
 }
 
-/// Table VI.
+/// Makes Table VI.
 fn run_time(set: &[&SequenceErrors]) -> Table {
     let hours = set.iter().map(|sequence| sequence.seconds).sum::<f64>() / 3600.0;
     let rows = methods_of(set, |_| true).into_iter().map(|method| Row {

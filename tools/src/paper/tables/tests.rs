@@ -20,7 +20,7 @@ impl WindowNetwork for Nothing {
     }
 }
 
-/// A sequence that is simulated and read back.
+/// Returns a sequence that is simulated and read back.
 fn sequence(name: &str, layout: Layout, seconds: u32) -> Sequence {
     let folder = std::env::temp_dir().join(format!("gyronet-tables-{}-{name}", std::process::id()));
     let spec = Spec { layout, name: name.into(), seconds, device: 1, run: 3 };
@@ -88,7 +88,7 @@ fn each_method_does_what_it_says() {
     let seconds = 57.0;
     assert!((final_rad("raw") - 0.002 * seconds).abs() < 1e-4, "the bias alone: {}", final_rad("raw"));
     assert!(final_rad("static") < 1e-4, "{}", final_rad("static"));
-    // A network that says nothing leaves static initialisation.
+    // Without a correction by the network, static initialisation remains.
     assert!((final_rad("gyronet") - final_rad("static")).abs() < 1e-5);
     assert!((final_rad("gyronet_online") - final_rad("static")).abs() < 1e-5);
     assert!((final_rad("gyronet_loop") - final_rad("static")).abs() < 1e-5);

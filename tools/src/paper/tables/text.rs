@@ -1,4 +1,4 @@
-//! Tables as text.
+//! This module prints tables as text.
 
 use super::table::{Row, Table};
 use std::fmt;

@@ -1,20 +1,20 @@
-//! The arrival of a message: its stamp is the logger's, not the part's.
+//! This module delays messages, because the stamp in a data set is the logger's, not the part's.
 
 use crate::random::Random;
 use crate::simulate::purpose::Purpose;
 use crate::simulate::vehicles::Delays;
 
-/// The messages of one part on their way.
+/// Delays the messages of one part.
 #[derive(Debug, Clone)]
 pub(super) struct Delay {
     delays: Delays,
     random: Random,
     last: f64,
-    /// The blockage that is on or comes next, from and to.
+    /// Begin and end of the current or next blockage.
     blocked: [f64; 2],
 }
 
-/// Two messages of a part are never nearer, s: what reading one takes.
+/// Two messages of a part are at least this far apart, s: reading one takes so long.
 const APART: f64 = 10e-6;
 
 impl Delay {

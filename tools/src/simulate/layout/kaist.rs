@@ -1,4 +1,4 @@
-//! KAIST Complex Urban: no headers, nanoseconds since 1970.
+//! This module writes the layout of KAIST Complex Urban: no headers, nanoseconds since 1970.
 
 use super::delay::Delay;
 use super::text::Rows;
@@ -9,15 +9,15 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// The first moment: some time in 2018.
+/// A sequence starts at this time, somewhere in 2018.
 const START_NS: i64 = 1_524_000_000_000_000_000;
-/// Counts of a revolution.
+/// A revolution has this many counts.
 const RESOLUTION: f64 = 4096.0;
-/// Increments of the fibre-optic gyro in 10 ms.
+/// The fibre-optic gyro sends this many increments in 10 ms.
 const INCREMENTS: u32 = 10;
-/// Somewhere in UTM, m.
+/// A sequence starts at this place in UTM, m.
 const ORIGIN: [f64; 3] = [355_000.0, 4_025_000.0, 60.0];
-/// The Earth's field, east, north, up, as a part of itself, and the noise of its measurement.
+/// The Earth's field, east, north, up, normalised, and the noise of its measurement.
 const FIELD: ([f64; 3], f64) = ([0.0, 0.6, -0.8], 0.003);
 
 pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path, mut tick: impl FnMut()) -> io::Result<()> {
@@ -48,7 +48,7 @@ pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path, mut tick: impl
 
         let now = truth.seconds + DT;
         let (force, rate) = drive.imu(&truth);
-        // Nobody knows the vendor's filter: this heading is the gyro's integral.
+        // The vendor's filter is not known: this heading is the gyro's integral.
         let yaw = heading.get_or_insert(truth.yaw);
         *yaw += rate[2] * DT;
         let attitude = [motion.roll, motion.pitch, *yaw];
@@ -81,7 +81,7 @@ fn calibration(wheels: &odometer::Config, folder: &Path) -> io::Result<()> {
     fs::write(folder.join("EncoderParameter.txt"), text)
 }
 
-/// x, y, z, w of roll, pitch and yaw, turned in the order yaw, pitch, roll.
+/// Returns the quaternion x, y, z, w of roll, pitch and yaw, turned in the order yaw, pitch, roll.
 fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     let half = |angle: f64| (libm::sin(angle / 2.0), libm::cos(angle / 2.0));
     let ((sr, cr), (sp, cp), (sy, cy)) = (half(roll), half(pitch), half(yaw));

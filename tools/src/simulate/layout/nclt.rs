@@ -1,5 +1,5 @@
-//! NCLT: no headers, microseconds since 1970, x forward, y right, z down; heading clockwise
-//! from north.
+//! This module writes the layout of NCLT: no headers, microseconds since 1970, x forward, y right, z down; heading
+//! clockwise from north.
 
 use super::delay::Delay;
 use super::text::Rows;
@@ -10,17 +10,17 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::io;
 use std::path::Path;
 
-/// The first moment: some time in 2012.
+/// A sequence starts at this time, somewhere in 2012.
 const START_US: i64 = 1_330_000_000_000_000;
-/// Rates that were measured on 2013-01-10, Hz.
+/// The rates are those measured on 2013-01-10, Hz.
 const IMU_HZ: f64 = 47.1;
 const WHEELS_HZ: f64 = 41.2;
-/// Longest blockage of the wheels, s: gaps of up to 201 ms were measured there.
+/// The longest blockage of the wheels, s: gaps of up to 201 ms were measured on that day.
 const WHEELS_LONGEST: f64 = 0.175;
 /// The Earth's field, east, north, up, Gauss, and the noise of its measurement.
 const FIELD: ([f64; 3], f64) = ([0.0, 0.19, -0.5], 0.003);
 
-/// A part slower than the ticks: it averages.
+/// Times a part that is slower than the ticks and averages over them.
 struct Slow {
     period: f64,
     next: f64,
@@ -94,7 +94,7 @@ pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path, mut tick: impl
     [imu_rows, fog_rows, wheel_rows, pose_rows].into_iter().try_for_each(Rows::finish)
 }
 
-/// x forward, y left, z up seen as x forward, y right, z down.
+/// Converts x forward, y left, z up to x forward, y right, z down.
 fn down([x, y, z]: [f64; 3]) -> [f64; 3] {
     [x, -y, -z]
 }

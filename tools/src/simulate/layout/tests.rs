@@ -12,7 +12,7 @@ fn spec(layout: Layout, seconds: u32) -> Spec {
     Spec { layout, name: "one".into(), seconds, device: 1, run: 7 }
 }
 
-/// All rows of a file, the stamp apart.
+/// Returns all rows of a file, with the stamp apart.
 fn rows(path: &Path) -> Vec<(i64, Vec<f64>)> {
     let text = fs::read_to_string(path).unwrap();
     let row = |line: &str| {
@@ -50,8 +50,8 @@ fn kaist_has_its_columns_and_rates() {
     fs::remove_dir_all(folder).unwrap();
 }
 
-/// The sum of the increments is the turn of the pose, but for the Earth's and the gyro's errors,
-/// and the counts are its way.
+/// The sum of the increments is the turn of the pose, except for the Earth's rate and the gyro's errors, and the counts
+/// give its way.
 #[test]
 fn kaist_sensors_agree_with_the_pose() {
     let folder = folder("agree");

@@ -1,10 +1,10 @@
-//! Fast output of rows of numbers: a sequence has one and a half million of them.
+//! This module writes rows of numbers fast, since a sequence has one and a half million of them.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// A file of rows.
+/// Writes a file of rows.
 pub(super) struct Rows {
     file: BufWriter<File>,
     line: Vec<u8>,
@@ -19,7 +19,7 @@ impl Rows {
         self.field(itoa::Buffer::new().format(value).as_bytes())
     }
 
-    /// The shortest digits that are the same f32.
+    /// Writes the shortest digits that read back as the same f32.
     pub fn single(&mut self, value: f64) -> &mut Self {
         // Adding zero makes -0 a 0.
         self.field(ryu::Buffer::new().format(value as f32 + 0.0).as_bytes())
@@ -32,7 +32,7 @@ impl Rows {
         self
     }
 
-    /// Rounded to 1e-9.
+    /// Writes a value rounded to 1e-9.
     pub fn double(&mut self, value: f64) -> &mut Self {
         self.field(ryu::Buffer::new().format((value * 1e9).round() / 1e9 + 0.0).as_bytes())
     }
