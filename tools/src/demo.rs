@@ -1,4 +1,4 @@
-//! All results of one drive: the summary that `gyronet demo` prints, and its page.
+//! This module collects the results of one drive, for the summary that `gyronet demo` prints and for its page.
 
 pub mod board;
 mod can_excerpt;
@@ -19,12 +19,12 @@ pub use can_excerpt::Message;
 pub use costs::Cost;
 pub use trajectory::{Path, Trajectories};
 
-/// The results of one drive.
+/// Holds the results of one drive.
 #[derive(Debug)]
 pub struct Demo<'a> {
     /// The drive.
     pub recording: &'a Recording,
-    /// The drive is simulated.
+    /// Whether the drive is simulated.
     pub simulated: bool,
     /// Its yaw rates.
     pub rates: &'a Rates,
@@ -34,7 +34,7 @@ pub struct Demo<'a> {
     pub trajectories: Option<Trajectories>,
     /// The messages of one sample.
     pub excerpt: Vec<Message>,
-    /// Time and memory.
+    /// The figures of time and memory.
     pub costs: Vec<Cost>,
     /// Messages of the whole drive.
     pub frames: u64,
@@ -42,7 +42,7 @@ pub struct Demo<'a> {
     pub board: Outcome,
 }
 
-/// The results as JSON.
+/// Holds the results for JSON.
 #[derive(Debug, Serialize)]
 pub struct Summary<'a> {
     name: &'a str,
@@ -63,7 +63,7 @@ pub struct Summary<'a> {
 }
 
 impl<'a> Demo<'a> {
-    /// Works out what the rates do not say. `config` is that of the bus.
+    /// Computes the results that the rates do not contain. `config` is that of the bus.
     #[must_use]
     pub fn new(
         recording: &'a Recording,
@@ -105,7 +105,7 @@ impl<'a> Demo<'a> {
         }
     }
 
-    /// The page.
+    /// Returns the page as HTML.
     #[must_use]
     pub fn page(&self) -> String {
         page::page(self)

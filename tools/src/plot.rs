@@ -1,5 +1,5 @@
-//! Pictures and pages of anything: [`svg`] draws figures for a file, [`page`] writes HTML with charts that can be
-//! zoomed. Neither knows what it shows; each product draws its own pictures with them.
+//! These modules make pictures and pages: [`svg`] draws figures for a file, [`page`] writes HTML with charts that can
+//! be zoomed. Neither depends on what it shows; each product draws its own pictures with them.
 
 pub mod curve;
 pub mod page;

@@ -1,4 +1,4 @@
-//! The firmware's cost on its processor is measured here. [`emulator`] runs an image in QEMU; [`mod@bench`] counts
+//! These modules measure the firmware's cost on its processor. [`emulator`] runs an image in QEMU; [`mod@bench`] counts
 //! instructions and modelled cycles of the networks and parsers, [`tasks`] those of every interrupt handler, from which
 //! [`schedule`] computes worst response times. [`size`] and [`stack`] read the image's ELF file.
 

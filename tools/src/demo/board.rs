@@ -1,8 +1,7 @@
-//! The firmware image in the emulator, on the beginning of the same drive.
+//! This module runs the firmware image in the emulator on the beginning of the same drive.
 //!
-//! The recording's samples go to the image as the bytes of an Xsens MTi, and its SLCAN lines are
-//! held against the library's for the samples in those bytes. Wheels stay away on both sides: the
-//! emulated board has no CAN.
+//! The recording's samples go to the image as the bytes of an Xsens MTi, and its SLCAN lines are compared with the
+//! library's for the same samples. Neither side gets wheels, because the emulated board has no CAN.
 
 use crate::drive::recording::Recording;
 use crate::drive::replay::{Replay, ReplayError};
@@ -19,15 +18,15 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Samples that the image is given: static initialisation and as much again behind it.
+/// The image gets this many samples: for static initialisation, and a good deal more.
 pub const SAMPLES: usize = 1_000;
-/// The longest wait for all messages of them: a few seconds, more on a busy machine.
+/// All their messages must come within this time: they take a few seconds, more on a busy machine.
 const LIMIT: Duration = Duration::from_secs(180);
-/// The sensor's line, and the one on which the messages go out.
+/// The sensor is on this line; the messages go out on the next one.
 const SENSOR: usize = 1;
 const SLCAN: usize = 2;
 
-/// The error of a comparison that cannot be made.
+/// The reason why the comparison cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BoardError {
@@ -48,7 +47,7 @@ pub enum BoardError {
         /// The reason.
         source: StackError,
     },
-    /// The recording does not come back from the sensor's bytes.
+    /// The recording does not pass through the sensor's bytes.
     #[error(transparent)]
     Via(#[from] ViaError),
     /// The drive has no corrected rate in so short a time.
@@ -56,16 +55,16 @@ pub enum BoardError {
     Replay(#[from] ReplayError),
 }
 
-/// The outcome of the comparison.
+/// Holds the outcome of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Outcome {
-    /// Something that it needs is missing on this machine.
+    /// The comparison was not run, because something is missing on this machine.
     NotRun {
         /// The missing thing, as a sentence.
         why: String,
     },
-    /// It ran.
+    /// The comparison was run.
     Run {
         /// The comparison of its bytes with the library's.
         agreement: Agreement,
@@ -74,7 +73,7 @@ pub enum Outcome {
     },
 }
 
-/// The image's messages against those of the library for the same bytes of the sensor.
+/// Compares the image's messages with those of the library for the same bytes of the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Agreement {
     /// Samples sent.
@@ -87,15 +86,15 @@ pub struct Agreement {
     pub payload_bytes: u64,
     /// Time that the emulator took, s.
     pub seconds: f64,
-    /// The first one, if any.
+    /// The first difference, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub difference: Option<Difference>,
 }
 
-/// A message that is not the same.
+/// Describes a message that differs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Difference {
-    /// Counted from 1.
+    /// The number of the message, from 1.
     pub number: usize,
     /// The message of the board.
     pub board: String,
@@ -103,14 +102,14 @@ pub struct Difference {
     pub host: String,
 }
 
-/// The size and cost of the image.
+/// Holds the size and cost of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Figures {
-    /// Bytes.
+    /// Flash, bytes.
     pub flash: u64,
-    /// Bytes.
+    /// Static RAM, bytes.
     pub static_ram: u64,
-    /// Bytes.
+    /// Stack, bytes.
     pub stack: u64,
     /// Instructions of one GyroNet window.
     pub window_instructions: Option<u64>,

@@ -1,4 +1,4 @@
-//! The messages of one sample in words.
+//! This module puts the messages of one sample into words.
 
 use crate::drive::replay::Replay;
 use embedded_can::{Frame, Id};
@@ -8,22 +8,22 @@ use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage, SIGMA_UNKNOWN}
 use gyronet::can::{DataFrame, j1939::Vdc2};
 use serde::Serialize;
 
-/// A message in words.
+/// Describes a message in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Message {
     /// The time of its sample since the recording's first, s.
     pub time: String,
     /// The name in `gyronet.dbc`.
     pub name: String,
-    /// Hexadecimal.
+    /// Identifier, hexadecimal.
     pub id: String,
-    /// Hexadecimal.
+    /// Data, hexadecimal.
     pub data: String,
     /// The content in words.
     pub says: String,
 }
 
-/// The messages that go out when the vehicle turns fastest.
+/// Returns the messages that are sent when the vehicle turns fastest.
 #[must_use]
 pub fn fastest_turn(drive: &Replay, config: Config) -> Vec<Message> {
     let rate = |index: &usize| drive.steps[*index].vehicle.prompt.rate.0.unsigned_abs();
@@ -43,7 +43,7 @@ pub fn fastest_turn(drive: &Replay, config: Config) -> Vec<Message> {
     step.frames.iter().filter_map(|sent| message(&sent.frame)).collect()
 }
 
-/// Name and content of a message.
+/// Returns the name and content of a message.
 fn read(frame: &DataFrame, config: &Config) -> Option<(String, String)> {
     let data = frame.data();
     if let Some(number) = LAYOUTS.iter().position(|layout| Id::Standard(layout.id) == frame.id()) {

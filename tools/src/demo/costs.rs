@@ -1,4 +1,5 @@
-//! Figures of time and memory: those that this command measures, and those that the emulator counts.
+//! This module gathers the figures of time and memory: those that this command measures, and those that the emulator
+//! counts.
 
 use super::board::{Figures, Outcome};
 use crate::drive::recording::Recording;
@@ -12,7 +13,7 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use serde::Serialize;
 
-/// A figure of time or memory.
+/// Holds a figure of time or memory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Cost {
     /// The quantity.
@@ -23,7 +24,7 @@ pub struct Cost {
     pub how: String,
 }
 
-/// Clock of the STM32F405, MHz.
+/// The STM32F405 runs at this clock, MHz.
 const CLOCK_MHZ: f64 = crate::target::parser_load::CLOCK_HZ * 1e-6;
 
 /// Returns the figures of a drive and of the image.

@@ -1,4 +1,4 @@
-//! The page of a drive.
+//! This module writes the page of a drive.
 
 use super::board::Outcome;
 use super::trajectory::Trajectories;
@@ -12,7 +12,7 @@ use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
 
-/// Whose curves are drawn, from back to front.
+/// The curves of these methods are drawn, from back to front.
 const DRAWN: [Method; 6] = [
     Method::RAW,
     Method::STATIC,
@@ -56,7 +56,7 @@ pub fn page(demo: &Demo<'_>) -> String {
     document(&format!("gyronet demo: {name}"), &body)
 }
 
-/// The few figures that matter most.
+/// Returns the few figures that matter most.
 fn facts(demo: &Demo<'_>) -> String {
     let mut facts = Vec::new();
     if let Some(errors) = demo.errors {
@@ -80,7 +80,7 @@ fn facts(demo: &Demo<'_>) -> String {
     format!("<dl class=\"facts\">\n{}</dl>\n", rows.collect::<String>())
 }
 
-/// Yaw and, with a reference, what each method is off by.
+/// Returns the charts of the yaw and, with a reference, of each method's error.
 fn yaw(demo: &Demo<'_>) -> String {
     let rates = demo.rates;
     let points = |values: Vec<f64>| rates.seconds.iter().copied().zip(values).collect::<Vec<(f64, f64)>>();
@@ -89,7 +89,7 @@ fn yaw(demo: &Demo<'_>) -> String {
     let mut errors: Vec<Curve> = Vec::new();
     for method in DRAWN {
         let yaw = integral(&rates.rates[method]);
-        // What still has its bias may run off the errors' scale.
+        // A method that keeps its bias may leave the errors' scale.
         let in_scale = method != Method::RAW;
         let curve = |note, values, in_scale| Curve {
             class: method.key,
@@ -144,7 +144,7 @@ fn paths(trajectories: &Trajectories) -> String {
             in_scale: path.method != Some(Method::RAW),
         })
         .collect();
-    // The reference behind what is held against it.
+    // The reference is drawn behind the methods compared with it.
     curves.sort_by_key(|curve| (curve.in_scale, curve.class != REFERENCE));
     let chart =
         Chart { title: "Seen from above", axes: "m, from where it started", same_scale: true, curves }.html();

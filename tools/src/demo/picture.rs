@@ -1,4 +1,4 @@
-//! One picture of a drive: the yaw of each method, and below it the error of each.
+//! This module draws one picture of a drive: the yaw of each method, and below it the error of each.
 
 use crate::evaluate::heading_error::Reference;
 use crate::evaluate::methods::Method;
@@ -7,11 +7,12 @@ use crate::evaluate::rates::Rates;
 use crate::plot::curve::range;
 use crate::plot::svg::{Axis, COLORS, Color, Figure, Marks, Panel, PlotError, Stroke};
 
-/// Width and height, pixels.
+/// The picture has this width and height, pixels.
 const SIZE: (u32, u32) = (1200, 930);
-/// The room above and below the lines, as a share of what they span.
+/// The margin above and below the lines is this share of their extent.
 const AIR: f64 = 0.06;
-/// The colours and widths of the methods. The wider line is drawn first, so that one under another still shows.
+/// Lists the colours and widths of the methods. The wider line is drawn first, so that a line under another remains
+/// visible.
 const STYLES: [(Method, Color, u32); 6] = [
     (Method::RAW, COLORS[4], 2),
     (Method::STATIC, COLORS[0], 2),
@@ -32,7 +33,7 @@ pub fn svg(title: &str, rates: &Rates) -> Result<String, PlotError> {
     };
     let truth = rates.reference.as_ref().and_then(Reference::rate).map(integral);
     let (mut legend, mut angles, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-    // The corrected methods set the scale; a method that keeps its bias may run off it.
+    // The corrected methods set the scale; a method that keeps its bias may leave it.
     let mut scale = Vec::new();
     for (method, color, width) in STYLES {
         let (yaw, stroke) = (integral(&rates.rates[method]), Stroke::solid(color, width));

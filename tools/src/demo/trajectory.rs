@@ -1,4 +1,4 @@
-//! The path of the vehicle by each method: its yaw rate and the speeds of the wheels.
+//! This module computes the path of the vehicle by each method, from its yaw rate and the speeds of the wheels.
 
 use crate::drive::DT;
 use crate::drive::recording::Recording;
@@ -10,17 +10,17 @@ use crate::evaluate::trajectory_error::{Point, TrajectoryError};
 use gyronet::odometry::Track;
 use serde::Serialize;
 
-/// The methods whose paths are drawn.
+/// The paths of these methods are drawn.
 const METHODS: [Method; 3] = [Method::RAW, Method::STATIC, Method::NAVIGATION];
 
-/// A path.
+/// Holds the path of a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Path {
     /// The method, or `None` for the reference.
     #[serde(serialize_with = "key")]
     pub method: Option<Method>,
-    /// m, from where static initialisation ended; turned by right angles so that the way lies
-    /// across a page.
+    /// The points, m, from where static initialisation ended, turned by right angles so that the path lies across a
+    /// page.
     #[serde(skip)]
     pub points: Vec<Point>,
     /// Distance to the reference's path, RMS, m.
@@ -32,12 +32,12 @@ fn key<S: serde::Serializer>(method: &Option<Method>, serializer: S) -> Result<S
     serializer.serialize_str(method.map_or("reference", |method| method.key))
 }
 
-/// The paths of a drive.
+/// Holds the paths of a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectories {
-    /// The reference's first, where there is one.
+    /// The paths, the reference's first if there is one.
     pub paths: Vec<Path>,
-    /// Wheels that the speed is the mean of.
+    /// The number of wheels that the speed is the mean of.
     pub wheels: usize,
     /// The way, m.
     pub metres: f64,
@@ -72,7 +72,7 @@ impl Trajectories {
     }
 }
 
-/// Turns all paths by the same right angles: the farthest point of the first one to the right.
+/// Turns all paths by the same right angles, so that the farthest point of the first one lies to the right.
 fn lay_across(paths: &mut [Path]) {
     let Some(first) = paths.first() else { return };
     let reach =

@@ -1,4 +1,4 @@
-//! The points of a curve: thinned, and their range.
+//! This module thins the points of a curve and finds their range.
 
 /// Returns every n-th point so that about `most` are left, and the last one.
 pub fn thinned(
@@ -10,7 +10,8 @@ pub fn thinned(
     points.step_by(step).chain(last)
 }
 
-/// Returns the least and the greatest value with a share of their distance as air on either side; 0 to 1 for no values.
+/// Returns the least and the greatest value with a share of their distance as a margin on either side; 0 to 1 for no
+/// values.
 pub fn range(values: impl Iterator<Item = f64>, air: f64) -> (f64, f64) {
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
     if low > high {

@@ -1,4 +1,5 @@
-//! One HTML page that loads nothing from elsewhere and can be read without a script; the script adds zooming.
+//! This module writes an HTML page that loads nothing from elsewhere and can be read without a script; the script adds
+//! zooming.
 
 pub mod chart;
 

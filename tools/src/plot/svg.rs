@@ -1,7 +1,7 @@
-//! Figures as SVG: panels of lines, bars or dots under a title and a legend.
+//! This module draws figures as SVG: panels of lines, bars or dots under a title and a legend.
 //!
-//! A figure knows nothing of drives or faults: whoever draws one gives points, ranges and names. Lines are thinned to
-//! about one point for each pixel and cut at the edges of their panel, because SVG would draw them beyond.
+//! A figure does not depend on drives or faults: the caller gives points, ranges and names. Lines are thinned to about
+//! one point for each pixel and cut at the edges of their panel, because SVG would draw them beyond.
 
 use super::curve::thinned;
 use plotters::coord::Shift;
@@ -9,12 +9,12 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::Color as _;
 
-/// A colour.
+/// Holds a colour.
 pub type Color = RGBColor;
 type Failure = DrawingAreaErrorKind<std::io::Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// The error of a figure that cannot be drawn.
+/// The reason why a figure cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot draw the picture: {0}")]
 pub struct PlotError(#[from] Failure);
@@ -24,7 +24,7 @@ const LEGEND_ROW: u32 = 26;
 const LEGEND_COLUMNS: usize = 3;
 const FONT: &str = "sans-serif";
 const GREY: Color = RGBColor(90, 90, 90);
-/// Colours that the colour-blind can tell apart (Okabe and Ito, 2008).
+/// The colour-blind can distinguish these colours (Okabe and Ito, 2008).
 pub const COLORS: [Color; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -35,10 +35,10 @@ pub const COLORS: [Color; 8] = [
     RGBColor(150, 150, 150),
     RGBColor(120, 80, 30),
 ];
-/// Dash and gap of the lines that follow once all colours are used, pixels.
+/// Once all colours are used, lines have these dashes and gaps, pixels.
 const DASHES: [(u32, u32); 2] = [(12, 6), (3, 5)];
 
-/// The look of a line.
+/// Describes the look of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stroke {
     color: Color,
@@ -47,7 +47,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// The look of the truth: black.
+    /// The truth is drawn like this: black.
     pub const TRUTH: Self = Self::solid(BLACK, 3);
 
     /// Returns a solid line of a width in pixels.
@@ -56,14 +56,14 @@ impl Stroke {
         Self { color, width, dash: None }
     }
 
-    /// Returns one look after another, no two alike: all colours solid, then all of them in dashes.
+    /// Returns looks that all differ: all colours solid, then all of them dashed.
     pub fn distinct() -> impl Iterator<Item = Self> {
         let dashes = [None].into_iter().chain(DASHES.map(Some));
         dashes.flat_map(|dash| COLORS.map(|color| Self { color, width: 2, dash })).cycle()
     }
 }
 
-/// The marks of one series.
+/// Holds the marks of one series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Marks {
     /// A line through points.
@@ -74,7 +74,7 @@ pub enum Marks {
     Dots(Vec<(f64, f64, Color)>),
 }
 
-/// One axis of a panel.
+/// Describes one axis of a panel.
 pub struct Axis<'a> {
     /// The quantity and its unit.
     pub label: &'a str,
@@ -96,7 +96,7 @@ impl<'a> Axis<'a> {
     }
 }
 
-/// One coordinate system.
+/// Holds one coordinate system.
 pub struct Panel<'a> {
     /// The axis to the right.
     pub x: Axis<'a>,
@@ -106,13 +106,13 @@ pub struct Panel<'a> {
     pub series: Vec<Marks>,
 }
 
-/// A figure.
+/// Describes a figure.
 pub struct Figure<'a> {
     /// The text above it.
     pub title: &'a str,
     /// Its width and height, pixels.
     pub size: (u32, u32),
-    /// Its panels stand side by side; otherwise they stand one below the other.
+    /// Whether its panels stand side by side; otherwise they stand one below the other.
     pub side_by_side: bool,
     /// The names of its lines.
     pub legend: Vec<(String, Stroke)>,
@@ -131,7 +131,7 @@ impl Figure<'_> {
         Ok(svg)
     }
 
-    /// Widens the ranges of the only panel until a metre is as long either way.
+    /// Widens the ranges of the only panel until both axes have the same scale.
     pub fn square(&mut self) {
         let (width, height) = (self.size.0, self.size.1 - TITLE_HEIGHT - legend_height(self.legend.len()));
         for Panel { x, y, .. } in &mut self.panels {

@@ -11,7 +11,7 @@ use super::route::{Route, Way};
 use crate::random::Random;
 use std::f64::consts::TAU;
 
-/// m/s^2.
+/// Standard gravity, m/s^2.
 pub(super) const GRAVITY: f64 = 9.80665;
 
 /// Holds the parameters of a car and its driver.
@@ -69,7 +69,7 @@ impl Config {
 /// Holds the readings of a perfect, level part at the car's centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// m/s^2.
+    /// Specific force, m/s^2.
     pub specific_force: [f64; 3],
     /// rad/s.
     pub angular_rate: [f64; 3],

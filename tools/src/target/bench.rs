@@ -1,8 +1,8 @@
-//! The bench image in the emulator, and the counts in its output.
+//! This module runs the bench image in the emulator and reads the counts in its output.
 //!
-//! With a C compiler at hand, QEMU's plugin `tools/bench/m4count.c` counts instructions exactly
-//! and models Cortex-M4 cycles. Without one, instructions come from the image's own SysTick
-//! under `-icount shift=0`, where an instruction takes a nanosecond: good to 6 instructions.
+//! With a C compiler at hand, QEMU's plugin `tools/bench/m4count.c` counts instructions exactly and models Cortex-M4
+//! cycles. Without one, instructions come from the image's own SysTick under `-icount shift=0`, where an instruction
+//! takes a nanosecond: that is accurate to 6 instructions.
 
 use std::ffi::OsStr;
 use std::io::Read;
@@ -11,21 +11,21 @@ use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// SysTick of the emulated STM32F405, ticks per 1000 instructions (168 MHz, 1 instruction/ns).
+/// SysTick of the emulated STM32F405 counts this many ticks per 1000 instructions (168 MHz, 1 instruction/ns).
 const TICKS_PER_1000: u64 = 168;
-/// A hung image ends here, and a build that gets nowhere.
+/// A hung image or build is ended after this time.
 const LIMIT: Duration = Duration::from_secs(900);
 const POLL: Duration = Duration::from_millis(5);
-/// The images that count, one after the other.
+/// These images count, one after the other.
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
-/// The images that are flashed.
+/// These images are flashed.
 const FLASHED: [&str; 2] = ["coprocessor", "bringup"];
 /// The emulated board.
 pub const MACHINE: &str = "netduinoplus2";
 /// The image's target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The error of a bench that cannot be run.
+/// The reason why a bench cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// A program could not be started.
@@ -50,12 +50,12 @@ pub enum BenchError {
         /// The program.
         program: String,
     },
-    /// The image printed something else than expected.
+    /// The image printed an unexpected line.
     #[error("the bench image printed an unexpected line: {0}")]
     Line(String),
 }
 
-/// The counts of one region of the image.
+/// Holds the counts of one region of the image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Count {
     /// The image's name for it.
@@ -70,7 +70,7 @@ pub struct Count {
     pub stack: u64,
 }
 
-/// All counts of one run, and the sizes that the image prints.
+/// Holds all counts of one run, and the sizes that the image prints.
 #[derive(Debug, Clone, Default)]
 pub struct Counts {
     /// The regions in the order in which they ran.
@@ -80,25 +80,25 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Puts what another image has counted behind.
+    /// Appends the counts of another image.
     pub fn extend(&mut self, other: Self) {
         self.regions.extend(other.regions);
         self.sizes.extend(other.sizes);
     }
 
-    /// The first region of a name.
+    /// Returns the first region of a name.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Count> {
         self.regions.iter().find(|count| count.name == name)
     }
 
-    /// Returns whether instructions were counted one by one; otherwise they are good to six.
+    /// Returns whether instructions were counted one by one; otherwise they are accurate to six.
     #[must_use]
     pub fn exact(&self) -> bool {
         self.regions.iter().all(|count| count.cycles.is_some())
     }
 
-    /// Returns whether all windows of a network cost the same, as they must whatever they hold.
+    /// Returns whether all windows of a network cost the same, as they must for any input.
     #[must_use]
     pub fn constant(&self) -> bool {
         let tolerance = if self.exact() { 0 } else { 12 };
@@ -115,7 +115,7 @@ impl Counts {
     }
 }
 
-/// The root of the workspace that this crate was built in: images are built from there.
+/// Returns the root of the workspace that this crate was built in: images are built from there.
 #[must_use]
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -127,7 +127,7 @@ pub fn workspace() -> PathBuf {
 pub fn target_folder() -> PathBuf {
     let program = std::env::current_exe().ok();
     let folder = program.as_deref().and_then(|program| program.ancestors().nth(2));
-    // Cargo marks its folder so.
+    // Cargo marks its folder with this file.
     let cargo = folder.filter(|folder| folder.join("CACHEDIR.TAG").is_file());
     cargo.map_or_else(|| workspace().join("target"), Path::to_owned)
 }
@@ -135,7 +135,7 @@ pub fn target_folder() -> PathBuf {
 /// Checks that rustc has a standard library for the target.
 ///
 /// # Errors
-/// What is missing, as a sentence.
+/// A sentence that says what is missing.
 pub fn target_installed(target: &str) -> Result<(), String> {
     if !workspace().join("memory.x").is_file() {
         return Err("the repository that this program was built in is gone".into());
@@ -154,7 +154,7 @@ pub fn target_installed(target: &str) -> Result<(), String> {
     }
 }
 
-/// Builds an image of the firmware for the emulated board under `folder` and returns where it lies.
+/// Builds an image of the firmware for the emulated board under `folder` and returns its path.
 ///
 /// # Errors
 /// [`BenchError`] with the compiler's output.
@@ -175,7 +175,7 @@ pub fn build_for(
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
     cargo.current_dir(workspace).args(["build", "--release", "--quiet", "-p", "gyronet", "--bin", image]);
     if FLASHED.contains(&image) {
-        // As `cargo fw` and `cargo bringup` do.
+        // `cargo fw` and `cargo bringup` do the same.
         cargo.args(["--config", "profile.release.opt-level='s'"]);
     }
     cargo.args(["--features", board, "--target", target, "--target-dir"]).arg(folder);
@@ -183,7 +183,7 @@ pub fn build_for(
     Ok(folder.join(target).join("release").join(image))
 }
 
-/// Runs the bench image with the instruction counter, or without where it is not to be had.
+/// Runs the bench image with the instruction counter, or without it if it cannot be built or loaded.
 ///
 /// # Errors
 /// [`BenchError`].
@@ -195,8 +195,8 @@ pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
     }
 }
 
-/// The policies of the flash accelerator that ST's manual leaves open: a name, and the counter's options for it. The
-/// first one is the model's.
+/// Lists the policies of the flash accelerator that ST's manual leaves open: a name, and the counter's options for it.
+/// The model uses the first one.
 pub const POLICIES: [(&str, &str); 4] = [
     ("least recently used", ""),
     ("first in, first out", ",policy=fifo"),
@@ -204,7 +204,7 @@ pub const POLICIES: [(&str, &str); 4] = [
     ("both", ",policy=fifo,prefetched=kept"),
 ];
 
-/// Counts of the bench image under each of [`POLICIES`].
+/// Returns the counts of the bench image under each of [`POLICIES`].
 ///
 /// # Errors
 /// [`BenchError`], also where there is no C compiler.
@@ -218,7 +218,7 @@ pub fn measure_policies(workspace: &Path, image: &Path) -> Result<Vec<Counts>, B
     counts.collect()
 }
 
-/// Compiles the instruction counter; `None` where there is no C compiler.
+/// Compiles the instruction counter; `None` without a C compiler.
 pub fn plugin(workspace: &Path) -> Option<PathBuf> {
     let folder = workspace.join("target");
     std::fs::create_dir_all(&folder).ok()?;
@@ -230,7 +230,7 @@ pub fn plugin(workspace: &Path) -> Option<PathBuf> {
     run(&mut cc).is_ok().then_some(library)
 }
 
-/// Runs the bench image and pairs its lines with what was counted.
+/// Runs the bench image and pairs its lines with the counts.
 fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
     let (stdout, stderr) = match plugin {
         Some(plugin) => emulate(MACHINE, image, &["-plugin", &plugin.display().to_string()])?,
@@ -261,7 +261,7 @@ fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
     Ok(counts)
 }
 
-/// Runs an image on a machine of the emulator's until it ends by itself; what it printed, and what the emulator did.
+/// Runs an image on an emulated machine until it ends by itself; returns what the image and the emulator printed.
 ///
 /// # Errors
 /// [`BenchError`], also when the image reports a failure.
@@ -272,13 +272,13 @@ pub fn emulate(machine: &str, image: &Path, arguments: &[&str]) -> Result<(Strin
     run(qemu.args(arguments).arg("-kernel").arg(image))
 }
 
-/// The number behind `key` in a line.
+/// Returns the number behind `key` in a line.
 pub(crate) fn field(line: &str, key: &str) -> Option<u64> {
     let (_, rest) = line.split_once(key)?;
     rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
 }
 
-/// Runs a program to its end; its output, or its error output as an error.
+/// Runs a program to its end; returns its output, or its error output as an error.
 fn run(command: &mut Command) -> Result<(String, String), BenchError> {
     let program = command.get_program().to_string_lossy().into_owned();
     let start = |source| BenchError::Start { program: program.clone(), source };
@@ -302,11 +302,11 @@ fn run(command: &mut Command) -> Result<(String, String), BenchError> {
     if status.success() { Ok((stdout, stderr)) } else { Err(BenchError::Failed { program, output: stderr }) }
 }
 
-/// Reads to the end, beside what else there is to do: a full pipe would hold the program.
+/// Reads to the end in a thread, because a full pipe would block the program.
 fn collect(source: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
-        // What cannot be read is missing from the message, no more.
+        // Output that cannot be read is only missing from the message.
         let _ = source.map(|mut source| source.read_to_end(&mut bytes));
         String::from_utf8_lossy(&bytes).into_owned()
     })

@@ -1,11 +1,10 @@
-//! The emulated board: QEMU's `netduinoplus2`, an STM32F405 with its serial lines on TCP.
+//! This module runs the emulated board: QEMU's `netduinoplus2`, an STM32F405 with its serial lines on TCP.
 //!
-//! This side listens on ports that the system picks, and QEMU connects to them before the
-//! machine starts: no port is guessed, and nothing that the board sends is lost. What is sent to
-//! a receiver that the image has not switched on yet would be lost, as on a desk; so
-//! [`Board::send`] first looks at its enable bits through QEMU's test port. Every wait has a
-//! limit, and QEMU is killed when the [`Board`] goes. Bytes travel at the host's pace, not at a
-//! baud rate.
+//! This side listens on ports that the system picks, and QEMU connects to them before the machine starts: no port is
+//! guessed, and nothing that the board sends is lost. Bytes sent to a receiver that the image has not switched on yet
+//! would be lost, as on real hardware; so [`Board::send`] first checks its enable bits through QEMU's test port. Every
+//! wait has a limit, and QEMU is killed when the [`Board`] is dropped. Bytes travel at the host's pace, not at a baud
+//! rate.
 
 mod process;
 
@@ -18,21 +17,21 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const PROGRAM: &str = "qemu-system-arm";
-/// The time that QEMU has to connect its lines, and the image to switch a receiver on.
+/// QEMU must connect its lines, and the image switch a receiver on, within this time.
 const START: Duration = Duration::from_secs(20);
 const POLL: Duration = Duration::from_millis(5);
-/// The time that a client has to speak first.
+/// A client must send first within this time.
 const HELLO: Duration = Duration::from_secs(2);
 
-/// Control register 1 of USART 1 to 6 (RM0090, table 1 and 30.6.4), and its bits UE and RE.
+/// Control register 1 of USART 1 to 6 is at these addresses (RM0090, table 1 and 30.6.4); its bits UE and RE follow.
 const CR1: [u32; 6] = [0x4001_100C, 0x4000_440C, 0x4000_480C, 0x4000_4C0C, 0x4000_500C, 0x4001_140C];
 const RECEIVER_ENABLED: u32 = 1 << 13 | 1 << 2;
-/// Status register, which lies before it; its bit TXE. The emulated one takes a word beyond ten
-/// bits as a mask, any other as a value with TXE set.
+/// The status register lies this far before control register 1; its bit TXE follows. The emulated register takes a word
+/// beyond ten bits as a mask, any other as a value with TXE set.
 const SR_BEFORE_CR1: u32 = 0x0C;
 const ALL_BUT_TXE: u32 = !(1 << 7);
 
-/// The error of an emulator or its image.
+/// The reason why the emulator or its image failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EmulatorError {
@@ -52,7 +51,7 @@ pub enum EmulatorError {
     },
 }
 
-/// The result of a call of the emulator.
+/// Holds the result of a call to the emulator.
 pub type Result<T> = std::result::Result<T, EmulatorError>;
 
 /// Checks that QEMU can be run.
@@ -71,7 +70,7 @@ fn split(bytes: &[u8], end: u8) -> Vec<Vec<u8>> {
     lines
 }
 
-/// An emulated board that runs an image.
+/// Controls an emulated board that runs an image.
 #[derive(Debug)]
 pub struct Board {
     process: Process,
@@ -80,11 +79,11 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts QEMU with an image and its first `usarts` serial lines (1 to 6) connected;
-    /// `arguments` come behind QEMU's own, and hold where they contradict them.
+    /// Starts QEMU with an image and its first `usarts` serial lines (1 to 6) connected; `arguments` come after the
+    /// default ones and override them.
     ///
     /// # Errors
-    /// [`EmulatorError`], with QEMU's own words.
+    /// [`EmulatorError`], with QEMU's own message.
     pub fn boot(image: &Path, usarts: usize, arguments: &[&str]) -> Result<Self> {
         let listen = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
         let port = |listener: &TcpListener| listener.local_addr().map(|address| address.port());
@@ -99,8 +98,8 @@ impl Board {
             .args(["-monitor", "stdio", "-qtest-log", "/dev/null"])
             .args(["-qtest", &format!("tcp:127.0.0.1:{}", port(&registers)?)])
             .args(arguments);
-        // A multiplexer of one: it keeps up to 32 bytes, so that QEMU need not be woken for each of
-        // them, which takes longer the busier the host is. Its escape character is none of a byte.
+        // A multiplexer with one client buffers up to 32 bytes, so that QEMU need not be woken for each of them, which
+        // takes longer the busier the host is. Its escape character is no byte value.
         command.args(["-echr", "256"]);
         for (n, listener) in listeners.iter().enumerate() {
             let socket =
@@ -117,8 +116,7 @@ impl Board {
         Ok(Self { process, registers, usarts })
     }
 
-    /// Sends bytes into USART `n` (1 to 6) once its receiver is on, waiting while the board
-    /// takes none.
+    /// Sends bytes into USART `n` (1 to 6) once its receiver is on, waiting while the board accepts none.
     ///
     /// # Errors
     /// When the receiver stays off, or takes no byte for `limit`.
@@ -133,10 +131,10 @@ impl Board {
         sent.map_err(|error| self.process.failed(format!("USART{n} does not take the bytes: {error}")))
     }
 
-    /// Waits until what USART `n` has sent since the start is enough.
+    /// Waits until `enough` accepts the bytes that USART `n` has sent since the start.
     ///
     /// # Errors
-    /// When it is not within `limit`.
+    /// When that does not happen within `limit`.
     pub fn await_sent(&self, n: usize, limit: Duration, enough: impl FnMut(&[u8]) -> bool) -> Result<()> {
         if self.usarts[n - 1].received.holds(limit, enough) {
             Ok(())
@@ -162,10 +160,10 @@ impl Board {
         Ok(split(&bytes, end))
     }
 
-    /// Returns the lines of USART `n` once they are enough.
+    /// Returns the lines of USART `n` once `enough` accepts them.
     ///
     /// # Errors
-    /// When they are not within `limit`.
+    /// When that does not happen within `limit`.
     pub fn lines_until(
         &self,
         n: usize,
@@ -189,12 +187,12 @@ impl Board {
         self.ask(&format!("writel {:#x} {value:#x}", CR1[n - 1] - SR_BEFORE_CR1)).map(drop)
     }
 
-    /// Returns an address at which one TCP client can talk to USART `n` and reads everything that it has sent since
-    /// the start. The bytes come once the client has sent something, or nothing for a while: pyserial discards what is
-    /// there when it opens a line.
+    /// Returns an address at which one TCP client can talk to USART `n` and reads everything that it has sent since the
+    /// start. The bytes come once the client has sent something, or has been quiet for a while: pyserial discards what
+    /// is there when it opens a line.
     ///
     /// # Errors
-    /// When the system gives no port.
+    /// When the system provides no port.
     pub fn serve(&mut self, n: usize) -> Result<SocketAddr> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         let address = listener.local_addr()?;
@@ -224,7 +222,7 @@ impl Board {
         word.ok_or_else(|| self.process.failed(format!("the test port answers {answer:?}")))
     }
 
-    /// Returns the answer of QEMU's test port to a command, behind its "OK".
+    /// Returns the answer of QEMU's test port to a command, without its "OK".
     fn ask(&mut self, command: &str) -> Result<String> {
         let Line { stream, received } = &mut self.registers;
         let asked = received.wait(Duration::ZERO, |_| true).0.len();
@@ -253,7 +251,7 @@ impl Board {
         }
     }
 
-    /// Ends QEMU in order, so that its plugins can print, and returns everything that it, and the image through
+    /// Ends QEMU cleanly, so that its plugins can print, and returns everything that QEMU, and the image through
     /// semihosting, have written to standard error.
     ///
     /// # Errors

@@ -1,11 +1,11 @@
-//! The parsers' share of the processor, from the counts of the bench image.
+//! This module computes the parsers' share of the processor from the counts of the bench image.
 
 use crate::target::bench::Counts;
 
-/// Clock of the STM32F405, Hz.
+/// The STM32F405 runs at this clock, Hz.
 pub const CLOCK_HZ: f64 = 168e6;
 
-/// Kinds of frames that the image measures, and how many of them come in a second.
+/// Lists the kinds of frames that the image measures, and how many of each come in a second.
 pub const FRAMES: [(&str, u32); 8] = [
     ("sensor/dsp1760_frame", 1_000),
     ("sensor/dsp1760_timed_frame", 1_000),
@@ -17,7 +17,7 @@ pub const FRAMES: [(&str, u32); 8] = [
     ("sensor/adis16465_burst", 100),
 ];
 
-/// The cost of one kind of frame.
+/// Holds the cost of one kind of frame.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ParserLoad {
     /// The image's name for it.
@@ -35,7 +35,7 @@ pub struct ParserLoad {
 }
 
 impl ParserLoad {
-    /// Returns all kinds that the image has measured.
+    /// Returns the costs of all kinds that the image has measured.
     #[must_use]
     pub fn all(counts: &Counts) -> Vec<Self> {
         let load = |(name, hertz): (&str, u32)| {
@@ -53,7 +53,7 @@ impl ParserLoad {
         FRAMES.into_iter().filter_map(load).collect()
     }
 
-    /// Part of the processor's time, modelled at 5 wait states.
+    /// Returns the share of the processor's time, modelled at 5 wait states.
     #[must_use]
     pub fn share(&self) -> Option<f64> {
         self.cycles_5ws.map(|cycles| cycles as f64 * f64::from(self.hertz) / CLOCK_HZ)

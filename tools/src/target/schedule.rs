@@ -1,56 +1,58 @@
-//! The response time of every task of the image, from its cost and how often it can come, for fixed priorities (Joseph
-//! and Pandya 1986; Audsley and others 1993).
+//! This module computes the response time of every task of the image from its cost and how often it can be activated,
+//! for fixed priorities (Joseph and Pandya 1986; Audsley and others 1993).
 //!
-//! It is judged by the cycles with wait states, each activation with empty caches at its start. What it
-//! costs the task that it preempts is added to it: as many lines to read again as it has put into the
-//! caches. (A loop that fills the whole cache could lose more than that; the kernels' loops do not.)
+//! Deadlines are judged by the cycles with wait states, each activation starting with empty caches. A task's cost
+//! includes the delay of the task that it preempts: as many lines to read again as it has put into the caches. (A loop
+//! that fills the whole cache could lose more than that; the kernels' loops do not.)
 
 use crate::target::parser_load::CLOCK_HZ;
 use crate::target::tasks::{Activation, Cycles, Handler, Least, Tasks};
 use std::fmt;
 
-/// Cycles of entering and leaving a handler: 12 and 10 (Cortex-M4 TRM, 3.9.1), and 17 words of
+/// Entering and leaving a handler takes this many cycles: 12 and 10 (Cortex-M4 TRM, 3.9.1), and 17 words of
 /// floating-point registers each way.
 const EXCEPTION: u64 = 12 + 10 + 2 * 17;
-/// Cycles in which a line of flash is read, five of them wait states.
+/// Reading a line of flash takes this many cycles, five of them wait states.
 const LINE_READ: u64 = 6;
-/// Lines of both caches: nothing can cost a preempted task more of them.
+/// Both caches have this many lines: no activation can cost a preempted task more of them.
 const LINES: u64 = 64 + 8;
-/// The vector, read from flash, its place in the cache, and the line that was in use before.
+/// Taking the vector costs three lines: the vector itself, read from flash, its place in the cache, and the line that
+/// was in use before.
 const VECTOR: u64 = 3 * LINE_READ;
-/// Part of a deadline that must be to spare.
+/// This share of a deadline must be left.
 const SPARE: f64 = 0.25;
-/// The highest priority that idle blocks while it shares data with the output task.
+/// Idle blocks priorities up to this while it shares data with the output task.
 const SHARED: u8 = 2;
-/// Cycles of a copy of a frame and what is around it, outside of the code of `can_frames` itself.
+/// Copying a frame, with the code around it but without `can_frames` itself, takes at most this many cycles.
 const COPY: u64 = 150;
 /// Ten bits at 115200 and at 921600 bit/s, us.
 const BYTE_115200: f64 = 10e6 / 115_200.0;
 const BYTE_921600: f64 = 10e6 / 921_600.0;
-/// The largest delay of a sample's frames, us: the output task waits for a tick and takes no more than 3 ms, or no
-/// deadline counts as met.
+/// A sample's frames are delayed by at most this, us: the output task waits for a tick and takes no more than 3 ms; if
+/// it takes longer, no deadline counts as met.
 const FRAMES_LATE: f64 = 4e3;
-/// The shortest frame at 500 kbit/s: 47 bits.
+/// The shortest frame at 500 kbit/s takes this long, us: 47 bits.
 const FRAME: f64 = 47.0 / 0.5;
 
-/// The rule for the cost of a task.
+/// Says how the cost of a task follows from its activations.
 enum Cost {
-    /// The worst activation of all.
+    /// The task costs its worst activation.
     Worst,
-    /// The worst one that has moved no more than so many bytes, as a real line does: one in, and two out
-    /// where something is sent on it. The emulated line takes all that there is.
+    /// The task costs the worst activation that moved no more than so many bytes, as on a real line: one in, and two
+    /// out if something is sent on it. The emulated line moves all bytes at once.
     Bytes(usize),
-    /// The worst activation with one sample, the worst without, the cheapest one as often as frames that have left
-    /// pend it, and a look at all lines with every tick: the emulated line brings many bytes at a time.
+    /// The task costs, in 10 ms, the worst activation with one sample, the worst without, the cheapest one for each
+    /// sent frame that pends it, and a check of all lines with every tick, because the emulated line delivers many
+    /// bytes at a time.
     Sample,
 }
 
-/// Times in 10 ms that the output task is pended and finds nothing to do: ten frames that have left, a window's end.
+/// In 10 ms the output task is pended this many times without work: by ten sent frames and the end of a window.
 const TURNS: u64 = 10 + 1;
-/// Ticks in 10 ms, with each of which it looks at every line.
+/// In 10 ms there are this many ticks; with each the output task checks every line.
 const TICKS: u64 = 10;
 
-/// Activations that come together, again and again.
+/// Limits activations that come in bursts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Burst {
     count: f64,
@@ -66,7 +68,7 @@ impl Burst {
     }
 }
 
-/// The demand on a task.
+/// Describes the demand on a task.
 struct Demand {
     name: &'static str,
     handler: &'static str,
@@ -75,17 +77,17 @@ struct Demand {
     period: f64,
     /// The limit of activations in bursts.
     burst: Option<Burst>,
-    /// Time from when it is due to when it must be done, us.
+    /// Time from the activation to the deadline, us.
     deadline: f64,
     why: &'static str,
 }
 
 const MAILBOXES: &str = "three mailboxes are empty";
-/// Handlers that end a run: the supply falls, and the board restarts.
+/// These handlers end a run: the supply falls, and the board restarts.
 const LAST: [&str; 1] = ["PVD"];
 
-/// All tasks of `coprocessor` with everything configured and connected; an image without one of them does not have its
-/// row.
+/// Lists the demands on all tasks of `coprocessor` with everything configured and connected; an image without one of
+/// them lacks its row.
 const DEMANDS: [Demand; 9] = [
     byte("imu_line", "USART1", BYTE_115200),
     // Messages of up to 47 bytes, 1000 a second.
@@ -94,7 +96,7 @@ const DEMANDS: [Demand; 9] = [
     // In 10 ms, with their stamps: nine frames of 26 characters and VDC2's 31 out; four wheel frames of 22 in.
     Demand { burst: Burst::new(353.0, 1e4, FRAMES_LATE), ..both_ways("slcan_line", "USART2", BYTE_921600) },
     both_ways("service_line", "USART6", BYTE_115200),
-    // The filters pass wheel frames alone: four identifiers, twice each.
+    // The filters pass only wheel frames: four identifiers, twice each.
     Demand {
         burst: Burst::new(8.0, 1e4, 1e4),
         ..demand(
@@ -106,7 +108,7 @@ const DEMANDS: [Demand; 9] = [
             "three frames fill the controller",
         )
     },
-    // Six frames with a sample, four with what the fibre-optic gyro has summed up.
+    // Six frames come with a sample, four with the sums of the fibre-optic gyro.
     Demand {
         burst: Burst::new(10.0, 1e4, FRAMES_LATE),
         ..demand("can_sent", "CAN1_TX", Cost::Worst, FRAME, 3.0 * FRAME, MAILBOXES)
@@ -126,7 +128,8 @@ const fn demand(
     Demand { name, handler, cost, period, burst: None, deadline, why }
 }
 
-/// A line at full speed, on which nothing is sent: each byte is gone when the next one is there.
+/// Returns the demand of a line at full speed on which nothing is sent: each byte must be taken before the next
+/// arrives.
 const fn byte(name: &'static str, handler: &'static str, period: f64) -> Demand {
     demand(name, handler, Cost::Bytes(1), period, period, "the next byte")
 }
@@ -143,7 +146,7 @@ fn whole(cycles: Cycles, fills: u64) -> Cycles {
 }
 
 impl Cost {
-    /// Activations, instructions and modelled cycles in a period.
+    /// Returns activations, instructions and modelled cycles in a period.
     fn of(&self, handler: &Handler) -> (u64, u64, Cycles) {
         let kinds = if let Self::Bytes(most) = self { 1 + most } else { handler.activations.len() };
         let ran = || handler.activations.iter().take(kinds).flatten();
@@ -154,7 +157,8 @@ impl Cost {
             cycles: a.cycles.max(b.cycles),
             fills: a.fills.max(b.fills),
         });
-        // Code that never ran: each instruction once, at three cycles; half as many words as halfwords.
+        // For code that never ran, each instruction counts once, at three cycles; there are half as many words as
+        // halfwords.
         let worst = worst.unwrap_or_else(|| {
             let (zero, lines) = (3 * handler.code + COPY, handler.code / 8 + 1);
             let cycles = Cycles { zero, five: zero + 2 * lines * LINE_READ };
@@ -165,7 +169,7 @@ impl Cost {
             Self::Worst | Self::Bytes(_) => whole(cycles, fills),
             Self::Sample => {
                 let kind = |kind: usize| handler.activations[kind].map(|ran| whole(ran.cycles, ran.fills));
-                // On a host that is too slow to send one by one, the worst of several.
+                // On a host that is too slow to send samples one by one, the worst of several is used.
                 let sample = kind(1).unwrap_or_else(|| whole(cycles, fills)) + kind(0).unwrap_or_default();
                 let least = |least: Least| whole(least.cycles, least.fills);
                 sample + least(handler.least) * TURNS + least(handler.looking) * TICKS
@@ -174,7 +178,7 @@ impl Cost {
         (runs, instructions, cycles)
     }
 
-    /// Cycles of each of many activations: one that moves several bytes stands for as many.
+    /// Returns the cycles of each of many activations: one that moves several bytes stands for as many activations.
     fn each(&self, handler: &Handler) -> Option<Cycles> {
         let Self::Bytes(most) = self else { return None };
         let ran = handler.activations.iter().enumerate().take(1 + most);
@@ -187,12 +191,12 @@ impl Cost {
     }
 }
 
-/// A task and its response times.
+/// Holds a task and its response times.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Task {
     /// The image's name for it.
     pub name: &'static str,
-    /// The larger the more urgent.
+    /// Priority; a larger one is more urgent.
     pub priority: u8,
     /// Shortest time between two activations, us.
     pub period_us: f64,
@@ -202,11 +206,11 @@ pub struct Task {
     /// The cycles of each activation of a burst, where the worst one does the work of several.
     #[serde(skip)]
     each: Cycles,
-    /// Longest that an answer may take, us.
+    /// Deadline, us.
     pub deadline_us: f64,
     /// The reason for the deadline.
     pub why: &'static str,
-    /// Activations that were counted; 0: none ran, and the cost is a bound from its code.
+    /// Activations counted; with 0 the task never ran, and its cost is a bound from its code.
     pub runs: u64,
     /// Instructions of the longest activation.
     pub instructions: u64,
@@ -214,27 +218,27 @@ pub struct Task {
     pub cycles: u64,
     /// The same cycles with wait states, and with the cost to the preempted task.
     pub cycles_5ws: u64,
-    /// Worst response at zero wait states, us; `None`: later than ten times its deadline.
+    /// Worst response at zero wait states, us; `None` if later than ten times the deadline.
     pub response_us: Option<f64>,
     /// Worst response with wait states.
     pub response_5ws_us: Option<f64>,
 }
 
 impl Task {
-    /// Returns whether it is always done in time, with a quarter of the deadline to spare.
+    /// Returns whether the task always meets its deadline with a quarter of it to spare.
     #[must_use]
     pub fn met(&self) -> bool {
         self.response_5ws_us.is_some_and(|response| response <= (1.0 - SPARE) * self.deadline_us)
     }
 
-    /// Part of the processor, with wait states.
+    /// Returns the share of the processor, with wait states.
     #[must_use]
     pub fn share(&self) -> f64 {
         let period = self.burst.map_or(self.period_us, |Burst { count, span, .. }| span / count);
         self.each.five as f64 / (period * 1e-6 * CLOCK_HZ)
     }
 
-    /// Most activations in a time, us.
+    /// Returns the most activations in a time, us.
     fn within(&self, time: f64) -> f64 {
         let most = (time / self.period_us).ceil();
         self.burst
@@ -242,13 +246,13 @@ impl Task {
     }
 }
 
-/// The table.
+/// Holds the response times of all tasks.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Schedule(pub Vec<Task>);
 
 impl Schedule {
-    /// Makes the table of what was counted; `fognet` are the instructions and cycles of one of FoGNet's windows, which
-    /// idle runs piece by piece. `None`: the image has a task that is not in the table.
+    /// Makes the table from the counts; `fognet` are the instructions and cycles of one of FoGNet's windows, which idle
+    /// runs piece by piece. `None` if the image has a task that is not in the table.
     #[must_use]
     pub fn new(tasks: &Tasks, fognet: Option<(u64, Cycles)>) -> Option<Self> {
         let Tasks { handlers, all_off, some_off } = tasks;
@@ -296,15 +300,15 @@ impl Schedule {
         !late && self.0.iter().all(Task::met)
     }
 
-    /// Part of the processor that all tasks take together.
+    /// Returns the share of the processor that all tasks take together.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.0.iter().map(Task::share).sum()
     }
 }
 
-/// FoGNet's window, in the time that all tasks leave: one begins with each second, and its estimate is used with the
-/// next.
+/// Returns the row of FoGNet's window, which runs in the time that all tasks leave: one begins with each second, and
+/// its estimate is used in the next.
 fn in_idle((instructions, cycles): (u64, Cycles)) -> Task {
     Task {
         name: "fognet",
@@ -323,9 +327,8 @@ fn in_idle((instructions, cycles): (u64, Cycles)) -> Task {
     }
 }
 
-/// Worst response of a task, us: its own cost, what blocks it, and every activation of what is as
-/// urgent or more so that can come meanwhile. `cost` gives cycles of the worst activation and of each of
-/// many.
+/// Returns the worst response of a task, us: its own cost, its blocking, and all activations of tasks at least as
+/// urgent that can come meanwhile. `cost` gives the cycles of the worst activation and of each of many.
 fn response(tasks: &[Task], k: usize, blocked: u64, cost: fn(&Task) -> [u64; 2]) -> Option<f64> {
     let own = &tasks[k];
     let us = |cycles: u64| cycles as f64 / CLOCK_HZ * 1e6;
@@ -398,7 +401,7 @@ mod tests {
     use super::*;
     use crate::target::tasks::KINDS;
 
-    /// A handler whose activation takes so many cycles in all, without wait states and with them.
+    /// Makes a handler whose activation takes so many cycles in all, without wait states and with them.
     fn handler(name: &str, priority: u8, cycles: Option<[u64; 2]>) -> Handler {
         let ran = cycles.map(|[zero, five]| Activation {
             runs: 1,
@@ -479,8 +482,8 @@ mod tests {
         assert!(schedule.met(), "{schedule}");
     }
 
-    /// 20 ms for a window and all that preempts it: done after 13 ms it is in time with a quarter to
-    /// spare, after 16 ms it is not.
+    /// With a deadline of 20 ms for a window and everything that preempts it, 13 ms leave a quarter to spare and 16 ms
+    /// do not.
     #[test]
     fn a_deadline_met_without_spare_time_is_missed() {
         let window = |us: u64| Schedule::new(&tasks(168 * us), None).unwrap();

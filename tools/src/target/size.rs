@@ -1,12 +1,12 @@
-//! Flash and RAM of a firmware image, read from its ELF file.
+//! This module reads the flash and RAM of a firmware image from its ELF file.
 
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
 
-/// Limits of an image with both networks and everything else, bytes: flash, static RAM, stack.
+/// An image with both networks and everything else must stay within these limits, bytes: flash, static RAM, stack.
 pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 12 << 10];
 
-/// Sizes of one image, bytes.
+/// Holds the sizes of one image, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ImageSize {
     /// Vectors, code, constants and the initial values of data.
@@ -19,7 +19,7 @@ pub struct ImageSize {
     pub ccm: u64,
 }
 
-/// The error of an image that cannot be measured.
+/// The reason why an image cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum SizeError {
     /// The file cannot be read.
@@ -30,7 +30,7 @@ pub enum SizeError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The file is no object file.
+    /// The file is not an object file.
     #[error("{path}: {source}")]
     Format {
         /// The file.

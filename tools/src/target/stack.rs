@@ -1,12 +1,11 @@
-//! The deepest stack that a firmware image can need, from its machine code alone.
+//! This module computes the deepest stack that a firmware image can need, from its machine code alone.
 //!
-//! Every function's own need is what its pushes and subtractions from the stack pointer add up
-//! to; what it calls is read from its branches. A call through a register may go to any
-//! function whose address stands anywhere in the image. Recursion, and a stack pointer moved by
-//! a register, have no bound and are errors. Interrupts: every handler of the vector table may
-//! interrupt every other one once, but for those of its own priority, each behind the largest frame
-//! that the processor pushes. Not so while an RTIC image initialises: that runs with interrupts off,
-//! until its own frame is left.
+//! A function's own need is the sum of its pushes and subtractions from the stack pointer; its calls are read from its
+//! branches. A call through a register may go to any function whose address stands anywhere in the image. Recursion,
+//! and a stack pointer moved by a register, have no bound and are errors. Interrupts: every handler of the vector table
+//! may interrupt every other one once, except those of its own priority, each on top of the largest frame that the
+//! processor pushes. An RTIC image initialises with interrupts off, so no handler adds to the stack until that frame is
+//! left.
 //!
 //! The result is an upper bound. It trusts the symbol table: code that no symbol covers, or
 //! addresses computed at run time, would escape it; the images have neither.
@@ -21,20 +20,21 @@ pub use barrier::handlers_without_barrier;
 use code::Code;
 use std::collections::{BTreeMap, HashMap};
 
-/// Bytes that the processor pushes at an exception: registers, floating-point registers, alignment (ARMv7-M, B1.5.6).
+/// The processor pushes this many bytes at an exception: registers, floating-point registers, alignment (ARMv7-M,
+/// B1.5.6).
 const EXCEPTION_FRAME: u32 = 32 + 72 + 4;
-/// The function that the image starts with.
+/// The image starts with this function.
 const RESET: &str = "Reset";
-/// The function that RTIC runs with interrupts off; its last step switches them on.
+/// RTIC runs this function with interrupts off; its last step switches them on.
 const MASKED: &str = "__rtic_init_resources";
 
-/// The error of an image whose stack has no bound.
+/// The reason why no bound of an image's stack is found.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StackError {
-    /// The file is no firmware image.
+    /// The file is not a firmware image.
     #[error("not a firmware image: {0}")]
     Format(String),
-    /// A function calls itself, by way of others or not.
+    /// A function calls itself, directly or through others.
     #[error("recursion: {}", .0.join(" -> "))]
     Recursion(Vec<String>),
     /// The stack pointer is moved by a register.
@@ -45,7 +45,7 @@ pub enum StackError {
         /// The address of the instruction.
         address: u32,
     },
-    /// A call to where no function is.
+    /// A call goes to an address that is not a function's.
     #[error("{function} calls {target:#010x}, where no function begins")]
     Target {
         /// The function.
@@ -55,13 +55,13 @@ pub enum StackError {
     },
 }
 
-/// Functions on the deepest way from one, outermost first, each with its own need.
+/// Lists the functions of the deepest call chain, outermost first, each with its own need.
 pub type Way = Vec<(String, u32)>;
 
-/// The handler of a priority that needs most.
+/// Holds the handler of a priority that needs the most stack.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Handler {
-    /// Higher is more urgent; of what has none there is but one.
+    /// Priority, higher is more urgent; a handler without one stands alone.
     pub priority: Option<u8>,
     /// Bytes that it needs, the processor's frame included.
     pub bytes: u32,
@@ -69,7 +69,7 @@ pub struct Handler {
     pub deepest: Way,
 }
 
-/// The deepest stack of an image.
+/// Holds the deepest stack of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageStack {
     /// Bytes of the main program while handlers can come.
@@ -126,7 +126,7 @@ impl ImageStack {
     }
 }
 
-/// Numbers and priorities of the exceptions that an image lists; higher is more urgent.
+/// Returns numbers and priorities of the exceptions that an image lists; higher is more urgent.
 ///
 /// # Errors
 /// [`StackError::Format`].
@@ -134,7 +134,7 @@ pub fn priorities(elf: &[u8]) -> Result<BTreeMap<usize, u8>, StackError> {
     Ok(Code::read(elf)?.vectors.priorities)
 }
 
-/// Names of functions in an image.
+/// Returns the names of the functions in an image.
 ///
 /// # Errors
 /// [`StackError::Format`].

@@ -1,6 +1,5 @@
-//! The cost of every task and interrupt of the flashed image is counted while it runs in the
-//! emulator: one sample after the other goes in, with wheel speeds, questions on the service
-//! line and a host's commands beside it.
+//! This module counts the cost of every task and interrupt of the flashed image while it runs in the emulator: it sends
+//! one sample after the other, with wheel speeds, requests on the service line and a host's commands among them.
 
 mod drive;
 mod symbols;
@@ -10,11 +9,11 @@ use crate::target::emulator::EmulatorError;
 use std::path::Path;
 use symbols::Symbols;
 
-/// Kinds of activations of a handler: by how many bytes it has moved, or samples processed; the last
-/// one is as many or more.
+/// A handler has this many kinds of activations, by the bytes moved or samples processed; the last kind is that many or
+/// more.
 pub const KINDS: usize = 5;
 
-/// All counts of an image.
+/// Holds all counts of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tasks {
     /// Its handlers.
@@ -25,7 +24,7 @@ pub struct Tasks {
     pub some_off: Cycles,
 }
 
-/// Modelled cycles: the largest at zero wait states, and the largest on an STM32F405 at 168 MHz.
+/// Holds modelled cycles: the largest at zero wait states, and the largest on an STM32F405 at 168 MHz.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Cycles {
     /// Cycles at zero wait states.
@@ -34,7 +33,7 @@ pub struct Cycles {
     pub five: u64,
 }
 
-/// The cheapest of some activations, preemption left out; zero: there was none.
+/// Holds the cheapest of some activations without preemption; zero if there was none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Least {
     /// The cycles of the cheapest activation.
@@ -50,7 +49,7 @@ impl std::fmt::Display for Least {
 }
 
 impl Cycles {
-    /// The larger one of each.
+    /// Returns the larger of each.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self { zero: self.zero.max(other.zero), five: self.five.max(other.five) }
@@ -79,24 +78,24 @@ impl std::fmt::Display for Cycles {
     }
 }
 
-/// An interrupt handler of the image.
+/// Describes an interrupt handler of the image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Handler {
     /// The name in the vector table.
     pub name: String,
-    /// The larger the more urgent.
+    /// Priority; a larger one is more urgent.
     pub priority: u8,
     /// The worst activation of each kind.
     pub activations: [Option<Activation>; KINDS],
     /// The cheapest activation.
     pub least: Least,
-    /// The cheapest one that looks at every line and processes no sample, where there is one.
+    /// The cheapest activation that checks every line and processes no sample, if there is one.
     pub looking: Least,
-    /// Halfwords of its code, what it calls left out.
+    /// Halfwords of its code, without the functions that it calls.
     pub code: u64,
 }
 
-/// The worst of the activations of a handler, preemption left out.
+/// Holds the worst of a handler's activations, without preemption.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Activation {
     /// The number of activations.
@@ -138,7 +137,7 @@ impl std::fmt::Display for Tasks {
     }
 }
 
-/// Runs the image with the plugin; all of its handlers.
+/// Runs the image with the plugin and returns the counts of all its handlers.
 ///
 /// # Errors
 /// [`BenchError`], also when the image does not answer.

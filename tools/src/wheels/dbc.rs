@@ -1,4 +1,4 @@
-//! A file of wheel settings from a DBC file and the names of the signals that carry the speeds.
+//! This module makes a file of wheel settings from a DBC file and the names of the signals that carry the speeds.
 //!
 //! A DBC file has the place, factor, offset and unit of a signal. It does not say in a standard way what protects a frame:
 //! checksum and counter are for the user to add to the file.
@@ -6,7 +6,7 @@
 use super::file::{Frame, Order, Place, Signal, Wheel, WheelFile};
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueDescription, ValueType};
 
-/// km/h of one unit, by the names that DBC files use, in lower case.
+/// Gives km/h for one of each unit, by the names that DBC files use, in lower case.
 const UNITS: [(&str, f64); 7] = [
     ("km/h", 1.0),
     ("kph", 1.0),
@@ -16,14 +16,14 @@ const UNITS: [(&str, f64); 7] = [
     ("mph", 1.609_344),
     ("mi/h", 1.609_344),
 ];
-/// Words with which DBC files describe the code of a value that is not valid.
+/// DBC files describe the code of an invalid value with these words.
 const INVALID: [&str; 5] = ["invalid", "not available", "not valid", "sna", "signal not available"];
 
-/// The error of a DBC file, or of a name in it.
+/// The reason why a DBC file, or a name in it, cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DbcError {
-    /// The file is no DBC file.
+    /// The file is not a DBC file.
     #[error("{path}: no DBC file: {reason}")]
     Format {
         /// The file.
@@ -38,7 +38,7 @@ pub enum DbcError {
         path: String,
         /// The name.
         name: String,
-        /// Names of the file that contain a part of it.
+        /// Names in the file that contain part of the missing one.
         similar: Vec<String>,
     },
     /// Several messages have a signal of this name.
@@ -58,7 +58,7 @@ pub enum DbcError {
         path: String,
         /// The name.
         name: String,
-        /// What it is instead.
+        /// The reason why it cannot be used.
         reason: String,
     },
 }
@@ -67,7 +67,7 @@ fn near(similar: &[String]) -> String {
     if similar.is_empty() { String::new() } else { format!("; there are {}", similar.join(", ")) }
 }
 
-/// The names of the signals, SIGNAL or MESSAGE.SIGNAL, by wheel: front left, front right, rear left, rear right.
+/// Holds the names of the signals, SIGNAL or MESSAGE.SIGNAL, by wheel: front left, front right, rear left, rear right.
 pub type Signals<'a> = [Option<&'a str>; 4];
 
 /// Makes a file of wheel settings.
@@ -164,7 +164,7 @@ fn find(path: &str, dbc: &Dbc, wheel: Wheel, name: &str) -> Result<(MessageId, S
     Ok((message.id, signal))
 }
 
-/// Returns the raw code that the file describes as not valid.
+/// Returns the raw code that the file describes as invalid.
 fn invalid_code(dbc: &Dbc, id: MessageId, signal: &str) -> Option<u32> {
     let descriptions = dbc.value_descriptions.iter().find_map(|description| match description {
         ValueDescription::Signal { message_id, name, value_descriptions }

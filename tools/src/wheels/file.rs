@@ -1,4 +1,5 @@
-//! The file of wheel settings (TOML), in the numbers of a DBC file: speeds in km/h, start bits as DBC files count them.
+//! This module reads and writes the file of wheel settings (TOML), in the conventions of a DBC file: speeds in km/h,
+//! start bits as DBC files count them.
 
 use embedded_can::{ExtendedId, Id, StandardId};
 use gyronet::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
@@ -10,12 +11,12 @@ use gyronet::sample::WHEELS;
 use gyronet::units::{Duration, WheelSpeed};
 use serde::{Deserialize, Serialize};
 
-/// Speed codes for one km/h.
+/// 1 km/h is this many speed codes.
 const CODES_PER_KMH: f64 = 65_536.0 / 3.6;
-/// [`WheelSignal::factor_q16`] of one km/h.
+/// 1 km/h a code is this [`WheelSignal::factor_q16`].
 const FACTORS_PER_KMH: f64 = CODES_PER_KMH * 65_536.0;
 
-/// The error of a file of wheel settings.
+/// The reason why a file of wheel settings cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WheelFileError {
@@ -42,7 +43,7 @@ pub enum WheelFileError {
         path: String,
         /// The identifier.
         id: u32,
-        /// It is said to have 29 bits.
+        /// Whether the file says that it has 29 bits.
         extended: bool,
     },
     /// A wheel has two signals.
@@ -63,7 +64,7 @@ pub enum WheelFileError {
         /// The reason.
         source: OutsideFrame,
     },
-    /// A number that the board's codes cannot hold.
+    /// The board's codes cannot hold a number.
     #[error("{path}: {key} = {value}: must be {range}")]
     Range {
         /// The file.
@@ -85,7 +86,7 @@ pub enum WheelFileError {
     },
 }
 
-/// The settings of a vehicle's wheel frames.
+/// Holds the settings of a vehicle's wheel frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelFile {
@@ -114,26 +115,26 @@ const fn still_for_ms() -> u32 {
     500
 }
 
-/// A frame with wheel speeds.
+/// Describes a frame with wheel speeds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
     /// Identifier.
     pub id: u32,
-    /// The identifier has 29 bits.
+    /// Whether the identifier has 29 bits.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub extended: bool,
-    /// Its protection; absent where it has none.
+    /// Its protection, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub checksum: Option<Protection>,
-    /// Its message counter; absent where it has none, or AUTOSAR's.
+    /// Its message counter; absent if it has none or AUTOSAR's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counter: Option<Place>,
     /// The speeds in it.
     pub signal: Vec<Signal>,
 }
 
-/// The protection of a frame.
+/// Names the protection of a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Protection {
@@ -157,7 +158,7 @@ pub enum Protection {
     P01 {
         /// Identifier of the data.
         data_id: u16,
-        /// The way in which it enters the checksum.
+        /// The bytes of the identifier that enter the checksum.
         mode: DataIdMode,
     },
     /// AUTOSAR E2E profile 2.
@@ -177,12 +178,12 @@ pub enum Protection {
     P11 {
         /// Identifier of the data.
         data_id: u16,
-        /// The way in which it enters the checksum.
+        /// The bytes of the identifier that enter the checksum.
         mode: P11Mode,
     },
 }
 
-/// The place of a value in a frame.
+/// Gives the place of a value in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
     /// Start bit, as a DBC file gives it.
@@ -206,7 +207,7 @@ pub enum Order {
     Motorola,
 }
 
-/// The wheel of a signal.
+/// Names the wheel of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wheel {
@@ -428,7 +429,7 @@ fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFil
 mod tests {
     use super::*;
 
-    /// [`WheelSettings::TOYOTA`].
+    /// This file has the content of [`WheelSettings::TOYOTA`].
     const TOYOTA: &str = r#"
 [[frame]]
 id = 0xAA

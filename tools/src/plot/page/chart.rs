@@ -1,4 +1,4 @@
-//! Charts that fill the width of the page: the picture stretches, its numbers do not.
+//! This module writes charts that fill the width of the page: the picture stretches, its numbers do not.
 //!
 //! The curves are an SVG without proportions of its own; axes and names are text of the page
 //! beside it. So the same chart can be read on a desk and on a phone, and the script can zoom by
@@ -8,14 +8,14 @@ use super::escaped;
 use crate::plot::curve::{range, thinned};
 use std::fmt::Write;
 
-/// The SVG's own width and height; coordinates are whole numbers.
+/// The SVG has this width and height; coordinates are whole numbers.
 const SIDE: f64 = 10_000.0;
-/// Points of a curve: more than there are pixels, for zooming.
+/// A curve keeps about this many points, more than there are pixels, for zooming.
 const POINTS: usize = 2_000;
-/// Width over height of a chart with the same scale in both directions, from and to.
+/// A chart with the same scale in both directions has a width over height within these limits.
 const ASPECTS: (f64, f64) = (1.5, 2.6);
 
-/// A line.
+/// Holds a line of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// Its colour in the style sheet.
@@ -26,18 +26,18 @@ pub struct Curve {
     pub note: String,
     /// The points in the units of the axes.
     pub points: Vec<(f64, f64)>,
-    /// The axes hold all of it; otherwise it may run off them.
+    /// Whether the axes must hold all of it; otherwise it may leave them.
     pub in_scale: bool,
 }
 
-/// Curves over common axes.
+/// Holds curves over common axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart<'a> {
-    /// Above it.
+    /// The title above it.
     pub title: &'a str,
     /// The units to the right and upwards.
     pub axes: &'a str,
-    /// A metre is as long either way; else the axis to the right is the time.
+    /// Whether both axes have the same scale; otherwise the axis to the right is the time.
     pub same_scale: bool,
     /// The lines from back to front.
     pub curves: Vec<Curve>,
@@ -99,7 +99,7 @@ impl Chart<'_> {
             for (k, point) in thinned(curve.points.iter().copied(), POINTS).enumerate() {
                 let gap = if k == 0 { "" } else { " " };
                 let across = SIDE * part(point.0, x);
-                // Far beyond the edge is as good as farther.
+                // A point far beyond the edge may be clamped.
                 let down = (SIDE * (1.0 - part(point.1, y))).clamp(-9.0 * SIDE, 10.0 * SIDE);
                 let _ = write!(html, "{gap}{across:.0},{down:.0}");
             }
@@ -114,7 +114,7 @@ fn part(value: f64, (from, to): (f64, f64)) -> f64 {
     (value - from) / (to - from)
 }
 
-/// Widens both ranges so that a metre is as long either way, and returns them with the ratio of width to height.
+/// Widens both ranges to the same scale, and returns them with the ratio of width to height.
 fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64) {
     let aspect = ((x.1 - x.0) / (y.1 - y.0)).clamp(ASPECTS.0, ASPECTS.1);
     let metres = 1.1 * (y.1 - y.0).max((x.1 - x.0) / aspect);
@@ -122,13 +122,13 @@ fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64) {
     (around(x, metres * aspect / 2.0), around(y, metres / 2.0), aspect)
 }
 
-/// A number on an axis.
+/// Holds a number on an axis.
 struct Tick {
     at: f64,
     label: String,
 }
 
-/// Round numbers, at most so many. The script has the same rule.
+/// Returns round numbers, at most so many. The script has the same rule.
 fn ticks((from, to): (f64, f64), most: u32) -> Vec<Tick> {
     let rough = (to - from) / f64::from(most);
     let power = 10f64.powf(rough.log10().floor());

@@ -1,4 +1,5 @@
-//! QEMU as a process: threads collect its output, and it is killed when its owner is dropped.
+//! This module runs QEMU as a process: threads collect its output, so that it never blocks, and it is killed when its
+//! owner is dropped.
 
 use super::{EmulatorError, POLL, Result, START};
 use std::fmt::Display;
@@ -10,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// The bytes that a thread collects until its source ends.
+/// Holds the bytes that a thread collects until its source ends.
 #[derive(Debug, Default)]
 pub(super) struct Collected {
     bytes: Mutex<Vec<u8>>,
@@ -19,7 +20,7 @@ pub(super) struct Collected {
 }
 
 impl Collected {
-    /// Waits until the bytes are enough or time is up, and returns them and whether they are enough.
+    /// Waits until `enough` accepts the bytes or time is up; returns the bytes and whether they were accepted.
     pub(super) fn wait(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> (Vec<u8>, bool) {
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let (bytes, timeout) = self
@@ -29,7 +30,7 @@ impl Collected {
         (bytes.clone(), !timeout.timed_out())
     }
 
-    /// Returns whether the bytes become enough before time is up, without a copy.
+    /// Returns whether `enough` accepts the bytes before time is up, without a copy.
     pub(super) fn holds(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> bool {
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let waited = self.more.wait_timeout_while(bytes, limit, |bytes| !enough(bytes));
@@ -56,7 +57,7 @@ impl Collected {
     }
 }
 
-/// QEMU itself, killed on drop, and the threads that read from it.
+/// Owns QEMU, which is killed on drop, and the threads that read from it.
 #[derive(Debug)]
 pub(super) struct Process {
     pub(super) child: Child,
@@ -119,7 +120,7 @@ impl Process {
         Ok(())
     }
 
-    /// Ends QEMU in order, by its monitor, and returns everything that it has written to standard error.
+    /// Ends QEMU cleanly, by its monitor, and returns everything that it has written to standard error.
     pub(super) fn quit(&mut self) -> Result<String> {
         let asked = self.child.stdin.take().map(|mut monitor| monitor.write_all(b"quit\n"));
         if !matches!(asked, Some(Ok(()))) {
@@ -155,7 +156,7 @@ impl Drop for Process {
     }
 }
 
-/// A connection to QEMU.
+/// Holds a connection to QEMU.
 #[derive(Debug)]
 pub(super) struct Line {
     pub(super) stream: TcpStream,

@@ -1,17 +1,17 @@
-//! Whether an interrupt handler can return while a store of its own is still on its way.
+//! This module checks that no interrupt handler returns while a store of its own is still under way.
 //!
-//! Then a Cortex-M4 can take the wrong vector next (Arm erratum 838869). A `DSB` after the last store prevents it, so
-//! between each return and the `DSB` before it only instructions that store nothing may stand, and no branch may lead
-//! there past the `DSB`.
+//! Otherwise a Cortex-M4 can take the wrong vector next (Arm erratum 838869). A `DSB` after the last store prevents it,
+//! so between each return and the `DSB` before it there may be only instructions that store nothing, and no branch may
+//! lead there past the `DSB`.
 
 use super::StackError;
 use super::code::Code;
 use super::thumb::{self, Effect};
 use std::collections::BTreeSet;
 
-/// Calls inside of calls that are followed: a handler, its task, and what that ends with.
+/// Calls are followed to this depth: a handler, its task, and the calls at that one's end.
 const DEPTH: usize = 4;
-/// `DSB SY`.
+/// The encoding of `DSB SY`.
 const DSB: (u16, Option<u16>) = (0xF3BF, Some(0x8F4F));
 
 /// Returns the names of those handlers, by exception number, that can return after a store without a barrier.
@@ -39,7 +39,7 @@ fn ends_with_barrier(code: &Code, start: u32, depth: usize) -> bool {
         return false;
     };
     let end = start + function.size;
-    // The barrier behind which nothing has been stored yet, and the stretches from a barrier to a return.
+    // These track the barrier since which nothing has been stored, and the stretches from a barrier to a return.
     let (mut barrier, mut endings, mut targets) = (None, Vec::new(), BTreeSet::new());
     for (at, first, second) in function.instructions.iter().copied() {
         match thumb::effect(first, second, at) {
@@ -67,7 +67,7 @@ fn ends_with_barrier(code: &Code, start: u32, depth: usize) -> bool {
     endings.iter().all(|(barrier, end)| targets.range(barrier + 1..=*end).next().is_none())
 }
 
-/// `BX lr`, `POP {..., pc}`, `LDR pc, [sp], #4`.
+/// Returns whether an instruction is a return: `BX lr`, `POP {..., pc}`, `LDR pc, [sp], #4`.
 fn returns(first: u16, second: Option<u16>) -> bool {
     match second {
         None => first == 0x4770 || first & 0xFF00 == 0xBD00,
@@ -75,7 +75,8 @@ fn returns(first: u16, second: Option<u16>) -> bool {
     }
 }
 
-/// The instructions that compilers put between a barrier and a return; of others it is not known here.
+/// Returns whether an instruction is one of those that compilers put between a barrier and a return and that store
+/// nothing; any other counts as a store.
 fn stores_nothing(first: u16, second: Option<u16>) -> bool {
     match second {
         // NOP; POP; ADD sp, #imm; MOVS Rd, #imm; MOV Rd, Rm; LDR Rt, [sp, #imm]

@@ -1,4 +1,4 @@
-//! The functions of an image: the stack that each needs, and its calls.
+//! This module reads the functions of an image: the stack that each needs, and its calls.
 
 use super::priority::{self, Vectors};
 use super::thumb::{self, Effect, Instruction};
@@ -30,7 +30,7 @@ impl Code {
         let format = |error: object::Error| StackError::Format(error.to_string());
         let file = object::File::parse(elf).map_err(format)?;
         let mut ranges = BTreeMap::new();
-        // Where code and data begin inside a section (AAELF32 5.5.5).
+        // Mapping symbols show where code and data begin inside a section (AAELF32 5.5.5).
         let mut mapping = BTreeMap::new();
         for symbol in file.symbols() {
             let (name, address) = (symbol.name().map_err(format)?, symbol.address() as u32);
@@ -91,8 +91,8 @@ impl Code {
         };
         let end = address + function.size;
         let (mut low, mut aligned) = ([0u32; 16], [0u32; 16]);
-        // A function's address that the instruction before has put together. The linker's way from flash
-        // to RAM jumps there at once: a call. Anything else takes the address.
+        // Holds a function's address that the instruction before has completed. The linker's veneers from flash to RAM
+        // jump there at once, which is a call. Any other use takes the address.
         let mut made: Option<(u8, u32)> = None;
         for (at, first, second) in function.instructions.iter().copied() {
             let effect = thumb::effect(first, second, at);
@@ -110,13 +110,13 @@ impl Code {
                 Effect::None => {}
                 Effect::Push(bytes) => function.own += bytes,
                 Effect::Align { register, bytes } => aligned[usize::from(register)] = bytes,
-                // A frame on a larger boundary; what is not rounded gives the stack back.
+                // A rounded register makes a frame on a larger boundary; any other restores the stack.
                 Effect::MoveSp { register } => {
                     function.own += std::mem::take(&mut aligned[usize::from(register)]);
                 }
                 Effect::Dynamic => return Err(StackError::Dynamic { function: function.name, address: at }),
                 Effect::Indirect { .. } | Effect::Loaded => function.indirect += 1,
-                // Inside, a branch is a loop or a condition; to the outside, a call at the end.
+                // Inside the function a branch is a loop or a condition; to the outside it is a tail call.
                 Effect::Branch(target) if (address..end).contains(&target) => {}
                 Effect::Call(target) | Effect::Branch(target) => {
                     function.calls.insert(target);
@@ -136,7 +136,7 @@ impl Code {
         self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
     }
 
-    /// Returns the frame that is left of a function that runs with interrupts off when they come on.
+    /// Returns, for the function that runs with interrupts off, the frame that is left when they come on.
     pub fn masked(&self) -> HashMap<u32, u32> {
         let masked = |function: &Function| function.name.ends_with(MASKED);
         self.functions.iter().filter(|(_, f)| masked(f)).map(|(address, f)| (*address, f.own)).collect()

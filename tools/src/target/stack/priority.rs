@@ -1,16 +1,16 @@
-//! The priorities of handlers, which determine which of them can interrupt each other.
+//! This module reads the priorities of handlers, which determine which of them can interrupt each other.
 //!
-//! Handlers of one priority cannot (ARMv7-M Architecture Reference Manual, B1.5.4). An image says
-//! its priorities in a section that is not loaded: for each task the number of its vector and its
-//! priority, a byte each, higher is more urgent. What it does not list may interrupt everything.
+//! Handlers of one priority cannot (ARMv7-M Architecture Reference Manual, B1.5.4). An image lists its priorities in a
+//! section that is not loaded: for each task the number of its vector and its priority, a byte each, higher is more
+//! urgent. A handler that it does not list may interrupt everything.
 
 use super::StackError;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The section with an image's priorities.
+/// An image's priorities are in this section.
 pub const SECTION: &str = ".priorities";
 
-/// A vector table, and the priorities of its handlers.
+/// Holds a vector table, and the priorities of its handlers.
 #[derive(Debug, Default)]
 pub struct Vectors {
     /// Address of the handler of each exception number, where it is a function's.
@@ -19,7 +19,7 @@ pub struct Vectors {
     pub priorities: BTreeMap<usize, u8>,
 }
 
-/// Handlers of which one at a time can run, and their priority where it is known.
+/// Holds handlers of which only one at a time can run, and their priority if it is known.
 pub type Group = (Option<u8>, BTreeSet<u32>);
 
 impl Vectors {
@@ -38,7 +38,7 @@ impl Vectors {
         Ok(())
     }
 
-    /// Most urgent first: one group for each priority, one for each handler without one.
+    /// Returns the groups, most urgent first: one for each priority, and one for each handler without one.
     pub fn groups(&self, reset: u32) -> Vec<Group> {
         let (mut known, mut unknown) = (BTreeMap::<u8, BTreeSet<u32>>::new(), BTreeSet::new());
         for (number, handler) in self.handlers.iter().enumerate() {

@@ -1,16 +1,16 @@
-//! The effect of a Thumb-2 instruction on the stack pointer and on the flow of control.
+//! This module decodes the effect of a Thumb-2 instruction on the stack pointer and on the flow of control.
 //!
 //! Only those that do something to either are known (ARMv7-M Architecture Reference Manual,
 //! A7.7); all others are [`Effect::None`].
 
-/// The effect of an instruction.
+/// Describes the effect of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     /// The instruction does not touch the stack pointer or the flow.
     None,
     /// The stack grows by so many bytes.
     Push(u32),
-    /// It grows by a register's value.
+    /// The stack grows by a register's value.
     Dynamic,
     /// A register is rounded down, by less than so many bytes; it may become the stack pointer.
     Align { register: u8, bytes: u32 },
@@ -24,9 +24,9 @@ pub enum Effect {
     Indirect { register: u8 },
     /// A jump to an address that lies in memory.
     Loaded,
-    /// The lower half of a register.
+    /// The lower half of a register is set.
     MoveLow { register: u8, value: u32 },
-    /// The upper half of a register; the lower one stays.
+    /// The upper half of a register is set; the lower one stays.
     MoveHigh { register: u8, value: u32 },
 }
 
@@ -38,7 +38,7 @@ pub const fn is_wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }
 
-/// An instruction: its address, its first halfword and, where it is wide, its second one.
+/// Holds an instruction: its address, its first halfword and, if it is wide, its second one.
 pub type Instruction = (u32, u16, Option<u16>);
 
 /// Returns the instructions of a function that begins at an address, without the data between them.
@@ -60,7 +60,7 @@ pub fn instructions(body: &[u8], start: u32, is_data: impl Fn(u32) -> bool) -> V
     instructions
 }
 
-/// The effect of the instruction at an address.
+/// Returns the effect of the instruction at an address.
 pub fn effect(first: u16, second: Option<u16>, address: u32) -> Effect {
     match second {
         Some(second) => wide(first, second, address),
@@ -142,12 +142,12 @@ fn wide(first: u16, second: u16, address: u32) -> Effect {
     }
 }
 
-/// The value whose highest bit, of so many, is its sign.
+/// Extends the sign of a value of so many bits.
 fn sign(value: u32, bits: u32) -> i32 {
     (value << (32 - bits)) as i32 >> (32 - bits)
 }
 
-/// Offset of BL and B.W (A7.7.12, encoding T4; A7.7.18).
+/// Returns the offset of BL and B.W (A7.7.12, encoding T4; A7.7.18).
 fn long_offset(first: u16, second: u16) -> i32 {
     let s = u32::from(first >> 10 & 1);
     let inverted = |at: u32| (u32::from(second >> at & 1) ^ s) ^ 1;
@@ -167,7 +167,7 @@ fn imm16(first: u16, second: u16) -> u32 {
     u32::from(first & 0xF) << 12 | imm12(first, second)
 }
 
-/// ThumbExpandImm (A5.3.2).
+/// Expands a constant as ThumbExpandImm does (A5.3.2).
 fn expand(first: u16, second: u16) -> u32 {
     let code = imm12(first, second);
     let byte = code & 0xFF;

@@ -1,4 +1,4 @@
-//! The input of the emulated image while it is counted.
+//! This module feeds the emulated image while it is counted.
 
 use crate::simulate::{Config, Sample, Simulation};
 use crate::target::emulator::{Board, EmulatorError};
@@ -10,17 +10,17 @@ use gyronet::service::{Reply, Request};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Samples: static initialisation, and forty windows.
+/// The image gets this many samples: for static initialisation, and forty windows.
 const SAMPLES: usize = 500;
-/// The longest time that a sample may take.
+/// A sample may take at most this long.
 const TURN: Duration = Duration::from_secs(10);
 const ASK: Duration = Duration::from_millis(20);
-/// Windows of the network that must have run, or nothing is known of it.
+/// At least this many windows of the network must have run for its cost to be known.
 const WINDOWS: u32 = 20;
-/// 8 ns for an instruction: the board's clock and its instructions stay in step as they do at
-/// about 125 million instructions a second.
+/// An instruction takes 8 ns: the board's clock and its instructions keep the ratio of about 125 million instructions a
+/// second.
 const ICOUNT: &str = "shift=3";
-/// Messages of the fibre-optic gyro in a sample.
+/// The fibre-optic gyro sends this many messages a sample.
 const GYRO_MESSAGES: usize = 10;
 /// USARTs of the board.
 const IMU: usize = 1;
@@ -28,22 +28,22 @@ const SLCAN: usize = 2;
 const GYRO: usize = 3;
 const SERVICE: usize = 6;
 
-/// Sends everything, one sample after the other, and ends the emulator; what the plugin has printed.
+/// Sends everything, one sample after the other, and ends the emulator; returns the plugin's output.
 pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
     let mut board = Board::boot(image, SERVICE, &["-icount", ICOUNT, "-plugin", plugin])?;
     let [info, configuration, log] = [Request::Info, Request::GetConfiguration, Request::Log { after: 0 }]
         .map(|request| emit(1, &request).unwrap_or_default());
     let mut answers = Answers::default();
     for (k, sample) in Simulation::new(&Config::DEFAULT).take(SAMPLES).enumerate() {
-        // Standing, as Toyota's frame has it, and now and then what a host asks.
+        // Toyota's frame says that the vehicle stands; from time to time a host sends a request.
         board.send(SLCAN, b"t0AA81A6F1A6F1A6F1A6F\r", TURN)?;
         if k % 50 == 0 {
             board.send(SLCAN, b"V\rN\rF\r", TURN)?;
         }
         let numbers = GYRO_MESSAGES * k..GYRO_MESSAGES * (k + 1);
         let messages: Vec<u8> = numbers.flat_map(|number| increment(number, &sample).emit()).collect();
-        // First what the gyro has sent in ten milliseconds, then the sample: the schedule adds up the turn
-        // that takes the one and the turn that takes the other.
+        // The gyro's messages of ten milliseconds come first, then the sample: the schedule adds up the activations
+        // that process them.
         board.send(GYRO, &messages, TURN)?;
         answers.wait(&mut board, "the gyro's messages", |answers| {
             answers.messages as usize >= GYRO_MESSAGES * (k + 1)
@@ -58,12 +58,12 @@ pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
     board.quit()
 }
 
-/// Byte by byte, so that some come while an answer goes out, as they do on a slow line.
+/// Sends a request byte by byte, so that some bytes come while an answer goes out, as on a slow line.
 fn ask(board: &mut Board, question: &[u8]) -> Result<(), EmulatorError> {
     question.iter().try_for_each(|byte| board.send(SERVICE, &[*byte], TURN))
 }
 
-/// The answers of the image about its pipeline.
+/// Holds the image's answers about its pipeline.
 #[derive(Default)]
 struct Answers {
     deframer: Deframer,
@@ -76,7 +76,7 @@ struct Answers {
 }
 
 impl Answers {
-    /// Asks until it is so far, however slow the host is.
+    /// Asks until the image has got so far, however slow the host is.
     fn wait(
         &mut self,
         board: &mut Board,
@@ -92,7 +92,7 @@ impl Answers {
                 return Err(board.failed(format!("{what} was not processed; {so_far}")));
             }
             ask(board, &counters)?;
-            // No answer in time: it is asked again.
+            // Without an answer in time, the request is repeated.
             let _ = board.await_sent(SERVICE, ASK, |bytes| {
                 self.read(bytes);
                 is_done(self)
@@ -127,7 +127,7 @@ fn message(k: usize, sample: &Sample) -> MtData2 {
 }
 
 fn increment(number: usize, sample: &Sample) -> Message {
-    // No gyro says the same for long.
+    // The reading changes, because a gyro that repeats itself counts as stuck.
     let noise = if (number / GYRO_MESSAGES).is_multiple_of(2) { 1e-8 } else { -1e-8 };
     Message {
         rotation: sample.reference.map(|rate| (rate * 1e-3 + noise) as f32),

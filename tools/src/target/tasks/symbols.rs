@@ -1,16 +1,16 @@
-//! The addresses of an image's handlers, for the plugin that counts them.
+//! This module finds the addresses of an image's handlers, for the plugin that counts them.
 
 use super::{Handler, KINDS, Least};
 use crate::target::stack;
 use object::{Object, ObjectSymbol};
 use std::path::Path;
 
-/// The function that a turn of the output task runs for each sample.
+/// The output task runs this function for each sample.
 const WATCHED: &str = "gyronet::coprocessor::Coprocessor::imu";
-/// The function that it runs to look at every line.
+/// The output task runs this function to check every line.
 const LOOKING: &str = "output::Output::look";
-/// Exception numbers of the handlers (RM0090, table 62), and the data register that a serial line's
-/// handler reads and writes (RM0090, table 1 and 30.6.2).
+/// Lists the exception numbers of the handlers (RM0090, table 62), and the data register that a serial line's handler
+/// reads and writes (RM0090, table 1 and 30.6.2).
 const VECTORS: [(usize, &str, u32); 10] = [
     (15, "SysTick", 0),
     (16 + 1, "PVD", 0),
@@ -24,7 +24,7 @@ const VECTORS: [(usize, &str, u32); 10] = [
     (16 + 71, "USART6", 0x4001_1404),
 ];
 
-/// The handlers, each with the plugin's option for it, and the addresses of the watched functions.
+/// Holds the handlers, each with the plugin's option for it, and the addresses of the watched functions.
 pub struct Symbols {
     pub handlers: Vec<(Handler, String)>,
     pub watched: u32,
@@ -32,7 +32,7 @@ pub struct Symbols {
 }
 
 impl Symbols {
-    /// The error says what the image lacks.
+    /// Reads the symbols of an image; the error says what it lacks.
     pub fn read(image: &Path) -> Result<Self, String> {
         let bad = |what: &dyn std::fmt::Display| format!("{}: {what}", image.display());
         let bytes = std::fs::read(image).map_err(|error| bad(&error))?;
@@ -44,7 +44,7 @@ impl Symbols {
             let (_, name, data) = known.ok_or_else(|| bad(&format!("vector {vector} has no name here")))?;
             let symbol = symbol(name).ok_or_else(|| bad(&format!("no handler {name}")))?;
             let (start, len) = (symbol.address() as u32 & !1, symbol.size() as u32);
-            // What `#[interrupt]` marks is a function of its own, where it is not inlined.
+            // A function marked `#[interrupt]` has a symbol of its own, unless it is inlined.
             let marked = format!("__cortex_m_rt_{name}");
             let is_body = |symbol: &object::Symbol<'_, '_>| symbol.name().is_ok_and(|n| n.contains(&marked));
             let body: u64 = elf.symbols().filter(is_body).map(|symbol| symbol.size()).sum();
