@@ -1,5 +1,5 @@
-//! A board with everything connected: an MTi, a fibre-optic gyro that is simulated from the reference, and wheel frames
-//! over SLCAN. A board in the emulator and one on the host take the same inputs, one after the other.
+//! This module runs a board with everything connected: an MTi, a fibre-optic gyro that is simulated from the reference,
+//! and wheel frames over SLCAN. A board in the emulator and one on the host take the same inputs, one after the other.
 
 use crate::recordings::Row;
 use crate::{qemu, replay};
@@ -22,20 +22,20 @@ const SLCAN: usize = 2;
 const FOG: usize = 3;
 /// The number of USARTs that such a board needs.
 pub const USARTS: usize = qemu::SERVICE;
-/// The gyro sends so many messages in 10 ms.
+/// The gyro sends this many messages in 10 ms.
 const MESSAGES: usize = 10;
-/// The gyro's resolution, rad.
+/// The gyro has this resolution, rad.
 const STEP: f64 = 4e-8;
-/// A sample of the MTi makes so many frames.
+/// A sample of the MTi makes this many frames.
 const SET: usize = 6;
 /// TX1 begins like this when the sensor is silent: no rate, failed.
 const SILENT: &[u8] = b"t1748008020FF0080";
-/// The number of samples from one wheel frame to the next.
+/// Wheel frames are this many samples apart.
 const WHEELS: usize = 2;
-/// The vehicle stands for so many samples.
+/// The vehicle stands for this many samples.
 const STANDING: usize = 600;
 
-/// The inputs of 10 ms, in their order.
+/// Holds the inputs of 10 ms, in order.
 #[derive(Debug, Clone)]
 pub struct Step {
     /// The frame of all four wheels, where one comes.
@@ -67,7 +67,7 @@ impl Step {
 /// Returns each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
 #[must_use]
 pub fn reading(number: usize, row: &Row) -> f32 {
-    // No gyro says the same for long: a reading is never the one before.
+    // A gyro that repeats itself counts as stuck, so no reading equals the one before.
     let noise = if number.is_multiple_of(2) { STEP / 4.0 } else { -STEP / 4.0 };
     ((row.reference * 0.01 / MESSAGES as f64 / STEP).round() * STEP + noise) as f32
 }
@@ -94,7 +94,7 @@ fn wheels(speed: f64) -> DataFrame {
     DataFrame::new(id, &[code.to_be_bytes(); 4].concat()).expect("eight bytes")
 }
 
-/// An input over one line.
+/// Holds an input over one line.
 enum Input {
     Wheels(DataFrame),
     Imu(Vec<u8>),
@@ -128,15 +128,15 @@ impl Input {
     }
 }
 
-/// The results of both boards.
+/// Holds the results of both boards.
 pub struct Outcome {
     /// The host's board, which never finds its sensor silent.
     pub host: replay::Board,
     /// The host's board that was silent where the emulated one was.
     pub followed: replay::Board,
-    /// The number of frames of the emulated one.
+    /// The number of frames of the emulated board.
     pub sent: usize,
-    /// The counters of the emulated one.
+    /// The counters of the emulated board.
     pub counters: AllCounters,
 }
 
@@ -189,8 +189,8 @@ pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step
 /// # Panics
 /// Where it does not answer.
 pub fn counters(device: &mut Device<Line>) -> AllCounters {
-    // Idle copies the counters before it looks for a question: where the output task came in
-    // between, the answer is older than that. The next one is not.
+    // Idle copies the counters before it checks for a request: if the output task ran in between, the answer is too
+    // old. The next one is not.
     let _ = device.ask(&Request::Counters);
     match device.ask(&Request::Counters) {
         Ok(Reply::Counters(counters)) => counters,

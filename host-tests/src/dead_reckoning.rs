@@ -1,4 +1,4 @@
-//! Dead reckoning of a simulated sequence with turns from elsewhere.
+//! This module does dead reckoning of a simulated sequence with turns from any source.
 
 use gyronet::odometry::Track;
 use gyronet_tools::evaluate::trajectory_error::TrajectoryError;

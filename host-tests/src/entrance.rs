@@ -1,5 +1,5 @@
-//! Every place where bytes from outside come in, as a function of any bytes that panics where
-//! what comes out breaks a promise.
+//! This module lists every place where bytes from outside come in, as a function that takes any bytes and panics if the
+//! result breaks a promise.
 //!
 //! The fuzz targets of `host-tests/fuzz` run these under coverage; `tests/library/entrances.rs` runs them
 //! over the corpus and over damaged copies of it.
@@ -14,17 +14,17 @@ mod service;
 mod slcan;
 mod weights;
 
-/// A named input.
+/// Holds a named input.
 pub type Seed = (&'static str, Vec<u8>);
 
-/// One entrance.
+/// Describes one entrance.
 #[derive(Debug, Clone, Copy)]
 pub struct Entrance {
     /// The name of its fuzz target and of its folder in the corpus.
     pub name: &'static str,
     /// The function, which takes any bytes.
     pub run: fn(&[u8]),
-    /// The corpus to begin with: made here, none of it recorded.
+    /// The initial corpus, which is generated and not recorded.
     pub seeds: fn() -> Vec<Seed>,
     /// The number of damaged copies that a test runs in well under a second.
     pub mutations: u64,
@@ -63,7 +63,7 @@ pub fn run(name: &str, data: &[u8]) {
     (entrance.run)(data);
 }
 
-/// Takes bytes off the front; all there are where there are fewer.
+/// Takes bytes off the front; if there are fewer, it takes all.
 fn take<'d>(data: &mut &'d [u8], len: usize) -> &'d [u8] {
     let (head, tail) = data.split_at(len.min(data.len()));
     *data = tail;

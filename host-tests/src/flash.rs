@@ -1,10 +1,9 @@
-//! A mock of the STM32F405's flash: its sectors, its rules, and a power cut at any operation.
+//! This module is a mock of the STM32F405's flash: its sectors, its rules, and a power cut at any operation.
 //!
-//! The rules (RM0090 3.5, 3.6): a sector is erased as a whole, and the sectors are of unequal
-//! sizes; a word that has been programmed is not programmed again until its sector has been
-//! erased, and programming only clears bits. Breaking a rule is a bug of the caller and panics.
-//! One relief: a word that a power cut has torn may be programmed again if that only clears
-//! bits, as the part allows.
+//! The rules (RM0090 3.5, 3.6): a sector is erased as a whole, and the sectors are of unequal sizes; a word that has
+//! been programmed is not programmed again until its sector has been erased, and programming only clears bits. Breaking
+//! a rule is a bug of the caller and panics. One exception: a word that a power cut has torn may be programmed again if
+//! that only clears bits, as the part allows.
 
 use crate::noise::Noise;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
@@ -17,7 +16,7 @@ use std::rc::Rc;
 const WORD: usize = 4;
 const BYTES: usize = 1 << 20;
 
-/// The ways in which a power cut hits an operation.
+/// Says how a power cut hits an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cut {
     /// The cut comes just before the operation.
@@ -42,7 +41,7 @@ impl Cut {
     }
 }
 
-/// The reasons why an operation was not done.
+/// Says why an operation was not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MockError {
     /// There is no power.
@@ -67,7 +66,7 @@ enum Word {
     Torn,
 }
 
-/// The whole flash of an STM32F405.
+/// Simulates the whole flash of an STM32F405.
 #[derive(Debug, Clone)]
 pub struct F405 {
     words: Vec<u32>,
@@ -121,7 +120,7 @@ impl F405 {
         bytemuck::cast_slice_mut::<u32, u8>(&mut self.words)[offset] ^= bits;
     }
 
-    /// Returns how far the next operation gets; `None`: to its end.
+    /// Returns how far the next operation gets; `None` if it is completed.
     fn step(&mut self) -> Result<Option<Cut>, MockError> {
         if !self.powered {
             return Err(MockError::PowerCut);
@@ -169,7 +168,7 @@ impl F405 {
     }
 }
 
-/// A part of the flash whose sectors are `SECTOR` bytes long, its offsets counted from its start.
+/// Gives access to a part of the flash whose sectors are `SECTOR` bytes long; offsets count from its start.
 #[derive(Debug, Clone)]
 pub struct Region<const SECTOR: usize> {
     flash: Rc<RefCell<F405>>,
@@ -236,7 +235,7 @@ impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
     }
 }
 
-/// The weight slots of a flash, which can also be read in place.
+/// Gives access to the weight slots of a flash, which can also be read in place.
 ///
 /// [`MappedSlots::slots`] returns a copy of the content at the last operation: the
 /// mock's bytes are behind a cell.

@@ -1,15 +1,15 @@
-//! The outputs of PyTorch for some windows, layer by layer, as `tools/train` exports them.
+//! This module reads the outputs of PyTorch for some windows, layer by layer, as `tools/train` exports them.
 
 use crate::recordings::workspace;
 use safetensors::{Dtype, SafeTensors};
 
-/// The number of windows in each file.
+/// Each file has this many windows.
 pub const WINDOWS: usize = 8;
-/// The largest difference: f32 sums of a few hundred products of order 1, twice over, in another order than PyTorch's.
-/// A normalised input of 20 has an LSB of 2e-6; all else stays within 1.
+/// Values may differ by this: f32 sums of a few hundred products of order 1, twice over, are in another order than
+/// PyTorch's. A normalised input of 20 has an LSB of 2e-6; everything else stays within 1.
 const TOLERANCE: f32 = 1e-5;
 
-/// A file of golden tensors.
+/// Holds a file of golden tensors.
 #[derive(Debug)]
 pub struct Golden(Vec<u8>);
 

@@ -1,4 +1,4 @@
-//! The firmware images, built as `cargo fw` builds them, so that the tests run what is flashed.
+//! This module builds the firmware images as `cargo fw` does, so that the tests run the same code as a board.
 
 use crate::qemu;
 use crate::recordings::workspace;
@@ -34,14 +34,14 @@ pub fn firmware_for(
 ) -> Option<PathBuf> {
     require::wants(test, Need::Qemu, bench::target_installed(target))?;
     static BUILT: Mutex<BTreeMap<String, PathBuf>> = Mutex::new(BTreeMap::new());
-    // A test that panicked here has left the map as it was.
+    // A test that panicked here has left the map unchanged.
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
     let name = format!("{board}/{image}");
     if let Some(elf) = built.get(&name) {
         return Some(elf.clone());
     }
-    // One folder for all boards, so that they share what does not depend on the board; the next one's image takes the
-    // place of this one's there.
+    // All boards share one folder, and with it everything that does not depend on the board; the next board's image
+    // overwrites this one's there.
     let scratch = Path::new(scratch);
     let fresh = bench::build_for((board, target), workspace(), image, &scratch.join("images"));
     let fresh = fresh.unwrap_or_else(|error| panic!("{error}"));

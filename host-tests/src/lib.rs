@@ -1,5 +1,5 @@
-//! The parts that the host tests share: how a test gets QEMU or the recordings or reports that it is skipped, the
-//! emulated board and its image, and every generator of bytes, samples, streams and weights.
+//! This crate holds the parts that the host tests share: how a test gets QEMU or the recordings or reports that it is
+//! skipped, the emulated board and its image, and every generator of bytes, samples, streams and weights.
 
 pub mod board;
 pub mod connected;

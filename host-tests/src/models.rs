@@ -1,4 +1,5 @@
-//! Window models of any shape with random weights, and windows for them: those of the firmware's images.
+//! This module makes window models of any shape with random weights, and windows for them, with the code of the
+//! firmware's images.
 
 #[path = "../../src/bin/support/numbers.rs"]
 mod numbers;

@@ -1,17 +1,17 @@
-//! Random numbers from a seed for long streams, the same on every machine and every time; and the settings of the
-//! property tests, whose seeds change from run to run.
+//! This module makes random numbers from a seed for long streams, the same on every machine and every time; and the
+//! settings of the property tests, whose seeds change from run to run.
 
 use proptest::test_runner::Config;
 
 /// Returns the settings for so many cases. Failed ones are not written beside the sources: the message has the input.
 #[must_use]
 pub fn cases(count: u32) -> Config {
-    // Miri looks at every access of a case: a few are enough there.
+    // Miri checks every access of a case, so a few cases are enough there.
     let cases = if cfg!(miri) { count.min(4) } else { count };
     Config { cases, failure_persistence: None, ..Config::default() }
 }
 
-/// The generator SplitMix64 (Steele, Lea, Flood: Fast Splittable Pseudorandom Number Generators, 2014).
+/// Generates random numbers by SplitMix64 (Steele, Lea, Flood: Fast Splittable Pseudorandom Number Generators, 2014).
 #[derive(Debug, Clone)]
 pub struct Noise(u64);
 

@@ -1,11 +1,11 @@
-//! LSTM weights row by row, and packed in the way that the documentation of `gyronet::nn::lstm`
-//! says: written from there, not from the quantiser.
+//! This module makes LSTM weights row by row and packs them as the documentation of `gyronet::nn::lstm` says; it was
+//! written from there, not from the quantiser, so that it can check both.
 
 use crate::noise::Noise;
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::{GATES, HIDDEN_MAX};
 
-/// One gate row of one unit.
+/// Holds one gate row of one unit.
 #[derive(Debug, Clone, Default)]
 pub struct Row {
     /// The bias, in accumulator units.
@@ -55,7 +55,7 @@ impl Row {
     }
 }
 
-/// The rows i, f, g, o of each unit.
+/// Holds the rows i, f, g, o of each unit.
 #[derive(Debug, Clone)]
 pub struct Rows(pub Vec<[Row; GATES]>);
 
@@ -77,7 +77,7 @@ impl Rows {
             Packed { units: self.0.len(), inputs: self.0[0][0].input.len(), ..Packed::default() };
         for unit in &self.0 {
             let [i, f, g, o] = unit.each_ref().map(|row| row.bias);
-            // 256 * high + low may pass 32 bits: it is meant modulo 2^32.
+            // 256 * high + low may exceed 32 bits: it is taken modulo 2^32.
             let both = |low: i32, high: i32| 256 * i64::from(high) + i64::from(low);
             packed.input.extend([i.into(), both(i, f), g.into(), both(g, o)].map(|start: i64| start as u32));
             columns(&mut packed.input, unit.each_ref().map(|row| row.input.clone()), 2);
@@ -110,7 +110,7 @@ fn columns(out: &mut Vec<u32>, mut rows: [Vec<i8>; GATES], multiple: usize) {
     }
 }
 
-/// Weights in reading order.
+/// Holds weights in reading order.
 #[derive(Debug, Clone, Default)]
 pub struct Packed {
     units: usize,

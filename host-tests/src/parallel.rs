@@ -1,9 +1,9 @@
-//! Recordings side by side, because each of them keeps a core busy for seconds.
+//! This module processes recordings side by side, because each of them keeps a core busy for seconds.
 
-/// Prints a table of the lines that `judge` returns for each item; what does not hold is reported with it.
+/// Prints a table of the lines that `judge` returns for each item, with the failures that it reports.
 ///
 /// # Panics
-/// Where something does not hold.
+/// When an item fails.
 pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String, Vec<String>) + Sync) {
     let (lines, failures): (Vec<_>, Vec<_>) = map(items, judge).into_iter().unzip();
     let table = format!("{heading}\n{}", lines.concat());

@@ -1,4 +1,4 @@
-//! The emulated board for tests: [`gyronet_tools::target::emulator`] with errors that end the test.
+//! This module is the emulated board for tests: [`gyronet_tools::target::emulator`] with errors that end the test.
 
 use crate::require::{self, Need};
 use gyronet_tools::client::device::{Device, line::Line};
@@ -7,16 +7,16 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
 
-/// The USART of the service line.
+/// The service line is on this USART.
 pub const SERVICE: usize = 6;
 
-/// Looks for QEMU; without it reports that the test is skipped.
+/// Checks for QEMU; without it reports that the test is skipped.
 #[must_use]
 pub fn available(test: &str) -> Option<()> {
     require::wants(test, Need::Qemu, emulator::available().map_err(|error| error.to_string()))
 }
 
-/// An emulated board that runs an image. Whatever goes wrong with it is a panic with QEMU's own words; each method is
+/// Controls an emulated board that runs an image. Each failure is a panic with QEMU's own message; each method is
 /// described at that of the same name in [`emulator::Board`].
 #[derive(Debug)]
 pub struct Board(emulator::Board);

@@ -1,5 +1,5 @@
-//! The recordings of real drives, which a test finds or is skipped. They are not part of the repository, because their
-//! licence does not allow it.
+//! This module finds the recordings of real drives; a test without them is skipped. They are not part of the
+//! repository, because their licence does not allow it.
 
 use crate::require::{self, Need};
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
     require::wants(test, Need::Data, found)
 }
 
-/// One row of a recording.
+/// Holds one row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// The time, s.

@@ -1,5 +1,5 @@
-//! The image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames in,
-//! SLCAN lines out. It is the input and output around the library's [`Coprocessor`], as the image is.
+//! This module is the image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames go in,
+//! SLCAN lines come out. It is the input and output around the library's [`Coprocessor`], as the image is.
 
 use crate::recordings::{self, Row, workspace};
 use gyronet::can::config::Config;
@@ -17,7 +17,7 @@ use gyronet::store::{Calibration, Configuration};
 use gyronet::units::Micros;
 use std::ops::Range;
 
-/// The messages that the image sends.
+/// The image sends these messages.
 pub const CONFIG: Config = Config::DEFAULT;
 
 /// Returns the message that an MTi would send for a row.
@@ -81,7 +81,7 @@ pub fn lines(bytes: &[u8]) -> Vec<Vec<u8>> {
     board.lines
 }
 
-/// The board's output task on the host.
+/// Runs the board's output task on the host.
 pub struct Board {
     config: coprocessor::Config,
     coprocessor: Coprocessor,
@@ -146,9 +146,9 @@ impl Board {
         }
     }
 
-    /// Returns a board that follows an emulated one which has sent these lines. A busy host may keep its bytes back for
-    /// so long that it finds the sensor silent, by its own clock, and reports that; where it has, this one reports it
-    /// too. All else must be the same.
+    /// Returns a board that follows an emulated one which has sent these lines. A busy host may delay its bytes for so
+    /// long that the emulated board finds the sensor silent, by its own clock, and reports that; this board then
+    /// reports it too. Everything else must be the same.
     #[must_use]
     pub fn following(lines: Vec<Vec<u8>>) -> Self {
         Self::new().beside(lines)
@@ -212,7 +212,7 @@ impl Board {
 
     /// Takes a wheel frame.
     pub fn wheel(&mut self, frame: &DataFrame) {
-        // A wrong one shows as the wheels' silence.
+        // A wrong frame shows as silent wheels.
         let _ = self.coprocessor.can(frame, self.now);
     }
 
@@ -222,9 +222,9 @@ impl Board {
             self.dsp1760.receive(*byte);
             while let Some(sample) = self.dsp1760.next_sample() {
                 if let Ok(sample) = sample {
-                    // Silence may fall before this sample or behind it.
+                    // Silence may come before this sample or after it.
                     self.follow();
-                    // What has no place in time is counted.
+                    // A sample without a place in time is counted.
                     let _ = self.coprocessor.fog(sample, self.now);
                     self.follow();
                     self.send();
@@ -239,10 +239,10 @@ impl Board {
         self.coprocessor.fog_counters()
     }
 
-    /// Lets the sensor be silent for so many message sets; from the start, where it has sent nothing yet.
+    /// Lets the sensor be silent for so many message sets; if it has sent nothing yet, from the start.
     ///
     /// # Panics
-    /// When the coprocessor does not say so.
+    /// When the coprocessor does not report it.
     pub fn silence(&mut self, sets: u64) {
         for _ in 0..sets {
             self.now = self.next_silence();
@@ -253,7 +253,7 @@ impl Board {
         }
     }
 
-    /// Sends the frames that there are, and runs the windows that are due.
+    /// Sends the waiting frames, and runs the windows that are due.
     fn send(&mut self) {
         while let Some(sent) = self.coprocessor.next_frame() {
             self.lines.push(line(&sent));

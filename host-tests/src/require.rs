@@ -1,8 +1,8 @@
-//! Requirements of a test beyond Rust: it gets them, or it is reported as skipped, or it fails.
+//! This module handles the requirements of a test beyond Rust: the test gets them, or is reported as skipped, or fails.
 //!
-//! `GYRONET_REQUIRE=qemu,data` makes tests that want these fail where they are missing; without
-//! it they print `SKIPPED name: why` and pass. The line goes straight to the process's standard
-//! error, which the test harness does not capture: a plain `cargo test` shows it.
+//! `GYRONET_REQUIRE=qemu,data` makes tests that need these fail where they are missing; without it they print `SKIPPED
+//! name: why` and pass. The line goes straight to the process's standard error, which the test harness does not
+//! capture: a plain `cargo test` shows it.
 
 use std::io::Write;
 use std::process::Command;
@@ -10,7 +10,7 @@ use std::process::Command;
 /// The environment variable that lists the requirements that must be met, separated by commas.
 pub const VARIABLE: &str = "GYRONET_REQUIRE";
 
-/// A requirement that not every machine meets.
+/// Names a requirement that not every machine meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
     /// The program qemu-system-arm and the target's standard library.
@@ -26,7 +26,7 @@ impl Need {
         [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python)];
 }
 
-/// The requirements that must be met.
+/// Holds the requirements that must be met.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Required(Vec<Need>);
 
@@ -34,7 +34,7 @@ impl Required {
     /// Reads the list.
     ///
     /// # Errors
-    /// The word that is no [`Need`]: a misspelt one would require nothing.
+    /// The word that is not a [`Need`]: otherwise a misspelt one would require nothing.
     pub fn parse(list: &str) -> Result<Self, String> {
         let words = list.split(',').map(str::trim).filter(|word| !word.is_empty());
         let need = |word: &str| {

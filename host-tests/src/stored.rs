@@ -1,5 +1,6 @@
-//! The flash of an emulated board before it starts: written by the library's own store to the mock of
-//! the F405's flash, and laid into the emulator's memory, which is mapped though it has no controller.
+//! This module prepares the flash of an emulated board before it starts: the library's own store writes it to the mock
+//! of the F405's flash, and it is loaded into the emulator's memory, which is mapped although the emulator has no flash
+//! controller.
 
 use crate::flash::{F405, Region};
 use crate::qemu;
@@ -51,14 +52,15 @@ pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), 
 pub fn other_weights(bits: u8) -> Vec<u8> {
     let mut file = weights::DEFAULT.0.to_vec();
     let end = file.len() - 4;
-    // Behind it: two bytes of its own, multiplier, the other row (120 weights, 8 bytes), the unit.
+    // After that byte come two more bytes of the bias, the multiplier, the other row (120 weights, 8 bytes) and the
+    // unit.
     file[end - (2 + 1 + 4 + 2 * 120 + 8 + 4)] ^= bits;
     let crc = CRC.checksum(&file[..end]);
     file[end..].copy_from_slice(&crc.to_le_bytes());
     file
 }
 
-/// A board's flash before it starts.
+/// Holds a board's flash before it starts.
 #[derive(Debug, Default)]
 pub struct Stored(Rc<RefCell<F405>>);
 
@@ -73,7 +75,7 @@ impl Stored {
         self
     }
 
-    /// Stores an accepted weight file; the last one is the one to be used.
+    /// Stores an accepted weight file; the last one is used.
     ///
     /// # Panics
     /// When it is refused.
@@ -90,7 +92,7 @@ impl Stored {
         self
     }
 
-    /// Lays it into a virtual board's flash.
+    /// Copies it into a virtual board's flash.
     pub fn lay(&self, board: &mut crate::board::Board) {
         let flash = self.0.borrow();
         for range in [layout::STORE, layout::SLOTS] {

@@ -1,4 +1,4 @@
-//! A pipeline that gets samples, with a network of the test's own behind it.
+//! This module runs samples through a pipeline with a network of the test's own.
 
 use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};
@@ -7,7 +7,7 @@ use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
 
-/// The first tick after static initialisation, where nothing disturbs it.
+/// Undisturbed, static initialisation is over from this tick on.
 pub const KNOWN: u64 = 300;
 
 /// Returns a pipeline with its defaults.
@@ -26,7 +26,7 @@ pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
     move |_| Some(Estimate { corrections: [rate(correction); WINDOW], scale: SCALE_MIN, ..Estimate::NONE })
 }
 
-/// Runs samples through a pipeline; estimates are delivered at once, `None` never.
+/// Runs samples through a pipeline; estimates are delivered at once, and a `None` is not delivered.
 ///
 /// # Panics
 /// When a sample has no place on the grid.

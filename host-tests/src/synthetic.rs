@@ -1,4 +1,4 @@
-//! Samples of a vehicle that stands, turns or shakes, in the codes of the pipeline.
+//! This module makes samples of a vehicle that stands, turns or shakes, in the codes of the pipeline.
 
 use crate::noise::Noise;
 use gyronet::estimate::{VehicleSample, YawEstimate};
@@ -24,7 +24,7 @@ pub fn force(metre_per_sec2: f64) -> SpecificForce {
     SpecificForce::from_metre_per_sec2(metre_per_sec2 as f32).expect("an accelerometer's range")
 }
 
-/// Returns a sample of a level vehicle at grid step `tick` that turns by `yaw_rate` and does nothing else.
+/// Returns a sample of a level vehicle at grid step `tick` that turns at `yaw_rate` and does not move otherwise.
 #[must_use]
 pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
     ImuSample {

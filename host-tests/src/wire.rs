@@ -1,4 +1,4 @@
-//! Bytes of an Xsens MTi, and the samples that the driver delivers for them.
+//! This module makes bytes of an Xsens MTi, and the samples that the driver delivers for them.
 
 use gyronet::sample::ImuSample;
 use gyronet::sensor::xsens::{MtData2, Mti, XsensError};

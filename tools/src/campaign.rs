@@ -1,10 +1,10 @@
-//! Fault injection: drives become bytes on the board's lines, faults damage them, and a receiver judges the board's
-//! messages.
+//! These modules inject faults: drives become bytes on the board's lines, faults damage them, and a receiver judges the
+//! board's messages.
 //!
-//! A [`drive::Drive`] becomes the bytes that a [`Part`] and the vehicle's wheels would send;
-//! faults disturb what is measured ([`motion`]) or damage bytes on a line ([`wire`]); the
-//! [`board::Board`], the library's own parts in the order of the image, turns them into bytes of
-//! frames; a [`receiver::Receiver`] reads these as an ECU would. Nothing looks inside.
+//! A [`drive::Drive`] becomes the bytes that a [`Part`] and the vehicle's wheels would send; faults disturb what is
+//! measured ([`motion`]) or damage bytes on a line ([`wire`]); the [`board::Board`], the library's own parts in the
+//! order of the image, turns them into bytes of frames; a [`receiver::Receiver`] reads these as an ECU would. The
+//! judgement rests on these bytes alone, as a vehicle's would.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -17,9 +17,8 @@
 //! | error | yaw turned in a good second less the drive's reference: what is left of it without faults is the method's |
 //! | recovery | from the end of the fault to the last report |
 //!
-//! After a report, and from 0.2 s after the last one on, what counts is by how much
-//! the error of a good second has grown against the same second undamaged: the network's windows
-//! begin at another sample then, and two estimates that are equally good need not be equal.
+//! From 0.2 s after the last report on, the error of a good second is compared with that of the same second undamaged:
+//! the network's windows then begin at another sample, and two equally good estimates need not be equal.
 
 pub mod board;
 pub mod drive;
@@ -51,16 +50,16 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Runs of a small campaign: twelve of each kind alone, and 128 pairs.
+/// A small campaign has this many runs: twelve of each kind alone, and 128 pairs.
 pub const QUICK: usize = 320;
-/// Rows of a run at most: 8 s.
+/// A run has at most this many rows: 8 s.
 const ROWS: usize = 800;
-/// Rows of a run after its faults are over, and with those that stay.
+/// A run has this many rows after its faults are over, and with faults that last.
 const AFTER: usize = 350;
 const WITH: usize = 400;
-/// Rows before a fault may begin, a second of them to be good in.
+/// A fault begins after at least this many rows, so that a good second comes first.
 const HEALTHY: usize = 101;
-/// Rows before a fault may begin in a run that starts with static initialisation.
+/// In a run that starts with static initialisation, a fault begins after at least this many rows.
 const HEALTHY_AT_START: usize = 20;
 /// One run in so many starts at the beginning of its drive.
 const START_EVERY: u64 = 8;
@@ -68,18 +67,18 @@ const START_EVERY: u64 = 8;
 const OF: usize = 5;
 const SINGLE: usize = 3;
 
-/// The size of a campaign.
+/// Describes the size of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
     /// Runs.
     pub runs: usize,
-    /// The same seed gives the same runs.
+    /// Seed of the runs; the same one gives the same runs.
     pub seed: u64,
     /// Threads.
     pub threads: usize,
 }
 
-/// One run of a drive with faults.
+/// Holds one run of a drive with faults.
 #[derive(Debug, Clone)]
 pub struct Run {
     /// Its number.
@@ -187,7 +186,7 @@ fn one(seed: u64, number: usize, scenes: &[Scene<'_>], networks: &mut Integer<'_
     Run { number, drive: scene.drive.name.clone(), part: scene.part, span, faults, outcome }
 }
 
-/// Makes `count` things on some threads, each thread with a tool of its own, and returns them in their order.
+/// Makes `count` results on some threads, each with a tool of its own, and returns them in order.
 fn on_threads<W, T: Send>(
     threads: usize,
     count: usize,

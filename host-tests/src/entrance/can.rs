@@ -1,4 +1,4 @@
-//! Frames from the vehicle bus: wheel speeds, and messages as a receiver of ours reads them.
+//! This module reads frames from the vehicle bus: wheel speeds, and our own messages as a receiver reads them.
 
 use super::{Seed, byte, take};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -44,8 +44,8 @@ fn two_wheels(checksum: Checksum) -> WheelSettings {
 }
 
 /// Receives wheel frames: the first byte selects the settings; then come frames: a byte of time, a byte of kind (which
-/// identifier, how long, whether its protection is made to fit), eight bytes. Of what is said of
-/// the wheels, nothing is older than its limit or contradicts the speeds.
+/// identifier, how long, whether its protection is made to fit), eight bytes. No report of the wheels may be older than
+/// its limit or contradict the speeds.
 pub fn wheels(mut data: &[u8]) {
     let choice = byte(&mut data);
     let checksum = match choice % 8 {
@@ -106,9 +106,8 @@ pub fn wheel_seeds() -> Vec<Seed> {
     ]
 }
 
-/// Parses blocks of eight bytes and a last short one as every message there is, and through the checks of
-/// every profile; three bytes as a place of a signal in the block. What is read is written the
-/// same.
+/// Parses blocks of eight bytes and a last short one as every message there is, and through the checks of every
+/// profile; three bytes as a place of a signal in the block. A message that was read must be written as the same bytes.
 pub fn messages(mut data: &[u8]) {
     let (start, len, kind) = (byte(&mut data), byte(&mut data), byte(&mut data));
     let order = if kind & 1 == 0 { ByteOrder::Intel } else { ByteOrder::Motorola };
@@ -134,7 +133,7 @@ pub fn messages(mut data: &[u8]) {
             assert_eq!(message.emit(), block);
         }
         if let Ok(message) = RateMessage::parse(block) {
-            // The three bits above quality mean nothing yet.
+            // The three bits above quality are not used yet.
             assert_eq!(message.emit()[3..7], block[3..7]);
             assert!(message.deg_per_sec().is_none_or(f64::is_finite));
         }

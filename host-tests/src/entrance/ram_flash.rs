@@ -1,11 +1,10 @@
-//! Flash in RAM, as quick as fuzzing wants it. The rules of the real one are
-//! [`crate::flash`]'s to hold.
+//! This module keeps a flash in RAM, fast enough for fuzzing. [`crate::flash`] checks the rules of the real one.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
 use gyronet::store::layout::SLOT_SIZE;
 
-/// A flash of two sectors.
+/// Simulates a flash of two sectors.
 #[derive(Clone)]
 pub struct RamFlash<const SECTOR: usize> {
     words: Vec<u32>,
@@ -63,7 +62,7 @@ impl<const SECTOR: usize> NorFlash for RamFlash<SECTOR> {
         if !offset.is_multiple_of(4) || !bytes.len().is_multiple_of(4) {
             return Err(NorFlashErrorKind::NotAligned);
         }
-        // Programming clears bits, and that is all it does.
+        // Programming only clears bits.
         for (to, from) in self.range(offset, bytes.len())?.iter_mut().zip(bytes) {
             *to &= from;
         }

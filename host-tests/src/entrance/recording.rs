@@ -1,4 +1,4 @@
-//! Recordings as CSV files, as a user of the tools gives them.
+//! This module reads recordings as CSV files, as a user of the tools gives them.
 
 use super::Seed;
 use gyronet::sample::PERIOD_US;

@@ -1,4 +1,4 @@
-//! Records in flash: configuration, calibration, and the accepted weights.
+//! This module reads records in flash: configuration, calibration, and the accepted weights.
 
 use super::ram_flash::RamFlash;
 use super::{Seed, byte, take};
@@ -9,13 +9,13 @@ use gyronet::model::blob::CRC;
 use gyronet::store::{Accepted, Calibration, Configuration, Level, Record, Store};
 use gyronet::units::{AngularRate, CentiCelsius};
 
-/// The size of a sector, smaller than the part's, so that it is soon full.
+/// A sector has this size, smaller than the part's, so that it is soon full.
 pub const SECTOR: usize = 1024;
 type Flash = RamFlash<SECTOR>;
 
-/// Takes bytes as those of both sectors; or, behind an odd byte, as records (key, version, length,
-/// content) whose lengths, headers and checksums are made to fit. What is read is inside its
-/// ranges and fit to be run with, and what is stored is read again.
+/// Takes bytes as those of both sectors; or, behind an odd byte, as records (key, version, length, content) whose
+/// lengths, headers and checksums are made to fit. A record that is read must be inside its ranges and usable, and a
+/// stored record must be read again.
 pub fn flash(mut data: &[u8]) {
     let flash = if byte(&mut data) & 1 == 0 { Flash::new(data) } else { Flash::new(&fitting(data)) };
     let mut store = Store::open(flash, 0, false).expect("the flash answers");
@@ -43,7 +43,7 @@ fn run(configuration: &Configuration, calibration: &Calibration) {
     }
 }
 
-/// Returns a sector of records as they should be.
+/// Returns a sector of valid records.
 fn fitting(mut data: &[u8]) -> Vec<u8> {
     let generation = 1_u32;
     let header = CRC.checksum(&(generation ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());

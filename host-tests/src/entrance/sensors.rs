@@ -1,4 +1,4 @@
-//! The bytes of the five sensors, as their parsers and dialogues take them.
+//! This module gives bytes to the parsers and dialogues of the five sensors.
 
 use super::Seed;
 use crate::wire::{bytes, message, synthetic_frame};
@@ -29,7 +29,7 @@ pub fn xsens(data: &[u8]) {
         let _ = dialogue.poll(Micros(now * 10_000));
     }
     if let Ok(message) = MtData2::parse(data) {
-        // What was read is written and read as the same; NaN is not equal to itself.
+        // A message that was read is written and read as the same; NaN is not equal to itself.
         let frame = message.emit_as(Precision::Double);
         let (_, again) = xbus::parse(&frame).expect("a frame of its own");
         let again = MtData2::parse(again).expect("a message of its own");
@@ -64,7 +64,7 @@ pub fn dsp1760(data: &[u8]) {
     for frame in [data, &frame] {
         if let Ok(message) = Message::parse(frame) {
             let again = Message::parse(&message.emit()).expect("a message of its own");
-            // By their bytes: NaN is not equal to itself.
+            // They are compared by their bytes, because NaN is not equal to itself.
             assert_eq!(again.emit(), message.emit());
         }
     }

@@ -1,4 +1,4 @@
-//! Folders in the layouts of KAIST Urban and NCLT, as the loaders read them.
+//! This module gives folders in the layouts of KAIST Urban and NCLT to the loaders.
 
 use super::Seed;
 use gyronet_tools::paper::sequence::{Sequence, write_csv};
@@ -15,7 +15,7 @@ const KAIST: [&str; 5] = [
 ];
 const NCLT: [&str; 4] = ["ms25.csv", "kvh.csv", "wheels.csv", "groundtruth_2012-01-08.csv"];
 
-/// A folder of its own for each thread; only what has changed is written again.
+/// Holds a folder for each thread; only changed files are written again.
 struct Folder {
     path: PathBuf,
     files: Vec<Vec<u8>>,
@@ -54,8 +54,8 @@ thread_local! {
         RefCell::new([Folder::new("kaist", KAIST.len()), Folder::new("nclt", NCLT.len())]);
 }
 
-/// Reads a folder: the first byte selects the layout, then come the files, a zero between them. What is read is
-/// finite and can be written out; what is refused is refused with the name of a file of it.
+/// Reads a folder: the first byte selects the layout, then come the files, a zero between them. Values that are read
+/// must be finite and can be written out; an error must name a file of the folder.
 pub fn folder(data: &[u8]) {
     let Some((layout, data)) = data.split_first() else { return };
     let layout = usize::from(layout & 1);

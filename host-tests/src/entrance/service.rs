@@ -1,4 +1,4 @@
-//! The service line in both directions: requests to the board, replies to the host.
+//! This module tests the service line in both directions: requests to the board, replies to the host.
 
 use super::ram_flash::RamFlash;
 use super::records::SECTOR;
@@ -25,14 +25,14 @@ const DRIVES: SupportedHardware = SupportedHardware {
 type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
 
 /// Runs the service line: the first byte says whether there is flash and whether the rest comes as it is, or as
-/// messages (length, content) whose frames are made to fit. Every answer is one that the asking
-/// side reads; what is stored by them, a board starts with.
+/// messages (length, content) whose frames are made to fit. Every answer must be one that the host reads, and a board
+/// must start with everything that was stored.
 pub fn line(mut data: &[u8]) {
     let choice = byte(&mut data);
     let mut board = Board::new(&DRIVES);
     let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(|| RamFlash::new(&[])));
     board.begin((choice & 4 != 0).then_some(records), slots, choice & 8 == 0, Identity::UNKNOWN);
-    // As the asking side, which a board might talk nonsense to.
+    // The same bytes go to the host's side, in case a board sends nonsense.
     let mut asker = Deframer::new();
     for byte in data {
         if let Some(Ok((number, reply))) = asker.receive::<Reply>(*byte) {

@@ -1,4 +1,4 @@
-//! SLCAN: what a host says to the board, and what the monitor reads from a line or a log.
+//! This module tests SLCAN: a host's commands to the board, and the bytes that the monitor reads from a line or a log.
 
 use super::Seed;
 use crate::synthetic::{rate, vehicle};
@@ -16,8 +16,8 @@ use gyronet_tools::drive::candump::Log;
 /// The answers of a board besides frames.
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
 
-/// Takes bytes as a host's commands, while frames go out over a line that takes a few bytes now and then:
-/// what leaves is whole lines, each an answer or the frame that was sent.
+/// Takes bytes as a host's commands, while frames go out over a line that takes a few bytes now and then: the output
+/// must be whole lines, each an answer or the frame that was sent.
 pub fn board(data: &[u8]) {
     let own = DataFrame::new(StandardId::MAX, &[1, 2, 3]).expect("a frame");
     let mut port = Port::<4>::new(500_000);

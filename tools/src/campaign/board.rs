@@ -1,4 +1,5 @@
-//! The board on the host: bytes of its lines go in and bytes of its CAN line come out, a millisecond at a time.
+//! This module is the board on the host: bytes of its lines go in and bytes of its CAN line come out, a millisecond at
+//! a time.
 //!
 //! It is the image's input and output around the library's [`Coprocessor`]: parsers of the part, SLCAN port, networks.
 
@@ -20,10 +21,10 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::units::{AngularRate, Micros};
 
-/// Frames that may wait, as in the image.
+/// At most this many frames may wait, as in the image.
 const QUEUE: usize = 24;
 
-/// The whole state of a board.
+/// Holds the whole state of a board.
 #[derive(Debug, Clone)]
 pub struct Board {
     input: Input,
@@ -43,7 +44,7 @@ impl Board {
             wheels,
             fog_expected: part == Part::Dsp1760,
             clock_ratio: Some(ClockRatioConfig::DEFAULT),
-            // The drives' increments have no Earth's rate in them.
+            // The drives' increments contain no Earth's rate.
             fog: FogConfig { latitude: Latitude::from_degrees(0.0), ..FogConfig::DEFAULT },
             ..Config::DEFAULT
         };
@@ -55,7 +56,7 @@ impl Board {
         }
     }
 
-    /// The gyro's static bias, zero before it is known.
+    /// Returns the gyro's static bias; zero before it is known.
     #[must_use]
     pub fn gyro_bias(&self) -> [AngularRate; 3] {
         self.coprocessor.pipeline().gyro_bias().unwrap_or_default()
@@ -141,7 +142,7 @@ impl Board {
         all.iter().map(|count| u64::from(*count)).sum()
     }
 
-    /// Sends the frames that there are, and runs the windows that are due.
+    /// Sends the waiting frames, and runs the windows that are due.
     fn send(&mut self, now: Micros, networks: &mut impl Networks, out: &mut Vec<Message>) {
         while let Some(sent) = self.coprocessor.next_frame() {
             let row = self.row_of(&sent);
@@ -163,7 +164,8 @@ impl Board {
         }
     }
 
-    /// Row of the drive that a frame belongs to: the fibre-optic gyro's are of the grid of the board's clock.
+    /// Returns the row of the drive that a frame belongs to; the fibre-optic gyro's frames are on the grid of the
+    /// board's clock.
     fn row_of(&self, sent: &TimedFrame) -> usize {
         let is_fog = |id: Id| FOG_IDS.iter().any(|own| matches!(id, Id::Standard(id) if id.as_raw() == *own));
         match self.coprocessor.fog_estimate() {

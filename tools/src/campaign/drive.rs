@@ -1,14 +1,14 @@
-//! The drives that faults are injected into: the readings of undamaged sensors, row by row.
+//! This module prepares the drives that faults are injected into: the readings of undamaged sensors, row by row.
 
 use crate::drive::recording::Recording;
 use crate::drive::wheel_frames::WheelFrames;
 use gyronet::sample::{ImuSample, PERIOD_US, WHEELS};
 use gyronet::units::{AngularRate, Micros};
 
-/// Board time of the step before the first row, microseconds.
+/// The step before the first row has this board time, microseconds.
 pub const START_US: u64 = 1_000_000;
 
-/// The undamaged measurements of one row.
+/// Holds the undamaged measurements of one row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// The sample of the part, stamped with the row's time by the board's clock.
@@ -17,32 +17,32 @@ pub struct Reading {
     pub at: u64,
     /// The rates of a fibre-optic gyro beside the part, equal to the reference where there is one.
     pub fog: [AngularRate; 3],
-    /// The fibre-optic gyro has no noise and repeats its readings.
+    /// Whether the fibre-optic gyro has no noise and repeats its readings.
     pub fog_stuck: bool,
     /// The error of the part's time stamp, microseconds.
     pub stamp_us: i64,
     /// The saturated axes: gyro, then accelerometer.
     pub saturated: [bool; 6],
-    /// An axis that sends no number, and which form that takes.
+    /// An axis that sends no number, and the form of what it sends.
     pub no_number: Option<(usize, usize)>,
     /// The speed of each wheel, km/h.
     pub wheels: [Option<f64>; WHEELS],
 }
 
-/// A drive on a whole grid.
+/// Holds a drive on a grid without gaps.
 #[derive(Debug, Clone)]
 pub struct Drive {
     /// The name in tables.
     pub name: String,
     /// The readings of undamaged sensors.
     pub readings: Vec<Reading>,
-    /// The true yaw turned up to and with each row, rad.
+    /// The true yaw up to and including each row, rad.
     pub truth: Option<Vec<f64>>,
 }
 
 impl Drive {
-    /// Converts a recording. Its time stamps go to the nearest grid step, because jitter is a fault and the campaign
-    /// adds the faults.
+    /// Converts a recording. Its time stamps are moved to the nearest grid step, because jitter is a fault and the
+    /// campaign adds the faults.
     #[must_use]
     pub fn new(recording: &Recording) -> Self {
         let mut readings = Vec::with_capacity(recording.rows.len());

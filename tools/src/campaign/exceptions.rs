@@ -1,10 +1,10 @@
-//! The named faults that nothing on the board can detect, each with a bound of its effect.
+//! This module lists the faults that nothing on the board can detect, each with a bound of its effect.
 
 use super::fault::{Axes, Fault, Kind, Line};
 use crate::parts::Part;
 use crate::parts::icm42688::WRAP_US;
 
-/// A fault that may go undetected.
+/// Describes a fault that may go undetected.
 #[derive(Debug, Clone, Copy)]
 pub struct Exception {
     /// The name in tables.
@@ -16,12 +16,12 @@ pub struct Exception {
     bound: fn(&Fault, Part) -> Option<f64>,
 }
 
-/// A fault of another kind beside it may change the windows: what that is worth, rad.
+/// A fault of another kind beside it may change the windows, and with them the yaw by this, rad.
 const MARGIN: f64 = 5e-4;
-/// The fastest turn of the drives, rad/s, with room.
+/// The drives turn no faster than this, rad/s, with a margin.
 const FASTEST: f64 = 0.7;
 
-/// The named list.
+/// Lists the exceptions.
 pub const EXCEPTIONS: &[Exception] = &[
     Exception {
         name: "bias step of the gyro about z",
@@ -49,7 +49,7 @@ pub const EXCEPTIONS: &[Exception] = &[
         why: "a stamp that is so much earlier may be jitter: what is sent is as much older, until a second of it \
               shows; bound 0.7 rad/s times the jump",
         bound: |fault, part| {
-            // An ICM's stamps wrap: a jump by nearly a whole turn of them is a small one.
+            // An ICM's stamps wrap: a jump by nearly a whole wrap is a small one.
             let wraps = if part == Part::Icm42688 { WRAP_US } else { f64::INFINITY };
             let turns = (fault.size / wraps).round();
             let jump = if turns == 0.0 { fault.size } else { fault.size - turns * wraps };
@@ -95,8 +95,8 @@ pub const EXCEPTIONS: &[Exception] = &[
     },
 ];
 
-/// The exception that covers what a run's faults moved. Errors of a pair add up: where no name alone
-/// covers it, its faults may move as much as each of them, and the wider one's name is given.
+/// Returns the exception that covers the yaw moved by a run's faults. Errors of a pair add up: if no exception alone
+/// covers it, its faults may move yaw by the sum of their bounds, and the wider one's name is given.
 #[must_use]
 pub fn excepted(faults: &[Fault], part: Part, moved: f64) -> Option<&'static Exception> {
     let covers = |exception: &&Exception| {

@@ -1,10 +1,10 @@
-//! The kinds of faults, and how a seed draws one.
+//! This module lists the kinds of faults, and draws faults from a seed.
 
 use crate::parts::Part;
 use crate::random::Random;
 use serde::Serialize;
 
-/// Kinds of faults.
+/// Names a kind of fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -14,7 +14,7 @@ pub enum Kind {
     Duplicate,
     /// One bit of a message is wrong.
     BitFlip,
-    /// A run of bytes is noise.
+    /// A series of bytes is replaced by noise.
     Burst,
     /// The end of a message is lost.
     Truncation,
@@ -26,11 +26,11 @@ pub enum Kind {
     ClockDrift,
     /// The part's clock jumps.
     ClockJump,
-    /// Readings stand still.
+    /// Readings do not change.
     Stuck,
     /// The motion is beyond the part's range.
     Saturation,
-    /// A reading is off by a constant from one sample to the next.
+    /// A reading is suddenly off by a constant.
     BiasStep,
     /// The part sends no number.
     NotANumber,
@@ -38,12 +38,12 @@ pub enum Kind {
     WheelSlip,
     /// Wheels have changed places.
     SwappedWheels,
-    /// The bus is gone: no wheel speeds in, or no frames out.
+    /// The bus is lost: no wheel speeds come in, or no frames go out.
     CanLoss,
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 16] = [
         Self::Drop,
         Self::Duplicate,
@@ -103,7 +103,7 @@ impl Kind {
     }
 }
 
-/// A line that bytes come over.
+/// Names a line that carries bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Line {
@@ -111,13 +111,13 @@ pub enum Line {
     Sensor,
     /// The line of the fibre-optic gyro.
     Gyro,
-    /// Wheel speeds in, SLCAN.
+    /// The line of the incoming wheel speeds, SLCAN.
     Wheels,
-    /// Frames out, SLCAN.
+    /// The line of the outgoing frames, SLCAN.
     Out,
 }
 
-/// The axes that a fault affects.
+/// Names the axes that a fault affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axes {
@@ -141,21 +141,21 @@ impl Axes {
     }
 }
 
-/// A fault.
+/// Describes a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Fault {
     /// The kind of fault.
     pub kind: Kind,
     /// The line, for a fault on a line.
     pub line: Line,
-    /// Row of the drive with which it begins.
+    /// First row of the drive that it affects.
     pub from: usize,
-    /// Rows that it lasts.
+    /// The number of rows that it lasts.
     pub rows: usize,
     /// Share of the messages that it hits.
     pub share: f64,
-    /// Clock: microseconds of a jump, ppm of a drift. Bias: rad/s or m/s^2. Burst: bytes.
-    /// Reordering: places. Slip: factor of the wheels' speed.
+    /// Size of the fault: microseconds of a clock jump, ppm of a drift, rad/s or m/s^2 of a bias, bytes of a burst,
+    /// places of a reordering, factor of the wheels' speed.
     pub size: f64,
     /// The axes of the sensor.
     pub axes: Axes,
@@ -165,7 +165,7 @@ pub struct Fault {
     pub seed: u64,
 }
 
-/// The rows of a drive that a run covers.
+/// Holds the rows of a drive that a run covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Span {
     /// First row.
@@ -177,12 +177,12 @@ pub struct Span {
 }
 
 impl Fault {
-    /// Draws one of a kind.
+    /// Draws a fault of a kind.
     #[must_use]
     pub fn draw(kind: Kind, part: Part, span: Span, draw: &mut Random) -> Self {
         let lines: &[Line] = match (kind, part) {
             (Kind::CanLoss, _) => &[Line::Wheels, Line::Out],
-            // What the part sends is what the campaign is about: every second fault is there.
+            // The campaign is mainly about the part's own messages: every second fault is on its line.
             (_, Part::Dsp1760) => &[Line::Gyro, Line::Gyro, Line::Sensor, Line::Wheels, Line::Out],
             _ => &[Line::Sensor, Line::Sensor, Line::Wheels, Line::Out],
         };

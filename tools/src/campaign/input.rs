@@ -1,4 +1,4 @@
-//! The board's end of a sensor's line: the library's parsers turn bytes into samples.
+//! This module is the board's end of a sensor's line: the library's parsers turn bytes into samples.
 
 use super::fault::Line;
 use super::wire::Message;
@@ -11,10 +11,10 @@ use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::sensor::xsens::Mti;
 use gyronet::units::Micros;
 
-/// Packets that the board fetches from a FIFO at once.
+/// The board fetches at most this many packets from a FIFO at once.
 const MAX_FETCHED: usize = 32;
 
-/// Parser or driver, with its state.
+/// Holds a parser or driver, with its state.
 #[derive(Debug, Clone)]
 pub enum Input {
     /// The parser of an MTi.
@@ -27,12 +27,12 @@ pub enum Input {
     Adis16465(Bursts),
 }
 
-/// The result of some bytes.
+/// Holds the result of parsing some bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delivered {
-    /// A sample of the inertial sensor, or bytes that were none.
+    /// The bytes were for the inertial sensor; `None` if they gave no sample.
     Imu(Option<ImuSample>),
-    /// A sample of the fibre-optic gyro, or bytes that were none.
+    /// The bytes were for the fibre-optic gyro; `None` if they gave no sample.
     Fog(Option<FogSample>),
 }
 
@@ -87,7 +87,7 @@ fn imu(mti: &mut Mti, bytes: &[u8], delivered: &mut Vec<Delivered>) {
     }
 }
 
-/// An ICM-42688-P on its simulated bus.
+/// Reads an ICM-42688-P on its simulated bus.
 #[derive(Debug)]
 pub struct Fifo {
     driver: Icm42688<Bus>,
@@ -99,7 +99,7 @@ pub struct Fifo {
 }
 
 impl Fifo {
-    /// A driver has state that cannot be copied: a new one begins with the last packet.
+    /// Makes a driver that begins with the last packet, because a driver's state cannot be copied.
     fn new(last: Option<(Vec<u8>, u64)>) -> Self {
         let bus = Bus::default();
         let driver = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay);
@@ -136,7 +136,7 @@ impl Clone for Fifo {
     }
 }
 
-/// An ADIS16465 on its simulated bus.
+/// Reads an ADIS16465 on its simulated bus.
 #[derive(Debug)]
 pub struct Bursts {
     driver: Adis16465<adis16465::Bus>,

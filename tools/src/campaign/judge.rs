@@ -1,12 +1,12 @@
-//! The judgement of a run: it is compared with the undamaged run and with the truth.
+//! This module judges a run: it is compared with the undamaged run and with the truth.
 
 use super::receiver::{Reports, Seen};
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 
-/// Rows of the second over which yaw is compared.
+/// Yaw is compared over this many rows: a second.
 const SECOND: usize = RATE_HZ as usize;
-/// The limits of errors: against the truth, and of undetected faults.
+/// Holds the limits of errors: of undamaged drives against the truth, and of undetected faults.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// The most that yaw may move in a second before anything is reported, whatever expected error is sent, rad. It
@@ -21,9 +21,11 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Limits of a MEMS part: `moved` is twice the expected error of a rate that the network has not corrected.
+    /// These limits hold for a MEMS part: `moved` is twice the expected error of a rate that the network has not
+    /// corrected.
     pub const INERTIAL: Self = Self { moved: 5e-4, mean: 5e-4, largest: 2.5e-3, inside_sigma: [0.25, 0.85] };
-    /// Limits of a fibre-optic gyro, which states no error: `moved` is twice the error of its undamaged drives.
+    /// These limits hold for a fibre-optic gyro, which states no error: `moved` is twice the error of its undamaged
+    /// drives.
     pub const FIBRE_OPTIC: Self = Self { moved: 1e-4, mean: 1e-4, largest: 2e-4, inside_sigma: [0.0, 1.0] };
 }
 
@@ -45,17 +47,17 @@ struct Row {
     reports: Reports,
     yaw: Option<i32>,
     sigma: Option<f64>,
-    /// Rows in a row, up to this one, that were good.
+    /// Consecutive good rows up to this one.
     good: usize,
     events: u64,
 }
 
-/// The outcome of a run.
+/// Holds the outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Outcome {
     /// Time from the fault's first effect to the first message, or first missing message, that reports it, s.
     pub reported_after: Option<f64>,
-    /// The board has counted something; a diagnosis would see it.
+    /// Whether the board has counted an event, which a diagnosis would see.
     pub counted: bool,
     /// The largest yaw moved in a second that is all marked good, before the first report, rad.
     pub moved: f64,
@@ -71,7 +73,7 @@ pub struct Outcome {
     pub error: f64,
     /// Time from the end of the fault to the last report of it, s; 0 where the last report came before.
     pub recovery: f64,
-    /// The fault was still reported at the end.
+    /// Whether the fault was still reported at the end.
     pub not_recovered: bool,
 }
 
@@ -89,7 +91,7 @@ impl Outcome {
     }
 }
 
-/// The errors of the undamaged run against the drive's reference, over whole good seconds.
+/// Holds the errors of the undamaged run against the drive's reference, over whole good seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct AgainstTruth {
     /// Seconds compared.
@@ -100,11 +102,11 @@ pub struct AgainstTruth {
     pub largest: f64,
     /// Share of the errors inside the expected error that was sent; `None` where none is sent.
     pub inside_sigma: Option<f64>,
-    /// All of that is within [`Limits`].
+    /// Whether all of these are within [`Limits`].
     pub in_order: bool,
 }
 
-/// The times of one run and of its faults.
+/// Holds the times of one run and of its faults.
 #[derive(Debug, Clone, Copy)]
 pub struct Times {
     /// First row of the run.
@@ -113,14 +115,14 @@ pub struct Times {
     pub to: usize,
     /// The time of the fault's first effect, microseconds.
     pub begin: u64,
-    /// The time at which the fault is over, or the run where it lasts.
+    /// The time at which the fault is over, or the end of the run if it lasts.
     pub end: u64,
     /// The time at which the run ends.
     pub last: u64,
 }
 
 impl Baseline {
-    /// Collects what was seen of a run, and the board's events after each row.
+    /// Collects the observations of a run, and the board's events after each row.
     #[must_use]
     pub fn new(count: usize, seen: &[Seen], events: &[u64], truth: Option<Vec<f64>>, limits: Limits) -> Self {
         let mut rows = vec![Row::default(); count];
@@ -147,7 +149,7 @@ impl Baseline {
         self.rows.get(row).map_or(0, |row| row.events)
     }
 
-    /// Holds the undamaged run against the truth, second by second; `None` where there is no truth.
+    /// Compares the undamaged run with the truth, second by second; `None` without a truth.
     #[must_use]
     pub fn against_truth(&self) -> Option<AgainstTruth> {
         let truth = self.truth.as_ref()?;
@@ -177,7 +179,7 @@ impl Baseline {
         Some(found)
     }
 
-    /// Judges what was seen of a damaged run.
+    /// Judges the observations of a damaged run.
     #[must_use]
     pub fn judge(&self, seen: &[Seen], times: Times) -> Outcome {
         let mut outcome = Outcome::default();
@@ -242,7 +244,7 @@ impl Baseline {
         }
         if let Some(last_report) = last_report {
             outcome.recovery = last_report.saturating_sub(times.end) as f64 * 1e-6;
-            // Half a second of nothing wrong is recovery.
+            // Half a second without a report counts as recovery.
             outcome.not_recovered = times.end < times.last && last_report + 500_000 > times.last;
         }
         outcome

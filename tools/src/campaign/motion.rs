@@ -1,4 +1,4 @@
-//! Faults of the measurements: in the part, in its clock, at the wheels.
+//! This module applies faults of the measurements: in the part, in its clock, at the wheels.
 
 use super::drive::Reading;
 use super::fault::{Fault, Kind};
@@ -6,7 +6,7 @@ use crate::parts::Part;
 use gyronet::units::{AngularRate, SpecificForce};
 
 /// Applies a fault to the readings of the rows from `first_row` on and returns the time of its first effect.
-/// `gyro_bias` is the part of the readings that is no motion.
+/// `gyro_bias` is the part of the readings that is not motion.
 pub fn disturb(
     readings: &mut [Reading],
     first_row: usize,
@@ -47,7 +47,7 @@ pub fn disturb(
                     _ => [rr, rl, fr, fl],
                 };
             }
-            // These are on a line.
+            // These faults are on a line.
             Kind::Drop
             | Kind::Duplicate
             | Kind::BitFlip
@@ -62,17 +62,17 @@ pub fn disturb(
     first
 }
 
-/// A part whose clock is fast by a share samples that much more often, and does not know it.
+/// Drifts a part's clock: a part whose clock is fast by a share samples that much more often, and does not notice.
 ///
-/// The rows then show a vehicle that does all it does in less time, and turns faster by that
-/// share: so row n of the disturbed drive has turned as far as row n of the undisturbed one, and
-/// they can be compared. Increments are angles whatever the clock: there the stamps alone drift.
+/// The rows then show a vehicle that does all it does in less time, and turns faster by that share: so row n of the
+/// disturbed drive has turned as far as row n of the undisturbed one, and they can be compared. Increments are angles
+/// and do not depend on the clock: there only the stamps drift.
 fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bias: [AngularRate; 3]) {
     if part == Part::Dsp1760 {
         reading.stamp_us += ((reading.at - begin.at) as f64 * share) as i64;
         return;
     }
-    // Two such faults: where the rows are by now is what counts.
+    // With two such faults, the shifted position of the rows counts.
     let since = reading.at.saturating_sub(begin.at) as f64;
     reading.at = begin.at + (since / (1.0 + share)) as u64;
     for (rate, bias) in reading.sample.angular_rate.iter_mut().zip(gyro_bias) {
@@ -81,12 +81,12 @@ fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bi
     }
 }
 
-/// The gyro of the part: the fibre-optic one where there is one.
+/// Returns the gyro of the part: the fibre-optic one, if it has one.
 fn gyro(reading: &mut Reading, part: Part) -> &mut [AngularRate; 3] {
     if part == Part::Dsp1760 { &mut reading.fog } else { &mut reading.sample.angular_rate }
 }
 
-/// The readings stay as they were when the fault began.
+/// Holds the readings at their values when the fault began.
 fn hold(reading: &mut Reading, begin: &Reading, fault: &Fault, part: Part) {
     let mut begin = *begin;
     for axis in 0..3 {
@@ -100,7 +100,7 @@ fn hold(reading: &mut Reading, begin: &Reading, fault: &Fault, part: Part) {
     }
 }
 
-/// Gyro axes by rad/s, accelerometer axes by m/s^2.
+/// Shifts gyro axes by rad/s, accelerometer axes by m/s^2.
 fn shift(reading: &mut Reading, fault: &Fault, part: Part) {
     for axis in 0..3 {
         if fault.axes.contains(axis) {
@@ -124,7 +124,7 @@ fn slip(reading: &mut Reading, fault: &Fault) {
             _ => wheel == 0,
         };
         if let (true, Some(speed)) = (slips, speed.as_mut()) {
-            // A standing vehicle's wheels may spin as well: 5 km/h of it.
+            // A standing vehicle's wheels may spin, too: at 5 km/h.
             *speed = if fault.size > 0.0 { *speed * fault.size + 5.0 } else { 0.0 };
         }
     }

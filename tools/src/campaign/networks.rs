@@ -1,4 +1,5 @@
-//! Both networks of the board, with a memory of their answers to an undamaged drive.
+//! This module runs both networks of the board, and remembers their estimates for an undamaged drive, because most
+//! windows of a damaged run are the same.
 
 use gyronet::model::fognet::{FogEstimate, FogNetState, MinuteNetwork};
 use gyronet::model::seconds::{Second, SecondsWindow};
@@ -8,7 +9,7 @@ use gyronet::units::{Angle, AngularRate};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// Whatever runs the windows that a board hands out.
+/// Runs the windows that a board hands out.
 pub trait Networks {
     /// Runs a window of GyroNet.
     fn window(&mut self, window: &[Features; WINDOW]) -> Estimate;
@@ -16,21 +17,21 @@ pub trait Networks {
     fn minute(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
 }
 
-/// The integer networks.
+/// Holds the integer networks.
 pub struct Integer<'a> {
     gyronet: GyroNet<'a>,
     fognet: FogNet<'static, 'static>,
 }
 
 impl<'a> Integer<'a> {
-    /// GyroNet on these weights, FoGNet on the library's.
+    /// Makes GyroNet over these weights, FoGNet over the library's.
     ///
     /// # Panics
     /// When the library's own weights are refused.
     #[must_use]
     pub fn new(blob: Blob<'a>) -> Self {
         let fog = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
-        // One for each thread, for as long as the program runs.
+        // Each thread keeps one for as long as the program runs.
         let state = Box::leak(Box::new(FogNetState::ZERO));
         Self { gyronet: GyroNet::new(blob), fognet: FogNet::new(fog, state) }
     }
@@ -46,19 +47,19 @@ impl Networks for Integer<'_> {
     }
 }
 
-/// The windows of an undamaged drive, and what the networks say of each once they have been asked.
+/// Holds the windows of an undamaged drive, and the networks' estimate of each once it has been computed.
 #[derive(Debug, Clone, Default)]
 pub struct Known {
-    /// GyroNet's windows, at whatever sample they end.
+    /// GyroNet's windows, one ending at each sample.
     pub windows: HashMap<[Features; WINDOW], OnceLock<Estimate>>,
     minutes: HashMap<Vec<Second>, OnceLock<FogEstimate>>,
 }
 
-/// Networks that are asked once about what an undamaged drive shows them: little of a run is new.
+/// Computes each window of an undamaged drive only once, because few windows of a run are new.
 pub struct Remembering<'a, N> {
     /// The networks themselves.
     pub networks: &'a mut N,
-    /// The answers that are known already.
+    /// The estimates that are known already.
     pub known: &'a Known,
 }
 
@@ -81,7 +82,7 @@ impl<N: Networks> Networks for Remembering<'_, N> {
     }
 }
 
-/// Corrects nothing and takes note of what it is asked.
+/// Corrects nothing and records the windows that it gets.
 #[derive(Debug, Default)]
 pub struct Collecting(pub Known);
 

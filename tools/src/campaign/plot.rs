@@ -1,5 +1,5 @@
-//! The runs of single faults in two panels: how soon a receiver has a report of each kind of fault, and how far yaw has
-//! moved by then.
+//! This module draws the runs of single faults in two panels: how soon a receiver has a report of each kind of fault,
+//! and how far yaw has moved by then.
 
 use super::Run;
 use super::fault::Kind;
@@ -9,9 +9,9 @@ const SIZE: (u32, u32) = (1200, 660);
 const DETECTED: Color = COLORS[0];
 const NAMED: Color = COLORS[4];
 const UNDETECTED: Color = COLORS[1];
-/// Dots of a kind in a panel; more would not show more.
+/// A panel shows at most this many dots of a kind; more would overlap.
 const DOTS: usize = 250;
-/// The golden ratio's fraction, which spreads dots of one value evenly.
+/// Multiples of the golden ratio's fraction spread dots of one value evenly.
 const GOLDEN: f64 = 0.618_034;
 
 /// Draws the runs of single faults.
@@ -34,7 +34,7 @@ pub fn svg(runs: &[Run]) -> Result<String, PlotError> {
     Figure { title: &title, size: SIZE, side_by_side: true, legend: Vec::new(), panels }.svg()
 }
 
-/// Returns the runs of each kind that have a value, as value and height; the largest is never left out.
+/// Returns the runs of each kind that have a value, as value and height; the largest is always included.
 fn dots(runs: &[&Run], value: impl Fn(&Run) -> Option<f64>) -> Vec<(f64, f64, Color)> {
     let of_kind = Kind::ALL.iter().enumerate().flat_map(|(height, wanted)| {
         let own = runs.iter().filter(|run| run.faults[0].kind == *wanted);
@@ -65,7 +65,7 @@ fn panel(
     limit: Option<f64>,
 ) -> Panel<'static> {
     let bottom = Kind::ALL.len() as f64 - 0.5;
-    // Dots of one value lie beside each other.
+    // Dots of one value lie side by side.
     let beside = |n: usize| 0.6 * ((n as f64 * GOLDEN) % 1.0) - 0.3;
     let dots = dots.into_iter().enumerate();
     let dots = dots.map(|(n, (value, kind, color))| (value.min(high).log10(), kind + beside(n), color));

@@ -1,8 +1,8 @@
-//! An ECU that reads our own yaw messages, of the inertial sensor or of the fibre-optic gyro, and collects the reports
-//! in them.
+//! This module is an ECU that reads our own yaw messages, of the inertial sensor or of the fibre-optic gyro, and
+//! collects the reports in them.
 //!
-//! It checks E2E, takes a set of rate, angle and detail only where all three carry the same
-//! sample counter, and takes silence for a fault.
+//! It checks E2E, accepts a set of rate, angle and detail only if all three carry the same sample counter, and treats
+//! silence as a fault.
 
 use super::fault::Line;
 use super::wire::Message;
@@ -15,25 +15,25 @@ use gyronet::can::slcan::assembler::LineAssembler;
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Quality, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::{DataFrame, slcan};
 
-/// The sender counts as dead after so long without a whole set, microseconds: three periods and a half.
+/// The sender counts as dead after this time without a whole set, microseconds: three periods and a half.
 pub const TIMEOUT_US: u64 = 35_000;
-/// Up to so many missing messages in a row are loss; more are disorder.
+/// Up to this many missing messages in a row count as loss; more count as disorder.
 const MAX_DELTA: u8 = 10;
 
-/// The reports that a receiver has, one bit each; bits 0 to 7 are the fault byte.
+/// Holds the reports of a receiver, one bit each; bits 0 to 7 are the fault byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Reports(pub u32);
 
 impl Reports {
-    /// Quality other than good.
+    /// The quality is not good.
     pub const NOT_GOOD: Self = Self(1 << 8);
-    /// Quality "not to be used".
+    /// The quality is "not to be used".
     pub const UNUSABLE: Self = Self(1 << 9);
-    /// Checksum, or no frame at all.
+    /// The checksum is wrong, or the bytes are not a frame.
     pub const DAMAGED: Self = Self(1 << 10);
-    /// Messages are missing, come twice, or in disorder.
+    /// Messages are missing, come twice, or are out of order.
     pub const SEQUENCE: Self = Self(1 << 11);
-    /// The report that no set came for [`TIMEOUT_US`].
+    /// No set came for [`TIMEOUT_US`].
     pub const SILENT: Self = Self(1 << 12);
 
     /// Returns the reports in this that are not in another.
@@ -53,7 +53,7 @@ impl Reports {
     }
 }
 
-/// A set of messages.
+/// Holds a set of messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Set {
     /// Row of the sample with which it was sent.
@@ -64,7 +64,7 @@ pub struct Set {
     pub sigma: Option<f64>,
 }
 
-/// An observation of the receiver.
+/// Holds an observation of the receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
     /// The time, microseconds of the board's clock.
@@ -75,7 +75,7 @@ pub struct Seen {
     pub set: Option<Set>,
 }
 
-/// The ECU.
+/// Reads messages as an ECU does.
 #[derive(Debug, Clone)]
 pub struct Receiver {
     messages: Vec<(Id, Checker)>,
@@ -86,7 +86,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Begins before the first byte. The messages are those of the part.
+    /// Begins before the first byte, and reads the messages of this part.
     #[must_use]
     pub fn new(part: Part) -> Self {
         let own = || Config::DEFAULT.settings().yaw.map(|yaw| (yaw.ids, yaw.e2e.profiles()));
@@ -111,8 +111,8 @@ impl Receiver {
         self.time(message.at, seen);
         for byte in &message.bytes {
             let Some(line) = self.assembler.receive(*byte) else { continue };
-            // Answers to what the wheels' line says are no frames; a frame that begins as one is
-            // missed by its counter.
+            // Answers to the wheels' frames are not frames themselves; if a damaged frame looks like an answer, its
+            // counter shows the loss.
             let line = line.map(|line| line.strip_prefix(b"\x07").unwrap_or(line));
             let frame = match line {
                 Ok([b't' | b'T', ..]) => line.ok().and_then(|line| slcan::parse::<DataFrame>(line).ok()),

@@ -1,4 +1,4 @@
-//! The results of a campaign: one line for each kind of fault.
+//! This module sums up a campaign: one line for each kind of fault.
 
 use super::Run;
 use super::exceptions::EXCEPTIONS;
@@ -8,7 +8,7 @@ use super::scene::Scene;
 use serde::Serialize;
 use std::fmt;
 
-/// Median and most.
+/// Holds the median and the largest of some values.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Spread {
     /// The median.
@@ -25,7 +25,7 @@ impl Spread {
     }
 }
 
-/// The runs of one kind of fault.
+/// Sums up the runs of one kind of fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Line {
     /// The kind.
@@ -38,16 +38,15 @@ pub struct Line {
     pub harmless: usize,
     /// Harmless runs in which the board counted something.
     pub counted: usize,
-    /// Undetected, and on the named list.
+    /// Undetected runs that an exception covers.
     pub excepted: usize,
-    /// Undetected.
+    /// Undetected runs that no exception covers.
     pub undetected: usize,
-    /// Panics.
+    /// Runs that panicked.
     pub panics: usize,
     /// Time from the first effect to the report, s.
     pub reported_after: Spread,
-    /// The most that yaw was moved in a good second before anything was reported, the named ones left
-    /// out, rad.
+    /// The most that yaw was moved in a good second before anything was reported, without the excepted runs, rad.
     pub moved: f64,
     /// The largest ratio of that to the limit.
     pub moved_limits: f64,
@@ -63,7 +62,7 @@ pub struct Line {
     pub not_recovered: usize,
 }
 
-/// An exception and what came under it.
+/// Holds an exception and the runs that it covers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Excepted {
     /// Its name.
@@ -76,7 +75,7 @@ pub struct Excepted {
     pub moved: f64,
 }
 
-/// An undamaged drive that every run is held against.
+/// Describes an undamaged drive with which every run is compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Undamaged {
     /// The drive.
@@ -87,7 +86,7 @@ pub struct Undamaged {
     pub errors: Option<AgainstTruth>,
 }
 
-/// A run that must not be.
+/// Describes a run that failed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
     /// Its number.
@@ -102,7 +101,7 @@ pub struct Failure {
     pub what: String,
 }
 
-/// The results of a campaign.
+/// Holds the results of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// The seed.
@@ -111,14 +110,14 @@ pub struct Report {
     pub undamaged: Vec<Undamaged>,
     /// Single faults by kind, then pairs, then all.
     pub lines: Vec<Line>,
-    /// The named list.
+    /// The exceptions and their runs.
     pub exceptions: Vec<Excepted>,
     /// Runs that failed.
     pub failures: Vec<Failure>,
 }
 
 impl Report {
-    /// Undamaged drives whose errors are beyond their limits.
+    /// Returns the undamaged drives whose errors are beyond their limits.
     pub fn out_of_order(&self) -> impl Iterator<Item = &Undamaged> {
         self.undamaged.iter().filter(|drive| drive.errors.is_some_and(|errors| !errors.in_order))
     }

@@ -1,4 +1,5 @@
-//! An undamaged drive with one part: every run begins at one of its states and is compared with it.
+//! A scene is an undamaged drive with one part: every run begins at one of its stored states, so that it need not run
+//! the drive up to there, and is compared with it.
 
 use super::board::Board;
 use super::drive::{Drive, Reading};
@@ -18,21 +19,21 @@ use gyronet::sample::{PERIOD_US, RATE_HZ};
 use gyronet::units::{AngularRate, Micros};
 use std::ops::Range;
 
-/// Runs may begin so many rows apart.
+/// Runs may begin this many rows apart.
 pub const STATE_EVERY: usize = RATE_HZ as usize;
-/// Time from a wheel frame to the end of its row, microseconds.
+/// A wheel frame comes this long before the end of its row, microseconds.
 const WHEEL_BEFORE_US: u64 = 3_000;
-/// The board looks at its clock so often.
+/// The board polls this often, microseconds.
 const TURN_US: u64 = 1_000;
 
-/// A drive, a part, and the undamaged run of both.
+/// Holds a drive, a part, and the undamaged run of both.
 #[derive(Debug, Clone)]
 pub struct Scene<'d> {
     /// The drive.
     pub drive: &'d Drive,
     /// The part.
     pub part: Part,
-    /// The networks' answers for it.
+    /// The networks' estimates for it.
     pub known: Known,
     /// The messages of the undamaged run.
     pub baseline: Baseline,
@@ -41,7 +42,7 @@ pub struct Scene<'d> {
     states: Vec<(Board, Receiver)>,
 }
 
-/// A window with every sample.
+/// This configuration makes a window due with every sample.
 const EVERY: PipelineConfig = PipelineConfig {
     compensate: CompensateConfig {
         mode: match Hop::new(1) {
@@ -86,13 +87,13 @@ impl<'d> Scene<'d> {
         Self { drive, part, gyro_bias: board.gyro_bias(), known, baseline, states }
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.drive.readings.len()
     }
 
-    /// Runs a stretch with faults; it begins where a state is kept.
+    /// Runs a stretch with faults; it must begin where a state is kept.
     pub fn run(&self, span: Span, faults: &[Fault], networks: &mut impl Networks) -> Outcome {
         let mut networks = Remembering { networks, known: &self.known };
         let (mut board, mut receiver) = self.states[span.from / STATE_EVERY].clone();
@@ -131,7 +132,7 @@ impl<'d> Scene<'d> {
     }
 }
 
-/// A whole drive; what went out in each row.
+/// Runs a whole drive and collects the messages of each row.
 fn whole(
     board: &mut Board,
     drive: &Drive,
@@ -147,7 +148,7 @@ fn whole(
     }
 }
 
-/// A row's time on the board.
+/// Runs the board for the time of a row.
 fn turn<'m>(
     board: &mut Board,
     rest: &mut std::iter::Peekable<impl Iterator<Item = &'m Message>>,
@@ -166,7 +167,7 @@ fn turn<'m>(
     }
 }
 
-/// All messages of some rows, in the order of their coming.
+/// Returns all messages of some rows, in order of arrival.
 fn messages(readings: &[Reading], first_row: usize, part: Part) -> Vec<Message> {
     let mut messages = Vec::new();
     for (row, reading) in (first_row..).zip(readings) {
@@ -179,7 +180,7 @@ fn messages(readings: &[Reading], first_row: usize, part: Part) -> Vec<Message> 
     messages
 }
 
-/// The vehicle's wheel frame as an SLCAN line; `None` where the drive has no wheels.
+/// Returns the vehicle's wheel frame as an SLCAN line; `None` if the drive has no wheels.
 fn wheel_frame(row: usize, reading: &Reading) -> Option<Message> {
     let line = slcan::emit(&wheel_frames::frame(reading.wheels)?)?;
     Some(Message { line: Line::Wheels, row, at: reading.at - WHEEL_BEFORE_US, bytes: line.to_vec() })

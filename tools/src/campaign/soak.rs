@@ -23,26 +23,28 @@ use gyronet::units::{Micros, Yaw};
 use serde::Serialize;
 use std::fmt;
 
-/// Ticks of SampleTimeFine in a sample.
+/// A sample lasts this many ticks of SampleTimeFine.
 const TICKS: u32 = (PERIOD_US / 100) as u32;
-/// Self-test passed, filter valid.
+/// The status word of a good sample: self-test passed, filter valid.
 const GOOD: u32 = 3;
-/// Frames of a sample with the messages of [`Config::DEFAULT`], and of a step of the fibre-optic gyro.
+/// A sample makes the first number of frames with the messages of [`Config::DEFAULT`], a step of the fibre-optic gyro
+/// the second.
 const FRAMES: u64 = 6;
 const FOG_FRAMES: u64 = 3;
-/// Steps of the fibre-optic gyro that the ends of the drive may cost.
+/// At most this many steps of the fibre-optic gyro may be lost at the ends of the drive.
 const FOG_ENDS: u64 = 3;
-/// The board looks at its inputs every millisecond.
+/// The board polls its inputs every millisecond.
 const LOOK_US: u64 = 1_000;
-/// Samples until the first one that is corrected, with something to spare.
+/// The first corrected sample comes within this many samples, with a margin.
 const INITIALISED: u32 = 100 * RATE_HZ;
-/// Half a least bit of the angle message, and one of each value that is summed, deg.
+/// The yaw may be off by this: half a least bit of the angle message, and one of each value that is summed, deg.
 const YAW_TOLERANCE: f64 = 1e-6;
 
-/// Half a least bit of the drop-in rate for 10 ms, and what a sum of floats needs: deg.
+/// The sum of drop-in rates may be off by this: half a least bit of the rate for 10 ms, and the rounding of a sum of
+/// floats, deg.
 const DROP_IN_TOLERANCE: f64 = 2.5e-5 + 1e-9;
 
-/// The results of a soak.
+/// Holds the results of a soak.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Soak {
     /// Samples sent.
@@ -65,8 +67,8 @@ pub struct Soak {
     pub gyro_lost: u32,
     /// Yaw at the receiver less that of the pipeline, deg.
     pub yaw_error_deg: f64,
-    /// The sum of the drop-in rates at the receiver less that of the rates they were encoded from, deg. What rounding
-    /// takes from one is in the next, so it stays below half a least bit for 10 ms.
+    /// The sum of the drop-in rates at the receiver less that of the rates they were encoded from, deg. The rounding
+    /// error of one is carried to the next, so it stays below half a least bit for 10 ms.
     pub drop_in_error_deg: f64,
     /// Whole turns of the car, in all.
     pub turns: f64,
@@ -174,7 +176,7 @@ impl Drive {
             Status::Init => self.statuses[0] += 1,
             Status::Degraded => self.statuses[1] += 1,
             Status::Ready => self.statuses[2] += 1,
-            // Counted by the sensor monitor.
+            // The sensor monitor counts it.
             _ => {}
         }
         while let Some(sent) = self.coprocessor.next_frame() {
@@ -195,7 +197,7 @@ impl Drive {
     /// Sends the fibre-optic gyro's message: 100 a second with its own 32-bit microseconds.
     fn gyro(&mut self, k: u32, sample: &Sample, now: Micros) {
         let time = self.starts[2].wrapping_add(k.wrapping_mul(PERIOD_US as u32));
-        // A gyro flickers; equal increments are those of a stuck one. The mean of three is zero.
+        // A real gyro flickers; equal increments would count as stuck. The mean of three is zero.
         let flicker = (f64::from(k % 3) - 1.0) * 1e-7;
         let message = Message {
             rotation: sample.reference.map(|rate| (rate / f64::from(RATE_HZ) + flicker) as f32),

@@ -1,5 +1,5 @@
-//! Single bits that flip in a weight file: they are refused when it is loaded, or found in the background when it is in
-//! use.
+//! This module flips single bits in a weight file: they are refused when it is loaded, or found in the background when
+//! it is in use.
 //!
 //! Weights lie in flash under a CRC-32, which is checked when they are loaded and again, piece by
 //! piece, while they are used ([`gyronet::model::background`]). Until that finds a flipped bit,
@@ -21,10 +21,10 @@ use serde::Serialize;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Bytes that the image's idle task checks in a millisecond: a pass is 9.7 s.
+/// The image's idle task checks this many bytes in a millisecond: a pass takes 9.7 s.
 pub const PIECE: usize = 13;
 
-/// The effects of flipped bits in a weight file.
+/// Holds the effects of flipped bits in a weight file.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct WeightUpsets {
     /// Bits of the header, provenance included.
@@ -43,7 +43,7 @@ pub struct WeightUpsets {
     pub not_found: usize,
 }
 
-/// A weight file in memory that bits flip in.
+/// Holds a weight file in memory whose bits are flipped.
 struct Memory {
     words: Vec<u32>,
     bytes: usize,
@@ -64,8 +64,7 @@ impl Memory {
         &bytemuck::cast_slice(&self.words)[..self.bytes]
     }
 
-    /// The weights in use, whatever has become of them: what was read from the header at the start
-    /// is not read again.
+    /// Returns the weights in use, damaged or not: values read from the header at the start are not read again.
     fn in_use<'m>(&'m self, loaded: &Blob<'m>) -> Option<Blob<'m>> {
         let mut at = first_weight(self.file()) / 4;
         let mut take = |words: usize| {
@@ -182,13 +181,12 @@ fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate
 /// Returns the milliseconds until the background check reports a flip that happens when it has come to byte `at`;
 /// `None` after two passes.
 ///
-/// Only the bytes of the pass in which the flip is seen need be looked at: the sum of a pass does
-/// not fit from that pass on.
+/// Only the pass in which the flip is seen needs to be computed, because every pass from that one on has the wrong sum.
 fn found_after(damaged: &Blob<'_>, flipped: usize, at: usize) -> Option<usize> {
     let mut check = BackgroundCheck::new(damaged);
     let length = check.len();
     let finds = check.advance(length)?.is_err();
-    // What has been passed already is seen in the next pass.
+    // A byte that this pass has checked already is seen in the next one.
     let rest = length.saturating_sub(at);
     let bytes = if flipped >= at { rest } else { rest + length };
     finds.then_some(bytes.div_ceil(PIECE))
@@ -208,7 +206,7 @@ impl fmt::Display for WeightUpsets {
     }
 }
 
-/// The numbers of flipped bits by effect.
+/// Counts flipped bits by effect.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Effects {
     /// Bits flipped.
@@ -217,13 +215,13 @@ pub struct Effects {
     pub nothing: usize,
     /// Bits whose estimate was rejected, which a receiver sees.
     pub reported: usize,
-    /// Yaw moved by no more than the stated sigma.
+    /// Bits that moved yaw by no more than the stated sigma.
     pub within: usize,
     /// Bits that moved yaw further without a report.
     pub beyond: usize,
     /// The most that yaw moved in a second without a report, rad.
     pub most: f64,
-    /// Arithmetic that overflowed; the board's wraps.
+    /// Bits whose arithmetic overflowed; on the board it wraps.
     pub panics: usize,
 }
 

@@ -1,9 +1,9 @@
-//! Messages on a line, and the faults of a line.
+//! This module applies the faults of a line to the messages on it.
 
 use super::fault::{Fault, Kind, Line};
 use crate::random::Random;
 
-/// Bytes that came over a line together.
+/// Holds bytes that came over a line together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
     /// The line.
@@ -47,7 +47,7 @@ pub fn damage(messages: &mut Vec<Message>, fault: &Fault) -> Option<u64> {
             }
         }
         Kind::Burst => {
-            // Noise knows nothing of messages: it goes on into the next one.
+            // Noise does not stop at the end of a message: it continues into the next one.
             let mut left = 0;
             for message in messages.iter_mut().filter(|message| message.line == fault.line) {
                 let mut at = 0;
@@ -69,14 +69,14 @@ pub fn damage(messages: &mut Vec<Message>, fault: &Fault) -> Option<u64> {
             }
         }
         Kind::Reordering => {
-            // A message that is hit waits for so many of its line behind it.
+            // A message that is hit is delayed behind so many later ones of its line.
             let own: Vec<usize> = (0..messages.len()).filter(|n| messages[*n].line == fault.line).collect();
             for (n, place) in own.iter().enumerate() {
                 let behind = own[n..].get(fault.size as usize);
                 if hit(&messages[*place], &mut draw)
                     && let Some(behind) = behind
                 {
-                    // One microsecond later than that one.
+                    // It comes one microsecond after that one.
                     messages[*place].at = messages[*behind].at + 1;
                 }
             }
@@ -94,7 +94,7 @@ pub fn damage(messages: &mut Vec<Message>, fault: &Fault) -> Option<u64> {
                 messages.sort_by_key(|message| message.at);
             }
         }
-        // These are of what is measured.
+        // These faults are of the measurements.
         Kind::ClockDrift
         | Kind::ClockJump
         | Kind::Stuck

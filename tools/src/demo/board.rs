@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 pub const SAMPLES: usize = 1_000;
 /// All their messages must come within this time: they take a few seconds, more on a busy machine.
 const LIMIT: Duration = Duration::from_secs(180);
-/// The sensor is on this line; the messages go out on the next one.
+/// These are the lines of the sensor and of the outgoing messages.
 const SENSOR: usize = 1;
 const SLCAN: usize = 2;
 

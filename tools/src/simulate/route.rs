@@ -1,6 +1,6 @@
 //! This module makes the driver's route: streets with bends, wide corners and stops, one after another.
 //!
-//! The car turns by at most some 0.3 rad/s, as in the recordings; nobody parks.
+//! The car turns by at most some 0.3 rad/s, as in the recordings, and never parks.
 
 use super::leg::Leg;
 use super::purpose::Purpose;

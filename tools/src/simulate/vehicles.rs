@@ -1,7 +1,7 @@
 //! This module holds the vehicles and parts of the two data sets, with the source of every number.
 //!
-//! None of the numbers was chosen by a result. (M) marks what was written down from memory of a
-//! data sheet that was not at hand; (A) what nobody has published and was assumed.
+//! None of the numbers was chosen by a result. (M) marks what was written down from memory of a data sheet that was not
+//! available; (A) marks assumptions, where nothing is published.
 //!
 //! | what | value | source |
 //! |---|---|---|

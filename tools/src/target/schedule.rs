@@ -25,7 +25,7 @@ const SPARE: f64 = 0.25;
 const SHARED: u8 = 2;
 /// Copying a frame, with the code around it but without `can_frames` itself, takes at most this many cycles.
 const COPY: u64 = 150;
-/// Ten bits at 115200 and at 921600 bit/s, us.
+/// A byte takes this long at 115200 and at 921600 bit/s, us: ten bits.
 const BYTE_115200: f64 = 10e6 / 115_200.0;
 const BYTE_921600: f64 = 10e6 / 921_600.0;
 /// A sample's frames are delayed by at most this, us: the output task waits for a tick and takes no more than 3 ms; if

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// 1 km/h is this many speed codes.
 const CODES_PER_KMH: f64 = 65_536.0 / 3.6;
-/// 1 km/h a code is this [`WheelSignal::factor_q16`].
+/// A factor of 1 km/h is this [`WheelSignal::factor_q16`].
 const FACTORS_PER_KMH: f64 = CODES_PER_KMH * 65_536.0;
 
 /// The reason why a file of wheel settings cannot be used.
