@@ -111,8 +111,8 @@ pub struct Coprocessor {
 }
 
 impl Coprocessor {
-    /// The coprocessor of a static, at time 0: configure it before the first input. It is some 10 KB, which
-    /// [`Coprocessor::new`] returns by way of the stack.
+    /// Starts at time 0 with the default configuration, for a static: configure it before the first input. It is some
+    /// 10 KB, which [`Coprocessor::new`] would return by way of the stack.
     pub const START: Self = {
         const CONFIG: Config = Config::DEFAULT;
         Self {

@@ -101,10 +101,10 @@ impl Faults {
     pub const GAP: Self = Self(1);
     /// The part is saturated.
     pub const CLIPPED: Self = Self(1 << 1);
-    /// The part's readings stand still.
+    /// The part's readings repeat themselves.
     pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate is not believed, a reading of the part or its clock is not, or the rates
-    /// owe more than a window's revision.
+    /// The network's estimate was rejected, a reading of the part or its clock is implausible, or the rates still lack
+    /// more than a window's revision.
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
@@ -112,7 +112,7 @@ impl Faults {
     pub const STORED: Self = Self(1 << 5);
     /// The wheels are silent, or say that the vehicle stands while the gyro says that it turns.
     pub const WHEELS: Self = Self(1 << 6);
-    /// Frames were dropped because the bus did not take them, or came and found no room.
+    /// Frames were dropped because the bus did not take them, or received ones found no room.
     pub const BUS: Self = Self(1 << 7);
 
     /// Returns the fault that a reading of this validity stands for.
@@ -161,7 +161,7 @@ pub struct BoardFaults {
 }
 
 impl BoardFaults {
-    /// No fault.
+    /// No fault is present.
     pub const NONE: Self = Self { bus: false, clock: false, stored: false, configuration_lost: false };
 
     /// Returns the bits that are sent.
@@ -223,7 +223,7 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// No event.
+    /// Starts without an event.
     pub const NONE: Self = Self {
         samples: 0,
         missing: 0,
@@ -258,7 +258,7 @@ pub struct MonitorCounters {
 }
 
 impl MonitorCounters {
-    /// No fault.
+    /// No fault is present.
     pub const NONE: Self = Self { silences: 0, stuck: 0, held: 0, wrong: 0, clock_off: 0 };
 }
 
@@ -288,7 +288,7 @@ pub struct InputCounters {
 }
 
 impl InputCounters {
-    /// No event.
+    /// Starts without an event.
     pub const NONE: Self = Self {
         imu_errors: 0,
         fog_errors: 0,

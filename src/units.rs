@@ -23,7 +23,7 @@ pub enum RangeError {
     OutOfRange,
 }
 
-/// Angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
+/// Holds an angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -52,7 +52,7 @@ impl AngularRate {
     }
 }
 
-/// Specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
+/// Holds a specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -79,7 +79,7 @@ impl SpecificForce {
     }
 }
 
-/// Angle turned, signed 64 bit, LSB 2^-44 rad (3.3e-12 deg), range +-524,288 rad.
+/// Holds an angle turned, signed 64 bit, LSB 2^-44 rad (3.3e-12 deg), range +-524,288 rad.
 ///
 /// This is so fine that rounding 1000 increments a second, always in the same direction, stays below 6e-6 deg/h.
 #[derive(Debug, Clone, Copy, PartialEq, Hash, Eq, PartialOrd, Ord, Default)]
@@ -117,7 +117,7 @@ impl Angle {
     }
 }
 
-/// Accumulated yaw, signed 64 bit, LSB 2^-27 rad/s x 10 ms: the sum of emitted rates, where a step of the
+/// Holds an accumulated yaw, signed 64 bit, LSB 2^-27 rad/s x 10 ms: the sum of emitted rates, where a step of the
 /// sensor's clock is 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -132,7 +132,7 @@ impl Yaw {
     }
 }
 
-/// Length, signed 64 bit, LSB 2^-32 m (0.23 nm), range +-2,147,483 km.
+/// Holds a length, signed 64 bit, LSB 2^-32 m (0.23 nm), range +-2,147,483 km.
 ///
 /// This is so fine that a hundred roundings a second, always in the same direction, add up to 42 um an hour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -150,7 +150,7 @@ impl Length {
     }
 }
 
-/// Speed of a wheel over ground, signed 32 bit, LSB 2^-16 m/s, range +-32768 m/s.
+/// Holds the speed of a wheel over ground, signed 32 bit, LSB 2^-16 m/s, range +-32768 m/s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -167,13 +167,13 @@ impl WheelSpeed {
     }
 }
 
-/// Temperature of the part, in 1/100 deg C.
+/// Holds a temperature of the part, in 1/100 deg C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CentiCelsius(pub i16);
 
-/// An instant in microseconds: the time of a part by its own clock, unwrapped, or of the caller's clock.
+/// Holds an instant in microseconds: the time of a part by its own clock, unwrapped, or of the caller's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Micros(pub u64);
@@ -192,7 +192,7 @@ impl Micros {
     }
 }
 
-/// A duration in microseconds.
+/// Holds a duration in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -67,7 +67,7 @@ pub struct ClockCounters {
 }
 
 impl ClockCounters {
-    /// No event.
+    /// Starts without an event.
     pub const NONE: Self = Self { samples: 0, late: 0, duplicates: 0, out_of_order: 0, jumps: 0 };
 
     /// Returns the events since `before`.

@@ -60,7 +60,7 @@ pub struct IncrementCounters {
 }
 
 impl IncrementCounters {
-    /// No event.
+    /// Starts without an event.
     pub const NONE: Self = Self { gaps: 0, late: 0, too_long: 0, dropped: 0 };
 
     /// Returns the events since `before`.
@@ -92,7 +92,7 @@ pub struct Increments {
 }
 
 impl Increments {
-    /// No increment.
+    /// Starts without an increment.
     pub const EMPTY: Self = Self { pieces: Deque::new(), last_end: None, counters: IncrementCounters::NONE };
 
     /// Takes a sample that ended at `time` by the board's clock, later than the last one.

@@ -53,7 +53,7 @@ pub struct Resampler {
 }
 
 impl Resampler {
-    /// No sample.
+    /// Starts without a sample.
     pub const EMPTY: Self = Self { samples: Deque::new(), dropped: 0 };
 
     /// Takes a sample; its time is the board's and later than the last one's.

@@ -29,7 +29,7 @@ pub struct Events {
 }
 
 impl Events {
-    /// No event.
+    /// Starts without an event.
     pub const NONE: Self =
         Self { imu: ClockCounters::NONE, fog: ClockCounters::NONE, increments: IncrementCounters::NONE };
 }

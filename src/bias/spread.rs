@@ -10,7 +10,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// The spread of no reading.
+    /// Starts without a reading.
     pub const EMPTY: Self = Self { count: 0, sum: 0, mean: 0.0, squares: 0.0 };
 
     /// Takes a reading as code and as value.

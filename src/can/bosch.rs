@@ -33,28 +33,28 @@ pub const TX1_ID: StandardId = StandardId::new(0x174).unwrap();
 /// SAE J1850: polynomial 0x1D, start and final XOR 0xFF.
 pub static CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
 
-/// Zero rate and zero acceleration.
+/// This code stands for zero rate and zero acceleration.
 const ZERO: i32 = 0x8000;
-/// 0.005 deg/s in 1e-9 deg/s x 2^-20.
+/// The LSB of the yaw rate is 0.005 deg/s, in units of 1e-9 deg/s x 2^-20.
 const YAW_RATE_LSB: i64 = 5_000_000 << 20;
-/// 1e-9 deg/s per rate code (180e9 / pi / 2^27), times 2^20.
+/// A rate code is this in units of 1e-9 deg/s x 2^-20 (180e9 / pi / 2^27).
 const NANO_DEG_PER_CODE_Q20: i64 = 447_623_277;
 /// Acceleration codes per 2^-20 m/s^2 (1 / (0.000127465 * 9.80665 * 2^20)), times 2^32.
 const AY_PER_CODE_Q32: i64 = 3_276_788;
 
-/// Quality of one signal, as its nibble says it.
+/// Holds the quality of one signal, as coded in its nibble.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SignalStatus(pub u8);
 
 impl SignalStatus {
-    /// Good.
+    /// The signal is good.
     pub const OK: Self = Self(0);
     /// The signal is not available.
     pub const NOT_AVAILABLE: Self = Self(1);
-    /// Failed: do not use.
+    /// The signal has failed: do not use it.
     pub const FAILURE: Self = Self(2);
-    /// Initialising: do not use yet.
+    /// The sensor is initialising: do not use the signal yet.
     pub const INITIALISING: Self = Self(4);
 }
 
@@ -142,7 +142,7 @@ pub struct YawRateSignal {
 pub struct OutOfRange(pub u16);
 
 impl YawRateSignal {
-    /// Nothing owed.
+    /// Starts without a rounding residual.
     pub const START: Self = Self { residual: 0 };
 
     /// Returns the code of a rate, with the rounding residual of the earlier ones.

@@ -10,10 +10,10 @@ use crate::units::AngularRate;
 /// Converts a rate code (LSB 2^-27 rad/s) to the code of a CAN signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scale {
-    /// Signal LSBs per rate code, times 2^32. At most 2^31: a signal finer than twice the rate
-    /// code itself has nothing to gain.
+    /// Signal LSBs per rate code, times 2^32. It is at most 2^31: a signal whose LSB is below two rate codes gains
+    /// nothing.
     pub factor_q32: i64,
-    /// Code of rate zero, times 2^32; it need not be a whole number. Below 2^60.
+    /// Code of rate zero, times 2^32; it need not be a whole number. It is below 2^60.
     pub zero_q32: i64,
 }
 
@@ -24,11 +24,11 @@ impl Scale {
     pub const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325, zero_q32: 0 };
 }
 
-/// The rounding residual of one signal, which is added to its next code.
+/// Carries the rounding residual of one signal to its next code.
 #[derive(Debug, Clone, Copy)]
 pub struct RoundingCarry {
     scale: Scale,
-    /// Owed to the receiver, in LSB x 2^-32.
+    /// The part that rounding has withheld from the receiver so far, in LSB x 2^-32.
     residual: i64,
 }
 

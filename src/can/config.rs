@@ -37,9 +37,9 @@ pub struct Config {
 }
 
 impl Config {
-    /// [`Settings::DEFAULT`], which pass the check (as a test shows).
+    /// Uses [`Settings::DEFAULT`], which pass the check (as a test shows).
     pub const DEFAULT: Self = Self { settings: Settings::DEFAULT };
-    /// [`Settings::SLCAN_115200`], likewise.
+    /// Uses [`Settings::SLCAN_115200`], which pass the check, too.
     pub const SLCAN_115200: Self = Self { settings: Settings::SLCAN_115200 };
 
     /// Checks settings.

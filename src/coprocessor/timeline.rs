@@ -5,10 +5,10 @@
 
 use crate::units::{Duration, Micros};
 
-/// The end of time, 146,000 years: sums of times and limits do not overflow before it.
+/// Time ends here, after 146,000 years, so that sums of times and limits do not overflow.
 pub(super) const END: Micros = Micros(1 << 62);
 
-/// The newest time, and what is added to the clock.
+/// Keeps the newest time, and the shift that is added to the clock.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Timeline {
     now: Micros,
@@ -16,7 +16,7 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Time 0.
+    /// Starts at time 0.
     pub const START: Self = Self { now: Micros(0), shift_us: 0 };
 
     /// Takes the clock's time and returns the shifted one.

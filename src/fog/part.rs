@@ -14,7 +14,7 @@ pub struct FogErrors {
     pub scale: f32,
 }
 
-/// 1 deg/h in rad/s.
+/// 1 deg/h is this in rad/s.
 const DEG_PER_HOUR: f32 = core::f32::consts::PI / 180.0 / 3600.0;
 /// Square root of an hour, in square roots of a second.
 const ROOT_HOUR: f32 = 60.0;

@@ -74,7 +74,7 @@ pub struct FogCounters {
 }
 
 impl FogCounters {
-    /// No event.
+    /// Starts without an event.
     pub const NONE: Self = Self {
         samples: 0,
         misplaced: 0,
@@ -331,7 +331,7 @@ struct Repeats {
 }
 
 impl Repeats {
-    /// No increment.
+    /// Starts without an increment.
     const NONE: Self = Self { newest: None, equal: 0, equal_us: 0 };
 
     /// Returns the state after a further sample.

@@ -21,7 +21,7 @@ use crate::root::sqrt;
 use crate::sample::{RATE_HZ, Standstill};
 use crate::units::Angle;
 
-/// Steps of a second.
+/// A second has this many steps.
 const STEPS: i64 = RATE_HZ as i64;
 /// Largest code of a step, 2,900 deg/s: a second's sums stay within 58 bits.
 const LARGEST_CODE: i64 = 1 << 43;

@@ -24,7 +24,7 @@ use gyronet::units::Micros;
 pub const TURN: usize = serial::RECEIVED;
 /// The bytes that a look at the part on SPI counts as: four looks a turn.
 const LOOK: usize = TURN / 4;
-/// The time from one attempt to bring it up to the next one.
+/// The part is brought up again after this time, if an attempt fails.
 const RETRY_MS: u32 = 1_000;
 /// Looks at the time before a delay is given up, should it stand still: a millisecond has some ten
 /// thousand.
@@ -84,7 +84,7 @@ impl Imu {
     }
 }
 
-/// The part on SPI.
+/// Reads the part on SPI.
 ///
 /// Its clock begins at 0 with each reset of the part, so the first sample after one would be older than the newest one
 /// before. It is placed on the sensor's grid instead, as many steps after that one as the board's clock has counted.

@@ -15,7 +15,7 @@ use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 /// Bytes that may wait for a task: more than a sensor sends in the 20 ms that an estimate is waited for, and 4 ms of a
 /// line at 921600 baud.
 pub const RECEIVED: usize = 512;
-/// Bytes on their way to a line.
+/// At most this many bytes wait to be sent on a line.
 pub const SENDING: usize = 128;
 /// Places of a ring that DMA may write between two ticks: 92 bytes come at 921600 baud.
 const AHEAD: usize = 128;

@@ -257,7 +257,7 @@ pub fn transmitted() {
     can.tsr().write(|w| unsafe { w.bits(completed) });
 }
 
-/// A frame from the receive FIFO.
+/// Holds a frame from the receive FIFO.
 #[derive(Debug)]
 pub struct Received {
     /// The frame; `None`: a remote frame.

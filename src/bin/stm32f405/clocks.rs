@@ -1,4 +1,4 @@
-//! Clock tree (RM0090 7): 168 MHz from the board's crystal, or the internal 16 MHz oscillator.
+//! This module sets the clock tree (RM0090 7): 168 MHz from the board's crystal, or the internal 16 MHz oscillator.
 //!
 //! Every wait has a limit. A crystal that does not start, has another frequency than the board says,
 //! or a supply that stays low leaves the chip on the internal oscillator: CAN stays off, since that
@@ -16,7 +16,7 @@ const POLLS: u32 = 80_000;
 /// The emulator's timers count at 1 GHz, whatever RCC holds.
 const EMULATED_TIMER_HZ: u32 = 1_000_000_000;
 
-/// Frequencies, Hz.
+/// Holds the frequencies, Hz.
 #[derive(Debug, Clone, Copy)]
 pub struct Clocks {
     /// Processor and SysTick.

@@ -154,7 +154,7 @@ impl Flash {
     }
 }
 
-/// A word of the flash.
+/// Reads a word of the flash.
 fn word(offset: u32) -> u32 {
     // SAFETY: inside the flash, on a word boundary.
     unsafe { ((FLASH_BASE + offset) as *const u32).read_volatile() }

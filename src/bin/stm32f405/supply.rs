@@ -1,4 +1,4 @@
-//! The supply's supervision (RM0090 5.2): programmable voltage detector and brown-out reset.
+//! This module supervises the supply (RM0090 5.2): programmable voltage detector and brown-out reset.
 //!
 //! Flash is programmed in words, which needs 2.7 V, and 168 MHz at five wait states needs the same.
 //! The detector's level 6 falls at 2.85 to 2.99 V and rises at 3.10 V at most (DS8626 table 19), so the chip

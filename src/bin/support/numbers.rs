@@ -18,7 +18,7 @@ impl Numbers {
         self.0
     }
 
-    /// Uniform in -`limit`..=`limit`.
+    /// Returns a uniform number in -`limit`..=`limit`.
     pub const fn within(&mut self, limit: i32) -> i32 {
         (self.next() >> 1) as i32 % (2 * limit + 1) - limit
     }

@@ -17,7 +17,7 @@ use gyronet::sensor::xsens::precision::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 
-/// Every parser.
+/// Measures every parser.
 pub fn run(meter: &mut Meter) {
     dsp1760(meter);
     mtdata2(meter);

@@ -170,7 +170,7 @@ pub struct SetEncoder {
 }
 
 impl SetEncoder {
-    /// Nothing owed.
+    /// Starts without a rounding residual.
     pub const START: Self = Self { rates: [YawRateSignal::START; 3] };
 
     /// Encodes the three messages of one sample, in the order of [`LAYOUTS`]. A value that does not fit its signal

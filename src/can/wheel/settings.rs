@@ -9,7 +9,7 @@ use embedded_can::{Id, StandardId};
 /// Most frames that wheel speeds may be spread over.
 pub const MAX_FRAMES: usize = WHEELS;
 
-/// The longest time-out and standing time.
+/// The time-out and the standing time are at most this.
 const LONGEST_US: u64 = 10_000_000;
 
 /// Everything that can be set.
