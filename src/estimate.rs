@@ -9,7 +9,7 @@ use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 pub struct YawEstimate {
     /// Grid step of the sample that the rate belongs to.
     pub tick: u32,
-    /// The corrected rate: the gyro's own reading in [`Status::Init`], zero in [`Status::Silent`].
+    /// The corrected rate: the gyro's own reading in [`Status::Init`], zero while the sensor is silent.
     pub rate: AngularRate,
     /// The amount subtracted from the gyro beyond its static bias: the network's estimate, the bias found by zero-rate
     /// updates, revisions of earlier samples.

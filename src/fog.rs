@@ -3,7 +3,7 @@
 //!
 //! # FoGNet
 //!
-//! A window covers a minute, and a new one begins every second, so 60 windows cover each second. A window's estimate is
+//! A window covers a minute, and a new one is due every second, so 60 windows cover each second. A window's estimate is
 //! used in the second after next. The caller runs the network in the meantime ([`FogOutput::due`],
 //! [`FogCorrector::deliver`]), so fast and slow machines give the same output.
 //!

@@ -46,8 +46,8 @@ impl Level {
     }
 }
 
-/// Holds gain and mounting of the unit's gyro, as a drive with a reference yaw rate has shown them (`gyronet
-/// calibrate`).
+/// Holds gain and mounting of the unit's gyro, as a drive with a reference yaw rate has shown them
+/// (`gyronet calibrate`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnitMap {

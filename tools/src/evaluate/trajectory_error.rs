@@ -2,9 +2,10 @@
 //! and after alignment.
 //!
 //! The paper says "using evo" but not whether rmse or mean, so both are computed. Alignment is Umeyama's (IEEE PAMI
-//! 13(4), 1991) without scale, in the plane: with the centred points as vectors, the rotation is `atan2(sum of cross
-//! products, sum of dot products)`. evo aligns in three dimensions, which is the same on planar paths, except that it
-//! may mirror a path and refuses a straight one; a vehicle cannot be mirrored, and drives straight.
+//! 13(4), 1991) without scale, in the plane: with the centred points as vectors, the rotation is
+//! `atan2(sum of cross products, sum of dot products)`. evo aligns in three dimensions, which is the same on planar
+//! paths, except that it may mirror a path and refuses a straight one; a vehicle cannot be mirrored, and drives
+//! straight.
 
 use serde::Serialize;
 
