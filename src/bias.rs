@@ -1,11 +1,9 @@
-//! These modules estimate what the gyro reads at rest, and how sure that is.
+//! These modules estimate the gyro's reading at rest, and the uncertainty of that estimate.
 //!
-//! `static_init` takes the mean of three seconds at the start. `zero_rate` goes on whenever
-//! the vehicle stands: it estimates what is left of the rate behind the network, so that the
-//! loop is closed around gyro and network together. The wheels show that the vehicle stands;
-//! where there are none, `quiet` looks at the inertial sensors, within limits that are
-//! tighter than those of the start. `earth` keeps the rotation of the Earth from being taken
-//! off twice.
+//! `static_init` takes the mean of three seconds at the start. `zero_rate` goes on whenever the vehicle stands: it
+//! estimates the remaining rate behind the network, so that the loop is closed around gyro and network together. The
+//! wheels show that the vehicle stands; where there are none, `quiet` looks at the inertial sensors, within limits that
+//! are tighter than those of the start. `earth` keeps the rotation of the Earth from being taken off twice.
 
 pub(crate) mod earth;
 mod quiet;

@@ -1,20 +1,19 @@
 //! This module computes corrected rates from the network's estimates.
 //!
-//! A sample's best estimate is the mean of what the windows that cover it say ([`Mode`]). It is
-//! known some samples later; two rates go out for every sample all the same:
+//! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Mode`]). It is complete only
+//! some samples later, so two rates are sent for every sample:
 //!
 //! - the **prompt** one at once, for a receiver that steers by it. No window has seen the sample yet, so of its
 //!   correction only the steady part is known ([`SteadyGain`]: mounting and gain of the unit).
 //! - the **navigation** one [`CompensateConfig::lag`] samples later, for a receiver that sums it
 //!   up to a heading. Most of what there is to know is known by then.
 //!
-//! What a later window changes is not lost: the revision is carried into the rates that follow,
-//! so that the sum of the rates arrives at the sum of the best estimates. One rate carries at
-//! most a bounded part of it, so that none jumps. With c_k(t) the estimate for sample k as known
-//! at sample t, and L the lag:
+//! A revision by a later window is not lost: it is carried into the rates that follow, so that the sum of the rates
+//! arrives at the sum of the best estimates. One rate carries at most a bounded part of it, so that none jumps. With
+//! c_k(t) the estimate for sample k as known at sample t, and L the lag:
 //! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`.
-//! The prompt rate carries an eighth of what it owes with each sample. What a window revises is mostly
-//! noise of samples that are over, which the newest sample does not have; carried at once it would be added to it.
+//! The prompt rate carries an eighth of its outstanding revisions with each sample. A revision mostly concerns the
+//! noise of past samples, which the newest sample does not have; carried at once, it would add that noise to it.
 //!
 //! No window of 0.1 s can know a constant error, and one that a network was trained to is wrong on another vehicle.
 //! The mean of the corrections beyond their steady part is taken out of them: standstill finds the bias.
@@ -73,7 +72,8 @@ impl CompensateConfig {
     };
 }
 
-/// The prompt rate carries one part in so many of what it owes: a time constant of 80 ms.
+/// The prompt rate carries this fraction of its outstanding revisions with each sample, one part in so many: a time
+/// constant of 80 ms.
 const PROMPT_CARRY: i64 = 8;
 /// Samples over which a carry may be spread before it is reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
@@ -149,7 +149,7 @@ pub struct Implausible {
     pub largest: AngularRate,
 }
 
-/// Estimates of the samples that a window can still reach, and what is left to carry.
+/// Holds the estimates of the samples that a window can still reach, and the revisions left to carry.
 #[derive(Debug, Clone)]
 pub struct Compensator {
     config: CompensateConfig,
@@ -241,7 +241,7 @@ impl Compensator {
 
     /// Returns the rate of the newest sample, less a bias that is subtracted beside the estimate.
     ///
-    /// What is owed is not paid in a rate that a receiver drops: a clipped one.
+    /// Revisions are not carried into a rate that a receiver drops: a clipped one.
     pub fn prompt(&mut self, bias: AngularRate) -> Option<Compensated> {
         let entry = self.kept[KEPT - 1]?;
         let taken = i64::from(entry.estimate) + i64::from(bias.0);
@@ -302,14 +302,15 @@ impl Compensator {
         self.navigation_carry.unsigned_abs() > much
     }
 
-    /// Returns what the sum of the prompt rates still lacks, codes x samples: revisions that are not carried yet.
+    /// Returns the amount that the sum of the prompt rates still lacks, codes x samples: revisions that are not carried
+    /// yet.
     #[must_use]
     pub fn prompt_owed(&self) -> i64 {
         -self.prompt_carry
     }
 
-    /// Returns what the sum of the navigation rates still lacks: such revisions, and the samples that wait for
-    /// their turn.
+    /// Returns the amount that the sum of the navigation rates still lacks: such revisions, and the samples that wait
+    /// for their turn.
     #[must_use]
     pub fn navigation_owed(&self, bias: AngularRate) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
@@ -318,7 +319,8 @@ impl Compensator {
     }
 }
 
-/// Takes off the estimate and `carried` of the carry, as far as the bound allows. What the code cannot hold stays owed.
+/// Subtracts the estimate and `carried` of the carry, as far as the bound allows. A part that does not fit the code
+/// stays in the carry.
 fn emit(entry: &Entry, taken: i64, carried: i64, carry: &mut i64, max_carry: AngularRate) -> Compensated {
     // A negative bound would disable the limit.
     let bound = if entry.validity.is_good() { i64::from(max_carry.0).max(0) } else { 0 };

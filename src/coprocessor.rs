@@ -8,7 +8,7 @@
 //!
 //! Use it in this order:
 //!
-//! 1. Give it what has come: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]; and call
+//! 1. Give it the inputs that have come: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]; and call
 //!    [`Coprocessor::poll`] every millisecond or so, because silence is found there.
 //! 2. After each of these calls send what [`Coprocessor::next_frame`] returns, until it returns `None`.
 //! 3. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_window`] through the networks, at once or in
@@ -250,7 +250,7 @@ impl Coprocessor {
         }
     }
 
-    /// Looks for what is due at `now` without an input: messages of a silent sensor.
+    /// Does the work that is due at `now` without an input: messages of a silent sensor.
     ///
     /// # Errors
     /// [`InputError::ClockWentBack`]; it is counted.

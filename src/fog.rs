@@ -69,7 +69,7 @@ pub struct FogConfig {
     /// The rate of shaking that a mean over a second still holds, 1 sigma, rad/s: of the standing and of the moving
     /// vehicle. It is no turn of the vehicle, and adds up to zero.
     pub shake: [f32; 2],
-    /// Whether FoGNet is used.
+    /// Says whether FoGNet is used.
     pub fognet: FogNetUse,
     /// The filling of a window before a minute is over.
     pub padding: Padding,
@@ -108,7 +108,7 @@ pub struct FogOutput {
     pub turn: Option<Angle>,
     /// The correction that was subtracted.
     pub correction: Angle,
-    /// Whether an estimate was in use for this frame.
+    /// Says whether an estimate was in use for this frame.
     pub corrected: bool,
     /// A window is due: run [`FogCorrector::window`] through the network and
     /// [`FogCorrector::deliver`] the estimate under this number within a second.
@@ -117,7 +117,7 @@ pub struct FogOutput {
     pub broken: Option<Incomplete>,
     /// The reason why the estimate due with this frame was rejected.
     pub implausible: Option<ImplausibleTurn>,
-    /// Whether the estimate due with this frame has not come in time.
+    /// Says whether the estimate due with this frame has not come in time.
     pub late: bool,
 }
 

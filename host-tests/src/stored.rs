@@ -32,7 +32,7 @@ pub fn slots(flash: &F405) -> [&[u8]; 2] {
 /// Uploads a file to a slot, checks it and accepts it, as the board does.
 ///
 /// # Errors
-/// What the slot or the store says.
+/// The error of the slot or the store.
 pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), String> {
     let text = |error: &dyn std::error::Error| error.to_string();
     let mut region = Region::<SLOT_SIZE>::new(flash, layout::SLOTS);

@@ -16,7 +16,7 @@ use crate::sample::{FogSample, PERIOD_US, RATE_HZ};
 use crate::units::{Angle, AngularRate, Micros};
 use heapless::Deque;
 
-/// Increments kept: what a 1 kHz part sends in the 20 ms that a step can be waited for, and
+/// At most this many increments are kept: those that a 1 kHz part sends in the 20 ms that a step can be waited for, and
 /// half as many again.
 pub const KEPT: usize = 32;
 
@@ -127,7 +127,7 @@ impl Increments {
         self.last_end = None;
     }
 
-    /// Forgets what has come.
+    /// Forgets all increments.
     pub fn clear(&mut self) {
         self.pieces.clear();
         self.last_end = None;

@@ -22,7 +22,7 @@ use heapless::Deque;
 pub const BRIDGE_US: u64 = 25_000;
 /// The longest gap that a value bridges.
 pub const MAX_GAP_US: u64 = 100_000;
-/// Samples kept: what a 500 Hz part sends in the 20 ms that a step can be waited for.
+/// At most this many samples are kept: those that a 500 Hz part sends in the 20 ms that a step can be waited for.
 pub const KEPT: usize = 16;
 
 /// Says where a value on the grid comes from.

@@ -11,8 +11,8 @@ use crate::units::{Angle, AngularRate, RATE_HZ};
 /// Rotation of the Earth against the stars, rad/s (WGS 84).
 pub(crate) const EARTH_RATE: f32 = 7.292_115e-5;
 
-/// A geographic latitude, as what the Earth turns by there: the sine is worked out once, not deep
-/// in the sample path.
+/// Holds a geographic latitude as the Earth's rate about the vertical there, so that the sine is computed once and not
+/// for each sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Latitude {

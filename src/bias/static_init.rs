@@ -158,8 +158,8 @@ impl StaticInit {
         Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
     }
 
-    /// Takes a sample; after [`STATIC_SAMPLES`] of them returns what it reads at rest, or why there
-    /// is none, and begins again.
+    /// Takes a sample; after [`STATIC_SAMPLES`] of them returns the readings at rest, or the reason why there are none,
+    /// and begins again.
     pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {

@@ -140,9 +140,9 @@ impl ZeroRate {
         }
     }
 
-    /// Takes the rate that is left of a settled sample (gyro less static bias less the network's estimate;
-    /// `None` where that is not good) and the source that says that the vehicle stands. Returns what a second
-    /// of standing led to when one is over.
+    /// Takes the remaining rate of a settled sample (gyro less static bias less the network's estimate; `None` where
+    /// that is not good) and the source that says that the vehicle stands. Returns the outcome of a second of standing
+    /// when one is over.
     pub fn observe(
         &mut self,
         left: Option<AngularRate>,

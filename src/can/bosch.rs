@@ -164,7 +164,7 @@ impl YawRateSignal {
         }
     }
 
-    /// Forgets what is owed: after a message that was marked bad.
+    /// Drops the rounding residual, after a message that was marked bad.
     pub fn reset(&mut self) {
         self.residual = 0;
     }

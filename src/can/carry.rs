@@ -48,7 +48,7 @@ impl RoundingCarry {
         sent as i32
     }
 
-    /// Forgets what is owed: after a message that was marked bad, or at a new start.
+    /// Drops the residual, after a message that was marked bad or at a new start.
     pub fn reset(&mut self) {
         self.residual = 0;
     }

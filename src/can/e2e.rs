@@ -1,5 +1,5 @@
-//! AUTOSAR end-to-end protection (PRS E2E Protocol) adds a CRC, a counter and an identifier that is not sent, so
-//! that a receiver notices what the path between two ECUs did to the data.
+//! AUTOSAR end-to-end protection (PRS E2E Protocol) adds a CRC, a counter and an identifier that is not sent, so that a
+//! receiver notices loss and damage on the path between two ECUs.
 //!
 //! | profile | header | CRC | counter |
 //! |---|---|---|---|
@@ -102,7 +102,7 @@ impl Profile {
         }
     }
 
-    /// Writes the header for what is behind it.
+    /// Writes the header for the data behind it.
     ///
     /// # Errors
     /// [`Fault::Length`] and [`Fault::Counter`].

@@ -82,7 +82,7 @@ impl CanEncoder {
     }
 }
 
-/// Collects what the Bosch set carries. The grid step is its counter, so that a receiver sees which samples are
+/// Collects the values of the Bosch set. The grid step is its counter, so that a receiver sees which samples are
 /// missing.
 fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
     Motion {

@@ -54,7 +54,7 @@ pub enum YawError {
     Source(u8),
 }
 
-/// The rate message: 1e-6 deg/s a code, where the rate comes from, what it is worth.
+/// Holds the rate message: the rate in 1e-6 deg/s a code, its source and its quality.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateMessage {
@@ -74,7 +74,7 @@ impl RateMessage {
         [0, 0, 0, a, b, c, d, self.source as u8 | (self.quality as u8) << 3]
     }
 
-    /// Reads what is behind the header.
+    /// Reads the content behind the header.
     ///
     /// # Errors
     /// [`YawError`].
@@ -106,7 +106,7 @@ impl RateMessage {
     }
 }
 
-/// The angle message: accumulated yaw, 360 deg / 2^32 a code, and what is wrong.
+/// Holds the angle message: accumulated yaw in 360 deg / 2^32 a code, and the faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngleMessage {
@@ -124,7 +124,7 @@ impl AngleMessage {
         [0, 0, 0, a, b, c, d, self.faults.0]
     }
 
-    /// Reads what is behind the header.
+    /// Reads the content behind the header.
     ///
     /// # Errors
     /// [`YawError::Length`].
@@ -163,7 +163,7 @@ impl DetailMessage {
         [0, 0, 0, a, b, c, d, self.latency]
     }
 
-    /// Reads what is behind the header.
+    /// Reads the content behind the header.
     ///
     /// # Errors
     /// [`YawError::Length`].

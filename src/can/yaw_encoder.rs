@@ -108,8 +108,8 @@ impl YawEncoder {
     }
 }
 
-/// Mean of some samples, nothing lost: what the division leaves stays in the sum, what the
-/// rounding leaves in the carry.
+/// Averages some samples without loss: the remainder of the division stays in the sum, and the rounding residual in the
+/// carry.
 #[derive(Debug, Clone, Copy)]
 struct Mean {
     sum: i64,

@@ -263,7 +263,7 @@ impl FogPipeline {
         self.estimate_faults = Faults::NONE;
     }
 
-    /// Returns what is taken off the gyro without FoGNet.
+    /// Returns the source of the rate without FoGNet.
     fn source(&self) -> Source {
         match self.lane.latitude() {
             Some(_) => Source::EarthRate,

@@ -15,7 +15,7 @@ pub struct IncrementRate {
 }
 
 impl IncrementRate {
-    /// No frame, and nothing owed.
+    /// Starts without a frame and without a remainder.
     pub const START: Self = Self { rest: 0 };
 
     /// Returns the rate of a frame that turned by this much, saturated at the limits of [`AngularRate`].

@@ -1,4 +1,4 @@
-//! This filter finds the bias of a fibre-optic gyro from what it reads while the wheels stand.
+//! This filter finds the bias of a fibre-optic gyro from its readings while the wheels stand.
 //!
 //! Two sources say what the gyro reads at rest:
 //!
@@ -9,8 +9,8 @@
 //! - **Latitude and data sheet.** The gyro reads the Earth's rate and a bias of the size that the data sheet says.
 //!   Without a latitude that is worth 9 deg/h.
 //!
-//! Their weighted mean is what is taken off; its variance is reported. A latitude that becomes known, or is found to
-//! have been wrong, leaves the first source as it is.
+//! Their weighted mean is subtracted, and its variance is reported. A latitude that becomes known, or is found to have
+//! been wrong, leaves the first source as it is.
 //!
 //! A mean counts when the second after it was still, too, for wheel sensors show a car that pulls away late. One that is
 //! further off than ten sigma was no standstill, whatever the wheels say.

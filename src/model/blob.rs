@@ -30,7 +30,7 @@ pub const HEADER_LEN: usize = header_len(FEATURES);
 pub struct Shape {
     /// Units of the Bi-LSTMs a direction, up to [`HIDDEN`] in steps of 4; with 0 there are none.
     pub units: u16,
-    /// Whether the model has a linear part.
+    /// Says whether the model has a linear part.
     pub linear: bool,
 }
 

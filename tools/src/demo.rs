@@ -24,7 +24,7 @@ pub use trajectory::{Path, Trajectories};
 pub struct Demo<'a> {
     /// The drive.
     pub recording: &'a Recording,
-    /// Whether the drive is simulated.
+    /// Says whether the drive is simulated.
     pub simulated: bool,
     /// Its yaw rates.
     pub rates: &'a Rates,

@@ -1,4 +1,4 @@
-//! The board's lines, and what it reports of itself.
+//! This module holds the board's lines, and the state that it reports.
 #![allow(
     unsafe_code,
     clippy::undocumented_unsafe_blocks,

@@ -113,7 +113,7 @@ unsafe extern "C" fn HardFault() -> ! {
     )
 }
 
-/// Keeps what the exception frame holds, where the stack pointer still pointed into the RAM.
+/// Keeps the content of the exception frame, if the stack pointer still points into the RAM.
 unsafe extern "C" fn hard_fault(stack: u32) -> ! {
     let inside = RAM.contains(&stack) && RAM.end - stack >= FRAME && stack.is_multiple_of(4);
     let word = |k: u32| {

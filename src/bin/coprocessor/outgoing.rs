@@ -40,7 +40,7 @@ impl Outgoing {
         }
     }
 
-    /// Sends what the lines take; gives what a host has sent over SLCAN.
+    /// Sends as much as the lines accept; passes on the frames that a host has sent over SLCAN.
     pub fn service(&mut self, take: impl FnMut(DataFrame)) {
         self.port.set_bus(match self.state() {
             State::Active => StatusFlags::default(),

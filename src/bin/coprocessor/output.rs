@@ -121,7 +121,7 @@ impl Output {
         }
     }
 
-    /// Takes what has come on all other lines.
+    /// Gives the coprocessor the waiting CAN frames and the fibre-optic gyro's bytes, and sends its frames.
     #[inline(never)]
     fn look(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
         while let Some(frame) = FRAMES.pop() {
@@ -143,7 +143,7 @@ impl Output {
         self.send(coprocessor, now);
     }
 
-    /// Hands on what the bus has lost.
+    /// Reports lost frames and the state of the bus to the coprocessor.
     fn report_bus(&mut self, coprocessor: &mut Coprocessor) {
         self.lines.unsent = self.outgoing.dropped();
         self.lines.frames_lost = received::lost();

@@ -11,7 +11,7 @@ const BYTES: &[u8; include_bytes!("../../../tools/weights/gyronet.safetensors").
     include_bytes!("../../../tools/weights/gyronet.safetensors");
 static FILE: Aligned<[u8; BYTES.len()]> = Aligned(*BYTES);
 
-/// The values of a tensor; `None` where the file is not what it should be.
+/// Returns the values of a tensor; `None` if the file does not have it as expected.
 fn tensor(name: &str) -> Option<&'static [f32]> {
     let (len, rest) = FILE.0.split_first_chunk::<8>()?;
     let (header, data) = rest.split_at_checked(u64::from_le_bytes(*len) as usize)?;

@@ -43,7 +43,7 @@ impl StatusFlags {
     pub const BUS_ERROR: Self = Self(1 << 7);
 }
 
-/// Says what a line from the host did.
+/// Holds the effect of a line from the host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reaction {
     /// The answer to send before the next frame.

@@ -55,7 +55,7 @@ impl<const N: usize> Port<N> {
         }
     }
 
-    /// Sets what the command `F` reports of the bus; frames that this line dropped are added.
+    /// Sets the state of the bus that the command `F` reports; frames that this line dropped are added.
     pub fn set_bus(&mut self, flags: StatusFlags) {
         self.bus = flags;
     }
@@ -103,10 +103,10 @@ impl<const N: usize> Port<N> {
         self.taken = self.taken.saturating_add(bytes).min(self.line.len());
     }
 
-    /// Moves what the line gives and takes without waiting; `frame` gets the host's frames.
+    /// Moves as many bytes from and to the line as it gives and takes without waiting; `frame` gets the host's frames.
     ///
     /// # Errors
-    /// The line's own. Nothing is lost by it but the byte that the line lost.
+    /// The line's own error; only the byte that the line lost is lost.
     pub fn service<L>(&mut self, line: &mut L, mut frame: impl FnMut(DataFrame)) -> Result<(), L::Error>
     where
         L: Read + ReadReady + Write + WriteReady,

@@ -37,7 +37,7 @@ impl Wheels {
         Self { rule, expected, speeds: [None; WHEELS], still_since: None }
     }
 
-    /// Drops what is too old. Call it before new speeds are taken.
+    /// Drops speeds that are too old. Call it before new speeds are taken.
     pub fn expire(&mut self, now: Micros) {
         for slot in &mut self.speeds {
             let old = |(_, at): &(_, Micros)| now.since(*at) > self.rule.timeout;

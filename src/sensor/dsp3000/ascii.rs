@@ -22,7 +22,7 @@ const MILLIONTHS: u32 = 1_000_000;
 pub struct Reading {
     /// The value in millionths of the unit, exact.
     pub millionths: i32,
-    /// Whether the part marks the reading as valid.
+    /// Says whether the part marks the reading as valid.
     pub valid: bool,
 }
 

@@ -17,7 +17,7 @@ pub struct Reading {
     pub at: u64,
     /// The rates of a fibre-optic gyro beside the part, equal to the reference where there is one.
     pub fog: [AngularRate; 3],
-    /// Whether the fibre-optic gyro has no noise and repeats its readings.
+    /// Says whether the fibre-optic gyro has no noise and repeats its readings.
     pub fog_stuck: bool,
     /// The error of the part's time stamp, microseconds.
     pub stamp_us: i64,

@@ -57,7 +57,7 @@ struct Row {
 pub struct Outcome {
     /// Time from the fault's first effect to the first message, or first missing message, that reports it, s.
     pub reported_after: Option<f64>,
-    /// Whether the board has counted an event, which a diagnosis would see.
+    /// Says whether the board has counted an event, which a diagnosis would see.
     pub counted: bool,
     /// The largest yaw moved in a second that is all marked good, before the first report, rad.
     pub moved: f64,
@@ -73,7 +73,7 @@ pub struct Outcome {
     pub error: f64,
     /// Time from the end of the fault to the last report of it, s; 0 where the last report came before.
     pub recovery: f64,
-    /// Whether the fault was still reported at the end.
+    /// Says whether the fault was still reported at the end.
     pub not_recovered: bool,
 }
 
@@ -102,7 +102,7 @@ pub struct AgainstTruth {
     pub largest: f64,
     /// Share of the errors inside the expected error that was sent; `None` where none is sent.
     pub inside_sigma: Option<f64>,
-    /// Whether all of these are within [`Limits`].
+    /// Says whether all of these are within [`Limits`].
     pub in_order: bool,
 }
 

@@ -24,7 +24,7 @@ impl<W: Write> Log<W> {
     /// Writes one data frame with its time stamp.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The writer's error.
     pub fn frame(&mut self, time: Micros, frame: &impl Frame) -> io::Result<()> {
         let Micros(us) = time;
         write!(self.out, "({}.{:06}) {INTERFACE} ", us / 1_000_000, us % 1_000_000)?;
@@ -42,7 +42,7 @@ impl<W: Write> Log<W> {
     /// Flushes the writer and returns the number of frames.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The writer's error.
     pub fn finish(mut self) -> io::Result<u64> {
         self.out.flush()?;
         Ok(self.frames)

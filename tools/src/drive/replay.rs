@@ -49,7 +49,7 @@ pub struct Step {
     pub row: usize,
     /// The sample's time stamp.
     pub time: Micros,
-    /// Whether the vehicle stands, by its wheels.
+    /// Says whether the vehicle stands, by its wheels.
     pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,

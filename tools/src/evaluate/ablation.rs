@@ -21,9 +21,9 @@ pub struct Variant {
     pub name: String,
     /// The configuration.
     pub config: PipelineConfig,
-    /// Whether windows go through the network; otherwise its corrections are zero.
+    /// Says whether windows go through the network; otherwise its corrections are zero.
     pub network: bool,
-    /// Whether the vehicle's bus has wheel speeds.
+    /// Says whether the vehicle's bus has wheel speeds.
     pub wheels: bool,
 }
 

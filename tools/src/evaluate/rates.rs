@@ -59,7 +59,7 @@ pub struct Rates {
     pub costs: PerMethod<Cost>,
     /// The truth, where the drive has one.
     pub reference: Option<Reference>,
-    /// Whether the drive began while the vehicle moved, so that a simulated standstill was put before it.
+    /// Says whether the drive began while the vehicle moved, so that a simulated standstill was put before it.
     pub simulated_rest: bool,
     /// The drive as the board would run it.
     pub drive: Replay,

@@ -166,9 +166,9 @@ pub struct DriveErrors {
     pub missing: u32,
     /// The column of the reference.
     pub reference: &'static str,
-    /// Whether the vehicle's wheels are known.
+    /// Says whether the vehicle's wheels are known.
     pub wheels: bool,
-    /// Whether the standstill at the start is simulated.
+    /// Says whether the standstill at the start is simulated.
     pub simulated_rest: bool,
     /// Our rates beside the best classical method.
     pub over_best_classical: Option<Comparisons>,

@@ -66,9 +66,9 @@ pub struct Sequence {
     pub layout: Layout,
     /// The specification that it was simulated from, if it is simulated.
     pub simulated: Option<Spec>,
-    /// Whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
+    /// Says whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
     pub has_gyro: bool,
-    /// Whether [`Step::vendor_yaw`] comes from a vendor's filter.
+    /// Says whether [`Step::vendor_yaw`] comes from a vendor's filter.
     pub has_vendor: bool,
     /// Distance of the wheels, m, if the data contain it.
     pub wheel_base: Option<f64>,

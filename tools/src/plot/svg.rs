@@ -112,7 +112,7 @@ pub struct Figure<'a> {
     pub title: &'a str,
     /// Its width and height, pixels.
     pub size: (u32, u32),
-    /// Whether its panels stand side by side; otherwise they stand one below the other.
+    /// Says whether its panels stand side by side; otherwise they stand one below the other.
     pub side_by_side: bool,
     /// The names of its lines.
     pub legend: Vec<(String, Stroke)>,

@@ -11,7 +11,7 @@ pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_x,ref_
 /// Writes a whole drive; returns the number of samples.
 ///
 /// # Errors
-/// What the writer says.
+/// The writer's error.
 pub fn write(config: &Config, mut out: impl Write) -> io::Result<u32> {
     writeln!(out, "{HEADER}")?;
     let samples = config.seconds * RATE_HZ;

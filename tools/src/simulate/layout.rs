@@ -136,7 +136,7 @@ impl Drive {
 /// Writes a sequence into a folder, which is made. `tick` is called for each 10 ms.
 ///
 /// # Errors
-/// What the file system says.
+/// The file system's error.
 pub fn write(spec: &Spec, folder: &Path, tick: impl FnMut()) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
     std::fs::write(folder.join(MARKER), serde_json::to_string_pretty(spec)? + "\n")?;

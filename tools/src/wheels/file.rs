@@ -43,7 +43,7 @@ pub enum WheelFileError {
         path: String,
         /// The identifier.
         id: u32,
-        /// Whether the file says that it has 29 bits.
+        /// Says whether the file says that it has 29 bits.
         extended: bool,
     },
     /// A wheel has two signals.
@@ -121,7 +121,7 @@ const fn still_for_ms() -> u32 {
 pub struct Frame {
     /// Identifier.
     pub id: u32,
-    /// Whether the identifier has 29 bits.
+    /// Says whether the identifier has 29 bits.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub extended: bool,
     /// Its protection, if it has one.

@@ -65,7 +65,7 @@ pub struct Handler {
 }
 
 impl Handler {
-    /// Does what the interrupt is for; waits for nothing.
+    /// Serves the line's interrupt without waiting.
     #[inline(always)]
     pub fn serve(&mut self) {
         let status = self.usart.status();

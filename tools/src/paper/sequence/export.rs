@@ -13,7 +13,7 @@ pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,whee
 /// Writes all steps; those in a gap of the inertial sensor are left out.
 ///
 /// # Errors
-/// What the writer says.
+/// The writer's error.
 pub fn write_csv(sequence: &Sequence, mut out: impl Write) -> io::Result<u64> {
     writeln!(out, "{HEADER}")?;
     let mut rows = 0;

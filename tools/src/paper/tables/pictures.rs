@@ -21,7 +21,7 @@ struct Labels<'a> {
     title: &'a str,
     x: &'a str,
     y: &'a str,
-    /// Whether both axes have the same scale.
+    /// Says whether both axes have the same scale.
     same_scale: bool,
 }
 

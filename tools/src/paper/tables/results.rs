@@ -52,10 +52,10 @@ pub struct SequenceErrors {
     pub name: String,
     /// The data set whose layout it has.
     pub layout: Layout,
-    /// Whether the sequence is simulated.
+    /// Says whether the sequence is simulated.
     pub simulated: bool,
-    /// Whether its sensors differ from those of the paper's first sequences: urban18 and later, or a simulated device
-    /// other than the first.
+    /// Says whether its sensors differ from those of the paper's first sequences: urban18 and later, or a simulated
+    /// device other than the first.
     pub other_devices: bool,
     /// The length of the comparison, s.
     pub seconds: f64,
@@ -181,7 +181,7 @@ pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod
 /// Holds the results in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
-    /// Whether some sequence is simulated.
+    /// Says whether some sequence is simulated.
     pub simulated: bool,
     /// One entry for each sequence.
     pub sequences: Vec<SequenceErrors>,

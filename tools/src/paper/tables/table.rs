@@ -20,7 +20,7 @@ pub struct Row {
 pub struct Table {
     /// Its number in the paper and its subject.
     pub title: String,
-    /// Whether it holds figures of simulated drives.
+    /// Says whether it holds figures of simulated drives.
     pub simulated: bool,
     /// Names of the columns of figures.
     pub columns: Vec<String>,

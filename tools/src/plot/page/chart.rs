@@ -26,7 +26,7 @@ pub struct Curve {
     pub note: String,
     /// The points in the units of the axes.
     pub points: Vec<(f64, f64)>,
-    /// Whether the axes must hold all of it; otherwise it may leave them.
+    /// Says whether the axes must hold all of it; otherwise it may leave them.
     pub in_scale: bool,
 }
 
@@ -37,7 +37,7 @@ pub struct Chart<'a> {
     pub title: &'a str,
     /// The units to the right and upwards.
     pub axes: &'a str,
-    /// Whether both axes have the same scale; otherwise the axis to the right is the time.
+    /// Says whether both axes have the same scale; otherwise the axis to the right is the time.
     pub same_scale: bool,
     /// The lines from back to front.
     pub curves: Vec<Curve>,
