@@ -1,8 +1,8 @@
 //! This module handles the requirements of a test beyond Rust: the test gets them, or is reported as skipped, or fails.
 //!
 //! `GYRONET_REQUIRE=qemu,data` makes tests that need these fail where they are missing; without it they print
-//! `SKIPPED name: why` and pass. The line goes straight to the process's standard error, which the test harness does not
-//! capture: a plain `cargo test` shows it.
+//! `SKIPPED name: why` and pass. The line goes straight to the process's standard error, which the test harness does
+//! not capture: a plain `cargo test` shows it.
 
 use std::io::Write;
 use std::process::Command;
