@@ -13,6 +13,7 @@ mod nclt;
 mod rows;
 mod summary;
 mod track;
+mod utm;
 
 pub use export::{HEADER, write_csv};
 pub use summary::{Seen, Spread, StreamSummary};
@@ -72,6 +73,8 @@ pub struct Sequence {
     pub has_vendor: bool,
     /// Distance of the wheels, m, if the data contain it.
     pub wheel_base: Option<f64>,
+    /// Latitude of the first pose, deg, where poses are in UTM.
+    pub latitude: Option<f64>,
     /// The steps, 10 ms apart.
     pub steps: Vec<Step>,
     /// Steps with a gap of the inertial sensor, the gyro, the wheels and the truth.
@@ -166,7 +169,9 @@ impl Sequence {
             let fault = DataFault::TooLittleInCommon { seconds, needed: NEEDED };
             return Err(DataError::of(folder.display(), fault));
         }
+        let mut latitude = None;
         if let Some(Step { position: [x, y], .. }) = steps.first().copied() {
+            latitude = (layout == Layout::Kaist).then(|| utm::latitude_deg([x, y])).flatten();
             for step in &mut steps {
                 step.position = [step.position[0] - x, step.position[1] - y];
             }
@@ -177,7 +182,19 @@ impl Sequence {
         let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
         let name = name.unwrap_or_else(|| folder.display().to_string());
         let path = folder.to_owned();
-        Ok(Self { name, path, layout, simulated, has_gyro, has_vendor, wheel_base, steps, in_gap, files })
+        Ok(Self {
+            name,
+            path,
+            layout,
+            simulated,
+            has_gyro,
+            has_vendor,
+            wheel_base,
+            latitude,
+            steps,
+            in_gap,
+            files,
+        })
     }
 
     /// Returns the length, s.
@@ -190,7 +207,9 @@ impl Sequence {
     /// recorded.
     #[must_use]
     pub fn latitude_deg(&self) -> f64 {
-        self.layout.vehicle().world.latitude_deg
+        let made = self.layout.vehicle().world.latitude_deg;
+        // A simulated world turns by the latitude of its settings, wherever its map lies.
+        self.latitude.filter(|_| self.simulated.is_none()).unwrap_or(made)
     }
 
     /// Returns the true change of heading in each step, rad; zero in the first.

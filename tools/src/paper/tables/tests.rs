@@ -59,6 +59,7 @@ fn exact() -> Sequence {
         has_gyro: true,
         has_vendor: true,
         wheel_base: None,
+        latitude: None,
         steps: (0..6_000).map(step).collect(),
         in_gap: [0; 4],
         files: [file(), file(), file(), file()],
