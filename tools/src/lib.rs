@@ -7,6 +7,7 @@
 //! ```text
 //! drive <- parts <- campaign -> plot, client, simulate
 //! drive <- calibrate
+//! drive <- import -> wheels
 //! drive <- evaluate <- paper -> plot, simulate
 //! target -> simulate      network      client      wheels
 //! demo -> everything above
@@ -19,6 +20,7 @@ pub mod client;
 pub mod demo;
 pub mod drive;
 pub mod evaluate;
+pub mod import;
 pub mod network;
 pub mod paper;
 pub mod parts;

@@ -4,7 +4,7 @@
 //! The board keeps the same settings as a record ([`gyronet::can::wheel::WheelSettings`]), so that another vehicle
 //! needs no new image. Both pass the library's own check.
 
-mod dbc;
+pub(crate) mod dbc;
 mod file;
 
 pub use dbc::{DbcError, Signals, from_dbc};

@@ -10,6 +10,7 @@ mod fognet_golden;
 mod fognet_integer;
 mod fognet_simulated;
 mod gyronet_golden;
+mod import_logs;
 mod mounting;
 mod recordings_bad_input;
 mod replay_via;

@@ -1,7 +1,11 @@
-//! `gyronet import`: a sequence of a data set, converted to one drive.
+//! `gyronet import`: logs of other tools, or a sequence of a data set, converted to one drive.
 
 use super::{Common, WriteError, print_json, progress, remark};
+use clap::ValueEnum;
 use gyronet_tools::drive::error::DataError;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::import::drive::{Imported, Request, import, write_csv};
+use gyronet_tools::import::vehicle::Vehicle;
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::paper::tables::pictures;
 use gyronet_tools::simulate::layout::Layout;
@@ -10,41 +14,140 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Summarise a sequence of KAIST Urban or NCLT, and convert it to a CSV.
+/// Convert logs of other tools, or a sequence of a data set, to one drive.
 ///
-/// The other subcommands read the CSV.
+/// The other subcommands read the CSV. Logs are ROS 1 bags, MCAP (ROS 1 and 2), PX4 ULog, candump, Vector ASC and BLF,
+/// PEAK TRC, Xsens MT text and CSV. The first channel with a gyro, an odometry and a GNSS position is found by its type;
+/// where several fit, name one. What a log cannot say (mounting, wheels, columns, the DBC file) stands in a vehicle file:
+/// `vehicle.toml` beside the first log unless --vehicle names another. It is written beside the drive again.
 ///
-/// KAIST has sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and global_pose.csv; NCLT has
-/// ms25.csv, kvh.csv, wheels.csv and groundtruth_*.csv. Missing files, wrong columns, text for numbers and time that
-/// goes backwards are errors. Rows with NaN, repeated stamps, gaps and encoder resets are counted and reported.
+/// The clocks of several files are laid on each other by the yaw rates that they have in common. Records that cannot be
+/// used are counted and reported.
+///
+/// A sequence of KAIST Urban or NCLT is named by its layout and its folder. KAIST has
+/// sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and global_pose.csv; NCLT has ms25.csv,
+/// kvh.csv, wheels.csv and groundtruth_*.csv. Missing files, wrong columns, text for numbers and time that goes backwards
+/// are errors. Rows with NaN, repeated stamps, gaps and encoder resets are counted and reported.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
+  gyronet import drive.bag --out drive.csv
+  gyronet import drive.mcap bus.blf --dbc car.dbc --vehicle car.toml --out drive.csv
   gyronet import kaist urban14 --out urban14.csv
   gyronet import nclt 2012-01-08 --stamps stamps.svg")]
 pub struct Args {
-    /// Data set whose layout the sequence has.
-    #[arg(value_name = "LAYOUT")]
-    layout: Layout,
-    /// Folder of the sequence.
-    #[arg(value_name = "DIR")]
-    folder: PathBuf,
-    /// Write the drive, at 100 Hz, with gyro, wheels and truth to this file.
+    /// Logs of one drive; or `kaist` or `nclt` and the folder of a sequence.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Write the drive, at 100 Hz, to this file.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
-    /// Write a picture of the times between stamps of each file (the paper's Fig. 11).
+    /// Vehicle file [default: vehicle.toml beside the first log, if there is one].
+    #[arg(long, value_name = "FILE.toml")]
+    vehicle: Option<PathBuf>,
+    /// Names and signals of the CAN frames.
+    #[arg(long, value_name = "FILE.dbc")]
+    dbc: Option<PathBuf>,
+    /// Channel of the gyro and the accelerometer.
+    #[arg(long, value_name = "CHANNEL")]
+    imu: Option<String>,
+    /// Channel whose speed stands in for the wheels; `none` takes none.
+    #[arg(long, value_name = "CHANNEL")]
+    odometry: Option<String>,
+    /// Channel of the GNSS position; `none` takes none.
+    #[arg(long, value_name = "CHANNEL")]
+    position: Option<String>,
+    /// The files have one clock: their stamps are used as they are.
+    #[arg(long)]
+    same_clock: bool,
+    /// Leave out this many seconds at the start.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    from: f64,
+    /// Write a picture of the times between stamps of each file of a sequence (the paper's Fig. 11).
     #[arg(long, value_name = "FILE.svg")]
     stamps: Option<PathBuf>,
 }
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let started = Instant::now();
-    let found = sequence::layout(&args.folder)?;
-    if found != args.layout {
-        return Err(format!("{}: has the layout of {found:?}", args.folder.display()).into());
+    if let [layout, folder] = &args.files[..]
+        && let Some(layout) = layout.to_str().and_then(|name| Layout::from_str(name, true).ok())
+    {
+        return run_sequence(args, layout, folder, common);
     }
-    let sequence = read(&args.folder, common)?;
+    run_logs(args, common)
+}
+
+/// Imports logs.
+fn run_logs(args: &Args, common: Common) -> super::Result {
+    if args.stamps.is_some() {
+        return Err("--stamps draws the files of a sequence of KAIST Urban or NCLT".into());
+    }
+    if !(0.0..1e6).contains(&args.from) {
+        return Err("--from should be seconds from the first sample on".into());
+    }
+    let Imported { rows, mut report, dropped } = import(&Request {
+        files: args.files.clone(),
+        vehicle: vehicle(args)?,
+        same_clock: args.same_clock,
+        from: args.from,
+    })?;
+    if let Some(path) = &args.out {
+        let error = WriteError::to(path);
+        write_csv(&rows, BufWriter::new(File::create(path).map_err(&error)?)).map_err(&error)?;
+        let beside = path.with_extension("vehicle.toml");
+        let text = toml::to_string(&vehicle(args)?)?;
+        std::fs::write(&beside, text).map_err(WriteError::to(&beside))?;
+        report.push(format!("{}: {} rows; {} beside it", path.display(), rows.len(), beside.display()));
+        // Read as all others will read it, so that its faults are known now.
+        if let Err(error) = Recording::read(path) {
+            report.push(format!("other commands will refuse it: {error}"));
+        }
+    }
+    let seconds = rows.last().map_or(0.0, |row| row.seconds);
+    let mut out = std::io::stdout().lock();
+    if common.json {
+        let json = serde_json::json!({
+            "seconds": seconds, "rows": rows.len(), "dropped": dropped, "report": report,
+        });
+        return print_json(&mut out, &json);
+    }
+    writeln!(out, "{seconds:.2} s, {} rows, {dropped} records dropped", rows.len())?;
+    for line in report {
+        writeln!(out, "  {line}")?;
+    }
+    Ok(())
+}
+
+/// The vehicle file, and what the arguments put in its place.
+fn vehicle(args: &Args) -> Result<Vehicle, Box<dyn std::error::Error>> {
+    let beside =
+        args.files.first().map(|file| file.with_file_name("vehicle.toml")).filter(|path| path.is_file());
+    let mut vehicle = match args.vehicle.as_ref().or(beside.as_ref()) {
+        Some(path) => Vehicle::read(path)?,
+        None => Vehicle::default(),
+    };
+    let dbc = args.dbc.as_ref().or(vehicle.bus.dbc.as_ref());
+    // The copy beside the drive may lie elsewhere than the DBC file.
+    vehicle.bus.dbc = dbc.map(std::path::absolute).transpose()?;
+    for (name, argument) in [
+        (&mut vehicle.signals.imu, &args.imu),
+        (&mut vehicle.signals.odometry, &args.odometry),
+        (&mut vehicle.signals.position, &args.position),
+    ] {
+        *name = argument.clone().or(name.take());
+    }
+    Ok(vehicle)
+}
+
+/// Imports a sequence of a data set.
+fn run_sequence(args: &Args, layout: Layout, folder: &Path, common: Common) -> super::Result {
+    let started = Instant::now();
+    let found = sequence::layout(folder)?;
+    if found != layout {
+        return Err(format!("{}: has the layout of {found:?}", folder.display()).into());
+    }
+    let sequence = read(folder, common)?;
     let mut out = std::io::stdout().lock();
     if common.json {
         let [imu, fog, wheels, truth] = &sequence.files;

@@ -165,7 +165,7 @@ fn find(path: &str, dbc: &Dbc, wheel: Wheel, name: &str) -> Result<(MessageId, S
 }
 
 /// Returns the raw code that the file describes as invalid.
-fn invalid_code(dbc: &Dbc, id: MessageId, signal: &str) -> Option<u32> {
+pub(crate) fn invalid_code(dbc: &Dbc, id: MessageId, signal: &str) -> Option<u32> {
     let descriptions = dbc.value_descriptions.iter().find_map(|description| match description {
         ValueDescription::Signal { message_id, name, value_descriptions }
             if *message_id == id && name == signal =>

@@ -1,0 +1,105 @@
+//! The format of a file, by its first bytes, and what to do with one that is not read.
+
+use super::can::Bus;
+use super::error::ImportError;
+use super::log::Log;
+use super::vehicle::Columns;
+use super::{blf, candump, mcap, ros_bag, table, ulog};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// What the formats read from.
+pub type Input<'a> = dyn BufRead + 'a;
+
+/// Formats that are known but not read, by their first bytes, and what turns them into one that is.
+const REFUSED: [(&[u8], &str); 3] = [
+    (
+        b"SQLite format 3\0",
+        "a ROS 2 bag in SQLite, which would need a database to be built with this command; convert it: \
+         pip install rosbags && rosbags-convert --src FOLDER --dst CONVERTED --dst-storage mcap",
+    ),
+    (
+        b"MDF     ",
+        "an MDF file; convert it: pip install asammdf && python3 -c \"from asammdf import MDF; \
+         MDF('FILE').to_dataframe(raster=0.01).to_csv('FILE.csv', index_label='t_s')\"",
+    ),
+    (b"PK\x03\x04", "a ZIP archive; unpack it first"),
+];
+
+/// Reads a file. `bus` decodes CAN frames, `columns` names the columns of a text table.
+///
+/// # Errors
+/// [`ImportError`]: the file cannot be read at all, or its format is not one of those that are.
+pub fn read_file(path: &Path, bus: Option<&Bus>, columns: &Columns) -> Result<Log, ImportError> {
+    let name = path.display().to_string();
+    let io = |source| ImportError::Io { path: name.clone(), source };
+    if path.is_dir() {
+        return Err(ImportError::Format {
+            path: name,
+            reason: "is a folder; name the files in it".to_owned(),
+        });
+    }
+    let file = File::open(path).map_err(io)?;
+    read(&name, &mut BufReader::with_capacity(1 << 16, file), bus, columns)
+}
+
+/// Reads bytes as a file of that name.
+///
+/// # Errors
+/// As [`read_file`].
+pub fn read_bytes(
+    name: &str,
+    mut bytes: &[u8],
+    bus: Option<&Bus>,
+    columns: &Columns,
+) -> Result<Log, ImportError> {
+    read(name, &mut bytes, bus, columns)
+}
+
+fn read(name: &str, input: &mut Input<'_>, bus: Option<&Bus>, columns: &Columns) -> Result<Log, ImportError> {
+    let io = |source| ImportError::Io { path: name.to_owned(), source };
+    let refuse = |reason: &str| ImportError::Format { path: name.to_owned(), reason: reason.to_owned() };
+    // A file's buffer holds them all at the first look.
+    let head = input.fill_buf().map_err(io)?;
+    if head.is_empty() {
+        return Err(refuse("is empty"));
+    }
+    if let Some((_, reason)) = REFUSED.iter().find(|(magic, _)| head.starts_with(magic)) {
+        return Err(refuse(reason));
+    }
+    let mut log = Log::default();
+    if head.starts_with(mcap::MAGIC) {
+        mcap::read(input, &mut log);
+    } else if head.starts_with(ros_bag::MAGIC) {
+        input.consume(ros_bag::MAGIC.len());
+        ros_bag::read(input, &mut log).map_err(io)?;
+    } else if head.starts_with(b"#ROSBAG") {
+        return Err(refuse("a bag of another version than 2.0; convert it: rosbag fix OLD.bag NEW.bag"));
+    } else if head.starts_with(ulog::MAGIC) {
+        ulog::read(input, &mut log).map_err(io)?;
+    } else if head.starts_with(blf::MAGIC) {
+        blf::read(input, bus, &mut log).map_err(io)?;
+    } else if let Some(dialect) = candump::dialect(head) {
+        candump::read(dialect, input, bus, &mut log).map_err(io)?;
+    } else {
+        table::read(input, columns, &mut log).map_err(|error| refuse(&error.to_string()))?;
+    }
+    Ok(log)
+}
+
+/// Reads `len` bytes, or as many as there are.
+pub fn read_up_to(input: &mut Input<'_>, len: usize) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    input.take(len as u64).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Reads a line without its end, of at most `most` bytes; what is beyond them is the next line.
+pub fn read_line(input: &mut Input<'_>, most: u64) -> std::io::Result<Option<String>> {
+    let mut bytes = Vec::new();
+    if input.take(most).read_until(b'\n', &mut bytes)? == 0 {
+        return Ok(None);
+    }
+    Ok(Some(String::from_utf8_lossy(&bytes).trim_end().to_owned()))
+}

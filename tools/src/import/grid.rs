@@ -1,0 +1,118 @@
+//! Samples of any rate on the 100 Hz grid.
+//!
+//! From 150 Hz on a row is the mean of the samples within 5 ms of it, which keeps the integral and what a mean filter
+//! keeps of the noise. Below, it is interpolated between its neighbours, at most two periods apart: a row in a gap is left
+//! out, because a row that is made up cannot be told from one that was measured.
+
+use crate::drive::DT;
+
+/// From this rate on samples are averaged, Hz.
+const AVERAGED_HZ: f64 = 150.0;
+/// Gaps are longer than this many periods.
+const GAP_PERIODS: f64 = 2.5;
+
+/// Samples of a vector, in rising order of time.
+pub type Series<const N: usize> = [(f64, [f64; N])];
+
+/// Returns the rate by the median period, Hz.
+pub fn rate<const N: usize>(series: &Series<N>) -> Option<f64> {
+    let mut periods: Vec<f64> = series.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    if periods.is_empty() {
+        return None;
+    }
+    let middle = periods.len() / 2;
+    let (_, median, _) = periods.select_nth_unstable_by(middle, f64::total_cmp);
+    Some(1.0 / *median)
+}
+
+/// How a rate comes to the grid.
+pub fn method(hz: f64) -> &'static str {
+    if hz >= AVERAGED_HZ {
+        "mean of the samples within 5 ms of each row"
+    } else if (hz - 100.0).abs() < 0.5 {
+        "interpolated to the row's time, no filter"
+    } else {
+        "linear interpolation, no filter"
+    }
+}
+
+/// Returns the values at `start + k * 10 ms` for k below `rows`; `None` in gaps.
+pub fn resample<const N: usize>(series: &Series<N>, start: f64, rows: usize) -> Vec<Option<[f64; N]>> {
+    let hz = rate(series).unwrap_or(100.0);
+    let longest = GAP_PERIODS / hz;
+    let mut at = 0;
+    let row = |k: usize| {
+        let time = start + DT * k as f64;
+        if hz >= AVERAGED_HZ {
+            while at < series.len() && series[at].0 < time - 0.5 * DT {
+                at += 1;
+            }
+            let near = series[at..].iter().take_while(|sample| sample.0 < time + 0.5 * DT);
+            let (count, sum) = near.fold((0, [0.0; N]), |(count, sum), (_, value)| {
+                (count + 1, std::array::from_fn(|axis| sum[axis] + value[axis]))
+            });
+            return (count > 0).then(|| sum.map(|sum| sum / f64::from(count)));
+        }
+        while at + 1 < series.len() && series[at + 1].0 <= time {
+            at += 1;
+        }
+        between(series.get(at)?, series.get(at + 1), time, longest)
+    };
+    (0..rows).map(row).collect()
+}
+
+/// The value at a time from the sample before and the one behind.
+fn between<const N: usize>(
+    before: &(f64, [f64; N]),
+    behind: Option<&(f64, [f64; N])>,
+    time: f64,
+    longest: f64,
+) -> Option<[f64; N]> {
+    // A stamp at a row's own time needs no neighbour.
+    if (time - before.0).abs() < 1e-6 {
+        return Some(before.1);
+    }
+    let behind = behind?;
+    let period = behind.0 - before.0;
+    let share = (time - before.0) / period;
+    let known = period <= longest && (0.0..=1.0).contains(&share);
+    known.then(|| std::array::from_fn(|axis| before.1[axis] + share * (behind.1[axis] - before.1[axis])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sine(hz: f64, seconds: f64) -> Vec<(f64, [f64; 1])> {
+        let samples = (hz * seconds) as usize;
+        (0..samples).map(|k| (k as f64 / hz, [(2.0 * k as f64 / hz).sin()])).collect()
+    }
+
+    #[test]
+    fn any_rate_keeps_the_signal_and_its_integral() {
+        for hz in [25.0, 50.0, 100.0, 120.0, 400.0, 1_000.0] {
+            let series = sine(hz, 12.0);
+            let rows = resample(&series, 1.0, 1_000);
+            let (mut worst, mut integral) = (0.0f64, 0.0);
+            for (k, row) in rows.iter().enumerate() {
+                let truth = (2.0 * (1.0 + 0.01 * k as f64)).sin();
+                let [value] = row.expect("no gap");
+                worst = worst.max((value - truth).abs());
+                integral += 0.01 * (value - truth);
+            }
+            assert!(worst < 3e-3 && integral.abs() < 2e-3, "{hz} Hz: {worst} {integral}");
+        }
+    }
+
+    #[test]
+    fn rows_in_a_gap_are_left_out() {
+        for hz in [50.0, 400.0] {
+            let mut series = sine(hz, 4.0);
+            series.retain(|(time, _)| !(1.5..1.8).contains(time));
+            let rows = resample(&series, 0.0, 390);
+            let missing = rows.iter().filter(|row| row.is_none()).count();
+            assert!((28..=32).contains(&missing), "{hz} Hz: {missing}");
+            assert!(rows[..149].iter().chain(&rows[182..]).all(Option::is_some), "{hz} Hz");
+        }
+    }
+}

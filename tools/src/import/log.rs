@@ -1,0 +1,178 @@
+//! A log as all formats give it: named channels of timed measurements in SI units, and a count of what was dropped.
+
+use std::collections::BTreeMap;
+
+/// Samples of one channel that are kept: over a day at 100 Hz, 2.7 hours at 1 kHz.
+pub const MAX_SAMPLES: usize = 10_000_000;
+/// Channels of one file; a log has tens, a bus with a large DBC file some thousands of signals.
+const MAX_CHANNELS: usize = 4_096;
+/// Reasons that are counted apart.
+const MAX_REASONS: usize = 64;
+
+/// One measurement. Axes are x forward, y left, z up, as far as the log says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Value {
+    /// Specific force, m/s^2, and angular rate, rad/s.
+    Imu([f64; 3], [f64; 3]),
+    /// Speed forward, m/s, and yaw rate to the left, rad/s.
+    Odometry(f64, f64),
+    /// A GNSS fix.
+    Position(Fix),
+    /// A plain number in the unit of the channel's name.
+    Number(f64),
+}
+
+/// A GNSS fix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fix {
+    /// Latitude and longitude, degrees.
+    pub degrees: [f64; 2],
+    /// Standard deviation of the position in each horizontal direction, m, where the receiver gives one.
+    pub sigma_m: Option<f64>,
+    /// Speed over ground, m/s, course in rad clockwise from north, and its standard deviation in rad.
+    pub velocity: Option<[f64; 3]>,
+}
+
+/// The kinds of channels, which say what a channel is fit for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Gyro and accelerometer.
+    Imu,
+    /// Speed and yaw rate of a vehicle's odometry.
+    Odometry,
+    /// GNSS.
+    Position,
+    /// A plain number.
+    Number,
+}
+
+impl Kind {
+    /// Returns the word for messages.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Imu => "IMU",
+            Self::Odometry => "odometry",
+            Self::Position => "position",
+            Self::Number => "signal",
+        }
+    }
+}
+
+impl Value {
+    /// Returns the kind of channel that it belongs to.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Imu(..) => Kind::Imu,
+            Self::Odometry(..) => Kind::Odometry,
+            Self::Position(_) => Kind::Position,
+            Self::Number(_) => Kind::Number,
+        }
+    }
+
+    fn is_finite(&self) -> bool {
+        match self {
+            Self::Imu(force, rate) => force.iter().chain(rate).all(|value| value.is_finite()),
+            Self::Odometry(speed, rate) => speed.is_finite() && rate.is_finite(),
+            Self::Position(fix) => {
+                let [latitude, longitude] = fix.degrees;
+                latitude.abs() <= 90.0 && longitude.abs() <= 360.0
+            }
+            Self::Number(value) => value.is_finite(),
+        }
+    }
+}
+
+/// A measurement and its time on the clock of its file, s.
+pub type Sample = (f64, Value);
+
+/// The channels of one file.
+#[derive(Debug, Clone, Default)]
+pub struct Log {
+    /// The samples of each channel, by name, in rising order of time.
+    pub channels: BTreeMap<String, Vec<Sample>>,
+    /// The units of plain numbers, by channel, where the log has them.
+    pub units: BTreeMap<String, String>,
+    /// Records that were not used, by reason.
+    pub dropped: BTreeMap<String, u64>,
+    /// Records that have no use for a drive, by type.
+    pub passed_over: BTreeMap<String, u64>,
+}
+
+impl Log {
+    /// Adds a measurement. One that is not finite, or not later than the one before, is dropped.
+    pub fn add(&mut self, channel: &str, seconds: f64, value: Value) {
+        if !seconds.is_finite() || !value.is_finite() {
+            return self.drop(format!("{channel}: not a finite number"));
+        }
+        if !self.channels.contains_key(channel) {
+            if self.channels.len() >= MAX_CHANNELS {
+                return self.drop("more channels than can be kept".to_owned());
+            }
+            self.channels.insert(channel.to_owned(), Vec::new());
+        }
+        let Some(samples) = self.channels.get_mut(channel) else { return };
+        if samples.first().is_some_and(|(_, first)| first.kind() != value.kind()) {
+            return self.drop(format!("{channel}: another type under the same name"));
+        }
+        if samples.len() >= MAX_SAMPLES {
+            return self.drop(format!("{channel}: beyond the {MAX_SAMPLES} samples that are kept"));
+        }
+        if samples.last().is_some_and(|(last, _)| seconds <= *last) {
+            return self.drop(format!("{channel}: time does not rise"));
+        }
+        samples.push((seconds, value));
+    }
+
+    /// Counts a record that could not be used.
+    pub fn drop(&mut self, reason: String) {
+        count(&mut self.dropped, reason);
+    }
+
+    /// Counts a record of a type that no drive needs.
+    pub fn pass_over(&mut self, kind: &str) {
+        count(&mut self.passed_over, kind.to_owned());
+    }
+
+    /// Returns the names, kinds and rates of the channels, Hz.
+    pub fn catalogue(&self) -> impl Iterator<Item = (&str, Kind, usize, f64)> {
+        self.channels.iter().filter_map(|(name, samples)| {
+            let (first, last) = (samples.first()?, samples.last()?);
+            let rate = (samples.len() - 1) as f64 / (last.0 - first.0).max(1e-9);
+            Some((name.as_str(), first.1.kind(), samples.len(), rate))
+        })
+    }
+}
+
+fn count(counts: &mut BTreeMap<String, u64>, reason: String) {
+    if counts.len() < MAX_REASONS || counts.contains_key(&reason) {
+        *counts.entry(reason).or_default() += 1;
+    } else {
+        *counts.entry("other".to_owned()).or_default() += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_jumps_back_costs_the_samples_until_it_has_caught_up() {
+        let mut log = Log::default();
+        for seconds in [0.0, 0.1, 0.05, 0.1, 0.2, f64::NAN] {
+            log.add("a", seconds, Value::Number(1.0));
+        }
+        log.add("a", 0.3, Value::Number(f64::INFINITY));
+        log.add("a", 0.3, Value::Odometry(1.0, 0.0));
+        let times: Vec<f64> = log.channels["a"].iter().map(|(seconds, _)| *seconds).collect();
+        assert_eq!(times, [0.0, 0.1, 0.2]);
+        let dropped: Vec<_> = log.dropped.iter().map(|(reason, count)| (reason.as_str(), *count)).collect();
+        let expected = [
+            ("a: another type under the same name", 1),
+            ("a: not a finite number", 2),
+            ("a: time does not rise", 2),
+        ];
+        assert_eq!(dropped, expected);
+    }
+}

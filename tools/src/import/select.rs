@@ -1,0 +1,198 @@
+//! The channels of several files that a drive is made of: by type where one fits, by name where several do.
+
+use super::error::ImportError;
+use super::log::{Fix, Kind, Log, Sample, Value};
+use super::vehicle::Vehicle;
+
+/// The name with which a role is left out.
+const NONE: &str = "none";
+
+/// A file that was read.
+#[derive(Debug)]
+pub struct File {
+    pub path: String,
+    pub log: Log,
+}
+
+/// A channel that was chosen.
+#[derive(Debug, Clone, Copy)]
+pub struct Channel<'a> {
+    pub file: usize,
+    pub name: &'a str,
+    pub samples: &'a [Sample],
+    pub unit: &'a str,
+}
+
+/// The channels of a drive.
+#[derive(Debug)]
+pub struct Selection<'a> {
+    pub imu: Channel<'a>,
+    pub odometry: Option<Channel<'a>>,
+    pub position: Option<Channel<'a>>,
+    pub reference_rate: Option<Channel<'a>>,
+    /// Front right, rear right, front left, rear left: the order of a drive's columns.
+    pub wheels: [Option<Channel<'a>>; 4],
+}
+
+/// Chooses the channels.
+///
+/// # Errors
+/// [`ImportError`], which lists the candidates.
+pub fn select<'a>(files: &'a [File], vehicle: &'a Vehicle) -> Result<Selection<'a>, ImportError> {
+    let signals = &vehicle.signals;
+    let imu = by_type(files, Kind::Imu, "imu", signals.imu.as_deref())?;
+    let imu = imu.ok_or_else(|| ImportError::Missing { role: "IMU", candidates: listed(files, |_| true) })?;
+    let wheels = &vehicle.wheels;
+    let names = [&wheels.front_right, &wheels.rear_right, &wheels.front_left, &wheels.rear_left];
+    let [fr, rr, fl, rl] = names.map(|name| {
+        name.as_deref().map(|name| by_name(files, "a wheel", name, Some(Kind::Number))).transpose()
+    });
+    let wheels = [fr?, rr?, fl?, rl?];
+    let odometry = match (&signals.odometry, wheels.iter().flatten().next()) {
+        // Wheels by name need no odometry.
+        (None, Some(_)) => None,
+        (name, _) => by_type(files, Kind::Odometry, "odometry", name.as_deref())?,
+    };
+    Ok(Selection {
+        imu,
+        odometry,
+        position: by_type(files, Kind::Position, "position", signals.position.as_deref())?,
+        reference_rate: signals
+            .reference_rate
+            .as_deref()
+            .map(|name| by_name(files, "the reference rate", name, None))
+            .transpose()?,
+        wheels,
+    })
+}
+
+fn by_type<'a>(
+    files: &'a [File],
+    kind: Kind,
+    role: &'static str,
+    name: Option<&str>,
+) -> Result<Option<Channel<'a>>, ImportError> {
+    match name {
+        Some(NONE) => return Ok(None),
+        Some(name) => return by_name(files, role, name, Some(kind)).map(Some),
+        None => {}
+    }
+    let mut found = channels(files).filter(|channel| channel.kind() == kind);
+    let (first, second) = (found.next(), found.next());
+    if second.is_some() {
+        return Err(ImportError::Ambiguous { role, candidates: listed(files, |other| other == kind) });
+    }
+    Ok(first)
+}
+
+fn by_name<'a>(
+    files: &'a [File],
+    role: &'static str,
+    name: &str,
+    kind: Option<Kind>,
+) -> Result<Channel<'a>, ImportError> {
+    let fits = |other: Kind| kind.is_none_or(|kind| kind == other);
+    let named = |channel: &Channel<'_>| {
+        let file = std::path::Path::new(&files[channel.file].path).file_name();
+        let file = file.and_then(|file| file.to_str()).unwrap_or_default();
+        channel.name == name
+            || name.strip_prefix(file).and_then(|name| name.strip_prefix(':')) == Some(channel.name)
+    };
+    let mut found = channels(files).filter(|channel| fits(channel.kind()) && named(channel));
+    match (found.next(), found.next()) {
+        (Some(channel), None) => Ok(channel),
+        (Some(_), Some(_)) => Err(ImportError::Unknown {
+            role,
+            name: format!("{name}, which several files have: FILE:{name}"),
+            candidates: Vec::new(),
+        }),
+        _ => Err(ImportError::Unknown { role, name: name.to_owned(), candidates: listed(files, fits) }),
+    }
+}
+
+fn channels(files: &[File]) -> impl Iterator<Item = Channel<'_>> {
+    files.iter().enumerate().flat_map(|(file, File { log, .. })| {
+        log.channels.iter().filter(|(_, samples)| !samples.is_empty()).map(move |(name, samples)| Channel {
+            file,
+            name,
+            samples,
+            unit: log.units.get(name).map_or("", String::as_str),
+        })
+    })
+}
+
+/// At most twenty channels for a message.
+fn listed(files: &[File], fits: impl Fn(Kind) -> bool) -> Vec<String> {
+    let catalogue = files.iter().flat_map(|file| file.log.catalogue());
+    let fitting = catalogue.filter(|(_, kind, ..)| fits(*kind));
+    fitting.map(|(name, kind, _, hz)| format!("{name} ({}, {hz:.1} Hz)", kind.name())).take(20).collect()
+}
+
+impl Channel<'_> {
+    fn kind(&self) -> Kind {
+        self.samples.first().map_or(Kind::Number, |(_, value)| value.kind())
+    }
+
+    /// Specific force and angular rate of each sample.
+    pub fn imu(&self) -> Vec<(f64, [f64; 6])> {
+        let six = |(seconds, value): &Sample| match value {
+            Value::Imu([fx, fy, fz], [wx, wy, wz]) => Some((*seconds, [*fx, *fy, *fz, *wx, *wy, *wz])),
+            _ => None,
+        };
+        self.samples.iter().filter_map(six).collect()
+    }
+
+    /// Speed and yaw rate of each sample of an odometry.
+    pub fn odometry(&self) -> Vec<(f64, [f64; 2])> {
+        let two = |(seconds, value): &Sample| match value {
+            Value::Odometry(speed, rate) => Some((*seconds, [*speed, *rate])),
+            _ => None,
+        };
+        self.samples.iter().filter_map(two).collect()
+    }
+
+    /// The fixes.
+    pub fn fixes(&self) -> Vec<(f64, Fix)> {
+        let fix = |(seconds, value): &Sample| match value {
+            Value::Position(fix) => Some((*seconds, *fix)),
+            _ => None,
+        };
+        self.samples.iter().filter_map(fix).collect()
+    }
+
+    /// A wheel's speed, m/s or, in rad/s, its rate: by the unit, m/s without one.
+    pub fn speed(&self) -> (Vec<(f64, [f64; 1])>, bool) {
+        let unit = self.unit.trim().to_lowercase();
+        let scale = match unit.as_str() {
+            "km/h" | "kph" | "kmh" | "km/hr" => 1.0 / 3.6,
+            "mph" | "mi/h" => 0.447_04,
+            "rpm" | "1/min" => std::f64::consts::TAU / 60.0,
+            _ => 1.0,
+        };
+        // A robot's joints come without a unit, in rad/s.
+        let is_rate = matches!(unit.as_str(), "rad/s" | "rpm" | "1/min")
+            || unit.is_empty() && self.name.starts_with('/');
+        (self.numbers(scale), is_rate)
+    }
+
+    /// The yaw rate of any channel that has one, rad/s to the left.
+    pub fn yaw_rate(&self) -> Vec<(f64, [f64; 1])> {
+        let unit = self.unit.trim().to_lowercase();
+        let degrees = matches!(unit.as_str(), "deg/s" | "°/s" | "degree/s" | "deg/sec" | "grad/s");
+        let scale = if degrees { std::f64::consts::PI / 180.0 } else { 1.0 };
+        let rate = |(seconds, value): &Sample| match value {
+            Value::Imu(_, [_, _, rate]) | Value::Odometry(_, rate) => Some((*seconds, [*rate])),
+            Value::Number(rate) => Some((*seconds, [scale * rate])),
+            Value::Position(_) => None,
+        };
+        self.samples.iter().filter_map(rate).collect()
+    }
+
+    fn numbers(&self, scale: f64) -> Vec<(f64, [f64; 1])> {
+        let number = |(seconds, value): &Sample| match value {
+            Value::Number(number) => Some((*seconds, [scale * number])),
+            _ => None,
+        };
+        self.samples.iter().filter_map(number).collect()
+    }
+}

@@ -1,0 +1,294 @@
+//! Text tables: a CSV of any names by a column map, and the export of Xsens MT Manager.
+//!
+//! Each column that is a number becomes a channel. Three of a gyro and three of an accelerometer become an IMU, latitude
+//! and longitude a position.
+
+use super::format::{Input, read_line};
+use super::log::{Fix, Log, Value};
+use super::vehicle::{Column, Columns};
+
+/// Longest line.
+const MAX_LINE: u64 = 1 << 16;
+/// Lines of remarks before the header.
+const MAX_REMARKS: usize = 1_000;
+
+/// Our names, and those that common exports use for the same in the same unit.
+const KNOWN: [(&str, &[&str]); 13] = [
+    ("t_s", &["time_s", "timestamp_s", "timestamps"]),
+    ("acc_x", &["Acc_X"]),
+    ("acc_y", &["Acc_Y"]),
+    ("acc_z", &["Acc_Z"]),
+    ("gyr_x", &["Gyr_X"]),
+    ("gyr_y", &["Gyr_Y"]),
+    ("gyr_z", &["Gyr_Z"]),
+    ("latitude", &["Latitude", "gnss_lat"]),
+    ("longitude", &["Longitude", "gnss_lon"]),
+    ("position_sigma", &[]),
+    ("course", &[]),
+    ("ground_speed", &[]),
+    ("course_sigma", &[]),
+];
+/// Units and what one of them is in SI.
+const UNITS: [(&str, f64); 13] = [
+    ("s", 1.0),
+    ("ms", 1e-3),
+    ("us", 1e-6),
+    ("ns", 1e-9),
+    ("m/s^2", 1.0),
+    ("g", 9.806_65),
+    ("rad/s", 1.0),
+    ("deg/s", std::f64::consts::PI / 180.0),
+    ("rad", 1.0),
+    ("deg", std::f64::consts::PI / 180.0),
+    ("m", 1.0),
+    ("m/s", 1.0),
+    ("km/h", 1.0 / 3.6),
+];
+
+/// The error of a table.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error("no format that is known: neither a bag, MCAP, ULog or CAN log, nor a table with a header")]
+    Unknown,
+    #[error("no column {0}; the columns are {1}")]
+    Column(String, String),
+    #[error("unknown unit {0:?}; known are {units}", units = UNITS.map(|(unit, _)| unit).join(", "))]
+    Unit(String),
+    #[error(
+        "no column of time; name it in the vehicle file: [columns] t_s = {{ name = \"...\", unit = \"ms\" }}; the columns are {0}"
+    )]
+    Time(String),
+    #[error("an Xsens DOT export, whose units differ by version; name its columns in the vehicle file")]
+    Dot,
+}
+
+/// Where the time comes from.
+enum Time {
+    Column(usize, f64),
+    /// A counter of 32 bits, in units of 0.1 ms.
+    Fine(usize),
+    /// A counter of 16 bits, and the samples of a second.
+    Packets(usize, f64),
+}
+
+/// Reads a table.
+///
+/// # Errors
+/// [`TableError`]. A row that is cut short or has text where a number should be is counted.
+pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(), TableError> {
+    let (header, rate) = header(input)?;
+    let split = |line: &str| -> Vec<String> {
+        let fields = match header.1 {
+            Some(separator) => {
+                line.split(separator).map(|field| field.trim().trim_matches('"')).collect::<Vec<_>>()
+            }
+            None => line.split_whitespace().collect(),
+        };
+        fields.into_iter().map(str::to_owned).collect()
+    };
+    let names = split(&header.0);
+    let find = |ours: &str| find(&names, columns, ours);
+    let time = match find("t_s")? {
+        Some((at, unit)) => Time::Column(at, unit),
+        None => {
+            let at = |name: &str| names.iter().position(|column| column == name);
+            match (at("SampleTimeFine"), at("PacketCounter"), rate) {
+                (Some(at), ..) => Time::Fine(at),
+                (None, Some(at), Some(rate)) => Time::Packets(at, rate),
+                _ => return Err(TableError::Time(names.join(", "))),
+            }
+        }
+    };
+    let mut places = Vec::new();
+    for (ours, _) in &KNOWN[1..] {
+        places.push(find(ours)?);
+    }
+    let [ax, ay, az, gx, gy, gz, lat, lon, sigma, course, speed, course_sigma] = places[..] else {
+        return Err(TableError::Unknown);
+    };
+    let others = named_others(&names, columns, &places)?;
+    let mut clock = Clock { last: None, turns: 0.0 };
+    while let Some(line) = read_line(input, MAX_LINE)? {
+        if line.is_empty() {
+            continue;
+        }
+        let row = split(&line);
+        let number = |place: Option<(usize, f64)>| {
+            let (at, unit) = place?;
+            Some(unit * row.get(at)?.parse::<f64>().ok()?)
+        };
+        if row.len() != names.len() {
+            log.drop("rows of another length than the header".to_owned());
+            continue;
+        }
+        let Some(seconds) = clock.seconds(&time, number) else {
+            log.drop("rows without a time".to_owned());
+            continue;
+        };
+        let vector = |places: [Option<(usize, f64)>; 3]| {
+            let [x, y, z] = places.map(number);
+            Some([x?, y?, z?])
+        };
+        if let (Some(_), Some(_)) = (gx, ax) {
+            match (vector([ax, ay, az]), vector([gx, gy, gz])) {
+                (Some(force), Some(rate)) => log.add("imu", seconds, Value::Imu(force, rate)),
+                _ => log.drop("rows whose IMU is not six numbers".to_owned()),
+            }
+        }
+        if let (Some(latitude), Some(longitude)) = (number(lat), number(lon)) {
+            let velocity = || Some([number(speed)?, number(course)?, number(course_sigma)?]);
+            let fix = Fix { degrees: [latitude, longitude], sigma_m: number(sigma), velocity: velocity() };
+            log.add("position", seconds, Value::Position(fix));
+        }
+        for (at, unit) in &others {
+            if let Some(value) = number(Some((*at, *unit))) {
+                log.add(&names[*at], seconds, Value::Number(value));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The header with its separator, and the rate that a remark before it names, Hz.
+type Header = ((String, Option<char>), Option<f64>);
+
+fn header(input: &mut Input<'_>) -> Result<Header, TableError> {
+    let mut rate = None;
+    for _ in 0..MAX_REMARKS {
+        let Some(line) = read_line(input, MAX_LINE)? else { return Err(TableError::Unknown) };
+        let line = line.trim_start_matches('\u{feff}').trim();
+        if line.contains("DeviceTag") {
+            return Err(TableError::Dot);
+        }
+        if line.starts_with("//") || line.starts_with('#') || line.is_empty() {
+            if let Some((_, text)) = line.split_once("Update Rate:") {
+                rate = text.trim().trim_end_matches("Hz").parse().ok().filter(|rate| *rate > 0.0);
+            }
+            continue;
+        }
+        let separator = [',', ';', '\t'].into_iter().find(|separator| line.contains(*separator));
+        let text = line.chars().all(|c| !c.is_control() || c == '\t');
+        let words = line.split([',', ';', '\t', ' ']).filter(|word| !word.is_empty()).count();
+        return if text && words >= 2 {
+            Ok(((line.to_owned(), separator), rate))
+        } else {
+            Err(TableError::Unknown)
+        };
+    }
+    Err(TableError::Unknown)
+}
+
+/// Where a column of ours is, and its unit in SI.
+fn find(names: &[String], columns: &Columns, ours: &str) -> Result<Option<(usize, f64)>, TableError> {
+    if let Some(Column { name, unit }) = columns.get(ours) {
+        let at = names.iter().position(|column| column == name);
+        let at = at.ok_or_else(|| TableError::Column(name.clone(), names.join(", ")))?;
+        return Ok(Some((at, scale(unit.as_deref(), matches!(ours, "latitude" | "longitude"))?)));
+    }
+    let others = KNOWN.iter().find(|(name, _)| *name == ours).map_or(&[][..], |(_, others)| others);
+    Ok(names.iter().position(|name| name == ours || others.contains(&name.as_str())).map(|at| (at, 1.0)))
+}
+
+/// Latitude and longitude stay degrees.
+fn scale(unit: Option<&str>, keeps_degrees: bool) -> Result<f64, TableError> {
+    match unit {
+        None => Ok(1.0),
+        Some("deg") if keeps_degrees => Ok(1.0),
+        Some(unit) => UNITS
+            .iter()
+            .find(|(known, _)| *known == unit)
+            .map(|(_, scale)| *scale)
+            .ok_or_else(|| TableError::Unit(unit.to_owned())),
+    }
+}
+
+/// Columns beyond the known ones: each is a signal of its own name, in the unit that the map gives.
+fn named_others(
+    names: &[String],
+    columns: &Columns,
+    known: &[Option<(usize, f64)>],
+) -> Result<Vec<(usize, f64)>, TableError> {
+    let mut others = Vec::new();
+    for (at, name) in names.iter().enumerate() {
+        if known.iter().flatten().all(|(used, _)| *used != at) {
+            let unit = columns
+                .values()
+                .find(|column| column.name == *name)
+                .and_then(|column| column.unit.as_deref());
+            others.push((at, scale(unit, false)?));
+        }
+    }
+    Ok(others)
+}
+
+/// A clock whose counter wraps.
+struct Clock {
+    last: Option<f64>,
+    turns: f64,
+}
+
+impl Clock {
+    fn seconds(&mut self, time: &Time, number: impl Fn(Option<(usize, f64)>) -> Option<f64>) -> Option<f64> {
+        let (at, period, second) = match *time {
+            Time::Column(at, unit) => return number(Some((at, unit))),
+            Time::Fine(at) => (at, 4_294_967_296.0, 1e4),
+            Time::Packets(at, rate) => (at, 65_536.0, rate),
+        };
+        let count = number(Some((at, 1.0)))?;
+        // A wrap goes back by more than half of all that can be counted; less is a clock that jumped.
+        if self.last.is_some_and(|last| count < last - 0.5 * period) {
+            self.turns += period;
+        }
+        self.last = Some(count);
+        Some((self.turns + count) / second)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str, columns: &str) -> Result<Log, TableError> {
+        let columns: Columns = toml::from_str(columns).unwrap();
+        let mut log = Log::default();
+        read(&mut text.as_bytes(), &columns, &mut log)?;
+        Ok(log)
+    }
+
+    #[test]
+    fn a_packet_counter_that_wraps_goes_on() {
+        let text = "// Start Time: Unknown\n// Update Rate: 100.0Hz\n// Filter Profile: none\n\
+                    PacketCounter\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\n\
+                    65535\t1\t2\t3\t0.1\t0.2\t0.3\n00000\t1\t2\t3\t0.1\t0.2\t0.3\n";
+        let log = table(text, "").unwrap();
+        let imu = &log.channels["imu"];
+        assert_eq!(imu[1], (655.36, Value::Imu([1.0, 2.0, 3.0], [0.1, 0.2, 0.3])));
+        assert!((imu[1].0 - imu[0].0 - 0.01).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_column_map_has_names_and_units() {
+        let map = "t_s={name='Zeit',unit='ms'}\nacc_x={name='a',unit='g'}\nacc_y={name='b',unit='g'}\n\
+                   acc_z={name='c',unit='g'}\ngyr_x={name='d',unit='deg/s'}\ngyr_y={name='e',unit='deg/s'}\n\
+                   gyr_z={name='f',unit='deg/s'}\nspeed={name='v',unit='km/h'}";
+        let log = table("v;Zeit;a;b;c;d;e;f\n36;1000;0;0;1;0;0;180\n36;x;0;0;1;0;0;180\n1;2\n", map).unwrap();
+        let (seconds, Value::Imu(force, rate)) = log.channels["imu"][0] else { panic!() };
+        assert_eq!((seconds, force[2]), (1.0, 9.806_65));
+        assert!((rate[2] - std::f64::consts::PI).abs() < 1e-12);
+        assert_eq!(log.channels["v"], [(1.0, Value::Number(10.0))]);
+        assert_eq!(log.dropped.values().collect::<Vec<_>>(), [&1, &1]);
+    }
+
+    #[test]
+    fn what_cannot_be_a_table_is_refused_with_the_reason() {
+        let message = |text: &str, map: &str| table(text, map).unwrap_err().to_string();
+        assert!(message("\u{1}\u{2}\u{3} x", "").starts_with("no format that is known"));
+        assert!(message("a,b\n1,2\n", "").starts_with("no column of time"));
+        assert_eq!(message("a,b\n", "t_s={name='c'}"), "no column c; the columns are a, b");
+        assert!(
+            message("a,b\n", "t_s={name='a',unit='fortnights'}").starts_with("unknown unit \"fortnights\"")
+        );
+    }
+}

@@ -1,0 +1,181 @@
+//! The vehicle file: a small TOML file beside a drive that says how the sensor is mounted, what the wheels are, and which
+//! channels of the logs are which.
+//!
+//! ```toml
+//! [mounting]          # of the IMU: degrees about its axes, roll first
+//! yaw_deg = 90.0
+//! [wheels]
+//! radius_m = 0.31     # rolling radius
+//! track_m = 1.52      # distance between left and right
+//! front_left = "WHEELS.FL"
+//! [signals]           # where several channels fit
+//! imu = "/imu/data"
+//! position = "/gps/fix"
+//! [columns]           # of a text table: our name = theirs, with a unit
+//! t_s = { name = "timestamp", unit = "ms" }
+//! ```
+
+use super::error::ImportError;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What is known of a vehicle and of the names in its logs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Vehicle {
+    /// How the IMU is mounted.
+    pub mounting: Mounting,
+    /// The wheels and the signals of their speeds.
+    pub wheels: Wheels,
+    /// The channels to take where several fit.
+    pub signals: Signals,
+    /// The bus.
+    pub bus: BusFiles,
+    /// The columns of a text table.
+    pub columns: Columns,
+}
+
+/// Names of a table's columns, by ours.
+pub type Columns = BTreeMap<String, Column>;
+
+/// A column.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// Its name in the file.
+    pub name: String,
+    /// Its unit; without one it is SI.
+    pub unit: Option<String>,
+}
+
+/// Angles from the sensor's axes to the vehicle's, degrees, as in the board's configuration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mounting {
+    /// About x.
+    pub roll_deg: f64,
+    /// About y.
+    pub pitch_deg: f64,
+    /// About z.
+    pub yaw_deg: f64,
+}
+
+/// The wheels.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Wheels {
+    /// Rolling radius, m; speeds become rates of wheels by it.
+    pub radius_m: Option<f64>,
+    /// Distance between the left and the right wheels, m.
+    pub track_m: Option<f64>,
+    /// Channel of a wheel's speed.
+    pub front_left: Option<String>,
+    /// Channel of a wheel's speed.
+    pub front_right: Option<String>,
+    /// Channel of a wheel's speed.
+    pub rear_left: Option<String>,
+    /// Channel of a wheel's speed.
+    pub rear_right: Option<String>,
+}
+
+/// The channels to take where several fit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Signals {
+    /// Gyro and accelerometer.
+    pub imu: Option<String>,
+    /// Odometry, whose speed stands in for the wheels.
+    pub odometry: Option<String>,
+    /// GNSS.
+    pub position: Option<String>,
+    /// A yaw rate to be the reference, `ref_gyr_z`: a better gyro's, never that of the IMU itself.
+    pub reference_rate: Option<String>,
+}
+
+/// Files that say what is on the bus.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BusFiles {
+    /// The DBC file, from the vehicle file's folder if relative.
+    pub dbc: Option<PathBuf>,
+}
+
+impl Vehicle {
+    /// Reads a vehicle file.
+    ///
+    /// # Errors
+    /// [`ImportError`].
+    pub fn read(path: &Path) -> Result<Self, ImportError> {
+        let name = path.display().to_string();
+        let text =
+            std::fs::read_to_string(path).map_err(|source| ImportError::Io { path: name.clone(), source })?;
+        let mut vehicle = Self::parse(&name, &text)?;
+        if let (Some(dbc), Some(folder)) = (&mut vehicle.bus.dbc, path.parent()) {
+            *dbc = folder.join(&*dbc);
+        }
+        Ok(vehicle)
+    }
+
+    /// Parses the text of a vehicle file.
+    ///
+    /// # Errors
+    /// [`ImportError`], for an unknown key too.
+    pub fn parse(path: &str, text: &str) -> Result<Self, ImportError> {
+        let error = |reason: String| ImportError::Vehicle { path: path.to_owned(), reason };
+        let vehicle: Self = toml::from_str(text).map_err(|cause| {
+            let cause = cause.to_string();
+            error(cause.lines().filter(|line| !line.trim().is_empty()).collect::<Vec<_>>().join(" "))
+        })?;
+        for (name, length) in [("radius_m", vehicle.wheels.radius_m), ("track_m", vehicle.wheels.track_m)] {
+            if length.is_some_and(|length| !(0.01..10.0).contains(&length)) {
+                return Err(error(format!("wheels.{name} should be 0.01 to 10 m")));
+            }
+        }
+        let Mounting { roll_deg, pitch_deg, yaw_deg } = vehicle.mounting;
+        if [roll_deg, pitch_deg, yaw_deg].iter().any(|angle| angle.is_nan() || angle.abs() > 360.0) {
+            return Err(error("mounting should be angles of at most 360 degrees".to_owned()));
+        }
+        Ok(vehicle)
+    }
+}
+
+impl Mounting {
+    /// Turns a vector from the sensor's axes to the vehicle's.
+    #[must_use]
+    pub fn turn(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let [(sr, cr), (sp, cp), (sy, cy)] =
+            [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle.to_radians().sin_cos());
+        let (y, z) = (cr * y - sr * z, sr * y + cr * z);
+        let (x, z) = (cp * x + sp * z, cp * z - sp * x);
+        [cy * x - sy * y, sy * x + cy * y, z]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyronet::mounting::Rotation;
+    use gyronet::units::AngularRate;
+
+    #[test]
+    fn angles_mean_what_they_mean_on_the_board() {
+        let (roll, pitch, yaw) = (12.0f32, -34.0f32, 56.0f32);
+        let board = Rotation::from_mounting(roll, pitch, yaw).unwrap();
+        let mounting = Mounting { roll_deg: roll.into(), pitch_deg: pitch.into(), yaw_deg: yaw.into() };
+        for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+            let rate = axis.map(|w: f64| AngularRate::from_rad_per_sec(w as f32).unwrap());
+            for (here, there) in mounting.turn(axis).iter().zip(board.rate(rate)) {
+                assert!((here - there.rad_per_sec()).abs() < 1e-5, "{here} {there:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_misspelt_key_is_refused_by_name() {
+        let error = Vehicle::parse("car.toml", "[wheels]\nradius = 0.3\n").unwrap_err().to_string();
+        assert!(error.starts_with("car.toml: ") && error.contains("unknown field `radius`"), "{error}");
+        let error = Vehicle::parse("car.toml", "[wheels]\nradius_m = 30\n").unwrap_err().to_string();
+        assert_eq!(error, "car.toml: wheels.radius_m should be 0.01 to 10 m");
+    }
+}

@@ -1,0 +1,55 @@
+//! Chunks of an MCAP that are packed with zstd, by `ruzstd`: the MCAP crate's own way is a C library.
+
+use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
+use mcap::{McapError, McapResult};
+use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
+use std::io::Read;
+
+/// A whole block with its header and that of a frame.
+const ENOUGH: usize = (128 << 10) + 3 + 18 + 4;
+
+/// Unpacks one block at a time, so that no input can ask for more memory than its frame's window.
+pub struct Zstd {
+    decoder: FrameDecoder,
+    in_frame: bool,
+}
+
+impl Zstd {
+    pub fn new() -> Self {
+        Self { decoder: FrameDecoder::new(), in_frame: false }
+    }
+}
+
+impl Decompressor for Zstd {
+    fn next_read_size(&self) -> usize {
+        ENOUGH
+    }
+
+    fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
+        let damaged = |error: &dyn std::fmt::Display| McapError::DecompressionError(error.to_string());
+        let mut rest = src;
+        if self.in_frame && self.decoder.is_finished() && self.decoder.can_collect() == 0 {
+            self.in_frame = false;
+        }
+        if self.decoder.can_collect() == 0 && !src.is_empty() {
+            if !self.in_frame {
+                self.decoder.reset(&mut rest).map_err(|error| damaged(&error))?;
+                self.in_frame = true;
+            }
+            self.decoder
+                .decode_blocks(&mut rest, BlockDecodingStrategy::UptoBlocks(1))
+                .map_err(|error| damaged(&error))?;
+        }
+        let wrote = if self.in_frame { self.decoder.read(dst).map_err(|error| damaged(&error))? } else { 0 };
+        Ok(DecompressResult { consumed: src.len() - rest.len(), wrote })
+    }
+
+    fn reset(&mut self) -> McapResult<()> {
+        *self = Self::new();
+        Ok(())
+    }
+
+    fn name(&self) -> &'static str {
+        "zstd"
+    }
+}
