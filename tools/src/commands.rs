@@ -7,6 +7,7 @@ pub mod campaign;
 pub mod completions;
 pub mod demo;
 pub mod device;
+pub mod doctor;
 pub mod evaluate;
 pub mod import;
 pub mod monitor;

@@ -8,6 +8,7 @@
 //! drive <- parts <- campaign -> plot, client, simulate
 //! drive <- calibrate
 //! drive <- import -> wheels
+//! drive <- doctor -> import, plot
 //! drive <- evaluate <- paper -> plot, simulate
 //! target -> simulate      network      client      wheels
 //! demo -> everything above
@@ -18,6 +19,7 @@ pub mod calibrate;
 pub mod campaign;
 pub mod client;
 pub mod demo;
+pub mod doctor;
 pub mod drive;
 pub mod evaluate;
 pub mod import;

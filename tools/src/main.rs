@@ -19,6 +19,7 @@ use std::process::ExitCode;
 ///   ref_yaw                course by GNSS, rad to the left; optional, empty where unknown
 ///   wheel1_rate ..4        wheels, rad/s; optional (front right, rear right, front left, rear left)
 ///
+/// `gyronet import` makes one of other tools' logs, `gyronet doctor` says what it is worth.
 /// The vehicle must stand still for the first 3 s.
 #[derive(Debug, Parser)]
 #[command(
@@ -46,6 +47,7 @@ enum Command {
     Campaign(commands::campaign::Args),
     Simulate(commands::simulate::Args),
     Import(commands::import::Args),
+    Doctor(commands::doctor::Args),
     Tables(commands::tables::Args),
     Quantize(commands::quantize::Args),
     Monitor(commands::monitor::Args),
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         Command::Campaign(args) => commands::campaign::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
         Command::Import(args) => commands::import::run(args, common),
+        Command::Doctor(args) => commands::doctor::run(args, common),
         Command::Tables(args) => commands::tables::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
         Command::Bus(args) => commands::bus::run(args, common),

@@ -3,6 +3,7 @@
 mod accuracy;
 mod campaign;
 mod course_reference;
+mod doctor;
 mod fir_choice;
 mod fog_default;
 mod fog_kingston;

@@ -1,0 +1,67 @@
+//! `gyronet doctor` on real recordings: figures that are known from elsewhere.
+
+use gyronet_host_tests::recordings::{folder, trial};
+use gyronet_host_tests::require::{Need, wants};
+use gyronet_tools::doctor::{Doctor, Mounting, Noise, Verdict, page};
+use gyronet_tools::import::drive::{Request, import, write_csv};
+use gyronet_tools::import::vehicle::Vehicle;
+
+#[test]
+fn a_car_is_fit_and_its_reference_has_the_known_floor() {
+    let test = "a_car_is_fit_and_its_reference_has_the_known_floor";
+    for number in [8, 11] {
+        let Some(path) = trial(test, number) else { return };
+        let doctor = Doctor::examine(&path).unwrap();
+        let bad: Vec<_> = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad).collect();
+        assert!(bad.is_empty(), "{bad:?}");
+        let reference = &doctor.finding("reference").unwrap().text;
+        let floor = reference.split("scatters by ").nth(1).unwrap().split(' ').next().unwrap();
+        // 0.00009 to 0.00011 rad in 1 s as a mean absolute difference of neighbours, less as a deviation.
+        assert!((5e-5..1.2e-4).contains(&floor.parse::<f64>().unwrap()), "{reference}");
+        let page = page(&doctor, &[("training", "none".to_owned())]);
+        for outside in ["http://", "https://", "src=", "href=", "@import", "url("] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+    }
+}
+
+/// An ADIS16405 at rest, upside down, in g and deg/s: a table with other names and units.
+#[test]
+fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
+    let test = "a_sensor_at_rest_has_the_noise_of_its_data_sheet";
+    let path = folder().join("static_adis16405/static_100hz.csv");
+    let found = if path.is_file() { Ok(path) } else { Err("no static_adis16405".to_owned()) };
+    let Some(path) = wants(test, Need::Data, found) else { return };
+    let column =
+        |ours: &str, theirs: &str, unit: &str| format!("{ours} = {{ name = '{theirs}', unit = '{unit}' }}\n");
+    let mut text = "[mounting]\nroll_deg = 180.0\n[columns]\n".to_owned();
+    for axis in ["x", "y", "z"] {
+        text += &column(&format!("acc_{axis}"), &format!("acc_{axis}_g"), "g");
+        text += &column(&format!("gyr_{axis}"), &format!("gyr_{axis}_dps"), "deg/s");
+    }
+    let vehicle = Vehicle::parse("vehicle.toml", &text).unwrap();
+    let imported = import(&Request { files: vec![path], vehicle, ..Request::default() }).unwrap();
+    assert_eq!((imported.rows.len(), imported.dropped), (180_000, 0), "{:?}", imported.report);
+    let csv = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("static_doctor.csv");
+    write_csv(&imported.rows, std::fs::File::create(&csv).unwrap()).unwrap();
+
+    let doctor = Doctor::examine(&csv).unwrap();
+    let Some(Mounting { roll_deg, pitch_deg, force }) = doctor.mounting else { panic!() };
+    assert!(
+        roll_deg.abs() < 2.0 && pitch_deg.abs() < 2.0 && (9.6..10.2).contains(&force),
+        "{:?}",
+        doctor.mounting
+    );
+    // The data sheet has 2.0 deg/sqrt(h) and 0.007 deg/s at 25 degrees, typical.
+    let noise = doctor.noise.unwrap().map(|noise| noise.unwrap());
+    for Noise { random_walk, instability } in noise {
+        assert!((1.0..3.0).contains(&(random_walk.to_degrees() * 60.0)), "{random_walk}");
+        // An axis whose curve still falls at its end, after half an hour, has none.
+        if let Some((rate, tau)) = instability {
+            assert!((0.003..0.015).contains(&rate.to_degrees()) && tau > 10.0, "{rate} {tau}");
+        }
+    }
+    // A few lines of NumPy on the same column give 0.0082 deg/s at the bottom of z, at 42 s.
+    let (rate, tau) = noise[2].instability.unwrap();
+    assert!((rate.to_degrees() * 0.664 - 0.0082).abs() < 2e-4 && (30.0..55.0).contains(&tau), "{rate} {tau}");
+}

@@ -1,0 +1,136 @@
+//! `gyronet doctor`: one page on a recording before anyone trusts it.
+
+use super::{Common, WriteError, print_json, progress, weights};
+use gyronet::model::GyroNet;
+use gyronet::pipeline::PipelineConfig;
+use gyronet_tools::calibrate::{Drive, Share, calibrate};
+use gyronet_tools::doctor::{Doctor, Finding, Verdict, page};
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::Replay;
+use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::evaluate::methods::Method;
+use gyronet_tools::evaluate::report::DriveErrors;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Examine a recording before anyone trusts it.
+///
+/// The page has rate and gaps, saturation, noise with its random walk and bias instability, standstills, mounting by
+/// gravity, wheels against gyro, the reference, what can and cannot be judged on the recording, and what a calibration
+/// and a training could gain. The exit status is 1 where something is to be cured first.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet doctor drive.csv
+  gyronet doctor drive.csv --out report.html --json")]
+pub struct Args {
+    /// Recorded drive.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Page [default: the recording's name, .doctor.html].
+    #[arg(long, value_name = "FILE.html")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    networks: weights::Files,
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let doctor = Doctor::examine(&args.file)?;
+    let gains = gains(args, common);
+    let path = args.out.clone().unwrap_or_else(|| args.file.with_extension("doctor.html"));
+    std::fs::write(&path, page(&doctor, &gains)).map_err(WriteError::to(&path))?;
+    let mut out = std::io::stdout().lock();
+    if common.json {
+        let findings = doctor.findings.iter().map(|Finding { what, verdict, text }| {
+            serde_json::json!({ "subject": what, "verdict": word(*verdict), "text": text })
+        });
+        let gains = gains.iter().map(|(by, text)| serde_json::json!({ "by": by, "text": text }));
+        let json = serde_json::json!({
+            "name": doctor.name,
+            "seconds": doctor.seconds,
+            "findings": findings.collect::<Vec<_>>(),
+            "gains": gains.collect::<Vec<_>>(),
+            "page": path,
+        });
+        print_json(&mut out, &json)?;
+    } else {
+        writeln!(out, "{}: {:.0} s", doctor.name, doctor.seconds)?;
+        for Finding { what, verdict, text } in &doctor.findings {
+            writeln!(out, "{:<4} {what}: {text}", word(*verdict))?;
+        }
+        for (by, text) in &gains {
+            writeln!(out, "gain {by}: {text}")?;
+        }
+        writeln!(out, "page: {}", path.display())?;
+    }
+    let bad = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad).count();
+    if bad > 0 { Err(format!("{bad} findings are to be cured first").into()) } else { Ok(()) }
+}
+
+fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Good => "good",
+        Verdict::Note => "note",
+        Verdict::Bad => "cure",
+    }
+}
+
+/// What calibration and training would gain on this drive, or why that cannot be said.
+fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
+    let refused = |error: &dyn std::fmt::Display| format!("Cannot be said: {error}.");
+    let recording = match Recording::read(&args.file) {
+        Ok(recording) => recording,
+        Err(error) => return vec![("any", refused(&error))],
+    };
+    let calibration = unit(args, &recording, common).unwrap_or_else(|error| refused(&error));
+    let training = trained(args, &recording, common).unwrap_or_else(|error| refused(&error));
+    vec![("gyronet calibrate", calibration), ("training", training)]
+}
+
+/// The shares of a unit by this drive alone.
+fn unit(args: &Args, recording: &Recording, common: Common) -> Result<String, Box<dyn std::error::Error>> {
+    let weights = args.networks.weights()?;
+    let blob = weights.blob()?;
+    let bar = progress::bar(common, recording.rows.len(), recording.name());
+    let (config, wheels) = (PipelineConfig::DEFAULT, WheelFrames::new(recording));
+    let replay = Replay::run(recording, &config, wheels, &mut GyroNet::new(blob), || bar.inc(1));
+    bar.finish_and_clear();
+    let unit = calibrate(&[Drive { recording, replay: replay? }], blob.crc)?;
+    let shares = unit.shares.iter().map(|Share { name, value, sigma, refused }| match refused {
+        None if value.abs() > 2.0 * sigma => {
+            format!("{name} {value:+.4} (sigma {sigma:.4}): worth taking off")
+        }
+        None => format!("{name} {value:+.4} (sigma {sigma:.4}): not told from zero"),
+        Some(reason) => format!("{name}: {reason}"),
+    });
+    Ok(format!("{}.", shares.collect::<Vec<_>>().join("; ")))
+}
+
+/// The error of what is sent over that of static initialisation, by the weights in use: the figure that a training would
+/// have to lower.
+fn trained(args: &Args, recording: &Recording, common: Common) -> Result<String, Box<dyn std::error::Error>> {
+    let rates = args.networks.rates(recording, common)?;
+    let errors = DriveErrors::new(recording, &rates)?;
+    let figure = |method: Method| {
+        let error = errors.methods[method].error;
+        error.mean_1s_rad.or(error.rms_rad)
+    };
+    let named = if errors.methods[Method::STATIC].error.mean_1s_rad.is_some() { "in 1 s" } else { "RMS" };
+    let (Some(still), Some(updated), Some(sent), Some(linear)) = (
+        figure(Method::STATIC),
+        figure(Method::STATIC_ZERO_RATE),
+        figure(Method::NAVIGATION),
+        figure(Method::LINEAR),
+    ) else {
+        return Err("the drive has no figure that compares methods".into());
+    };
+    Ok(format!(
+        "Error {named}: static initialisation {still:.6} rad; over it {:.2} with zero-rate updates, {:.2} sent with these \
+         weights, {:.2} by the bundled linear window. Training would have to lower these; by how much is not known from one \
+         drive: it takes several of one vehicle, one of them kept apart.",
+        updated / still,
+        sent / still,
+        linear / still
+    ))
+}

@@ -1,0 +1,116 @@
+//! The Allan deviation of a gyro at rest, with the two figures that are read off it.
+//!
+//! Averages of neighbouring spans of length tau differ by white noise, which falls as one over the root of tau (its value at
+//! 1 s is the angular random walk), and by what does not average out: the flat bottom of the curve, over 0.664, is the
+//! bias instability (IEEE Std 952).
+
+use crate::drive::DT;
+
+/// Fewest pairs of spans behind a point: below, it scatters by more than a third.
+const LEAST_PAIRS: usize = 9;
+/// Points of the curve in each decade.
+const PER_DECADE: f64 = 8.0;
+/// The flat part of 1/f noise lies at this times its coefficient.
+const FLAT: f64 = 0.664;
+
+/// The deviation over averaging times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Allan {
+    /// Averaging time, s, and deviation, rad/s.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// The figures of a gyro.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Angular random walk, rad/s/sqrt(Hz) or, the same number, rad/sqrt(s).
+    pub random_walk: f64,
+    /// Bias instability, rad/s, with the averaging time of the bottom, s; `None` where the standstill is too short to
+    /// have one.
+    pub instability: Option<(f64, f64)>,
+}
+
+impl Allan {
+    /// Returns the deviation of rates at 100 Hz by overlapping spans; fewer than 18 rates have no point.
+    #[must_use]
+    pub fn new(rates: &[f64]) -> Self {
+        let mut angle = Vec::with_capacity(rates.len() + 1);
+        let mut sum = 0.0;
+        angle.push(sum);
+        for rate in rates {
+            sum += rate * DT;
+            angle.push(sum);
+        }
+        let mut points = Vec::new();
+        let mut last = 0;
+        for k in 0.. {
+            let span = 10f64.powf(f64::from(k) / PER_DECADE).round() as usize;
+            if rates.len() < (LEAST_PAIRS + 1) * span {
+                break;
+            }
+            if span == last {
+                continue;
+            }
+            last = span;
+            let tau = span as f64 * DT;
+            let squares = angle.windows(2 * span + 1).map(|w| (w[2 * span] - 2.0 * w[span] + w[0]).powi(2));
+            let count = squares.len() as f64;
+            points.push((tau, (squares.sum::<f64>() / (2.0 * tau * tau * count)).sqrt()));
+        }
+        Self { points }
+    }
+
+    /// Reads the figures off the curve; `None` for less than a second.
+    #[must_use]
+    pub fn noise(&self) -> Option<Noise> {
+        // Below 0.1 s a sensor's own filter hides the noise.
+        let white = self.points.iter().filter(|(tau, _)| (0.1..=1.0).contains(tau));
+        let mut walks: Vec<f64> = white.map(|(tau, deviation)| deviation * tau.sqrt()).collect();
+        walks.sort_unstable_by(f64::total_cmp);
+        let random_walk = *walks.get(walks.len() / 2)?;
+        let bottom = self.points.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        // A curve that still falls at its end has not reached the bottom.
+        let instability = bottom.filter(|(at, _)| at + 2 < self.points.len());
+        let instability = instability.map(|(_, (tau, deviation))| (deviation / FLAT, *tau));
+        Some(Noise { random_walk, instability })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+
+    #[test]
+    fn white_noise_has_its_random_walk_and_no_bottom() {
+        let (mut random, normal) = (ChaCha8Rng::seed_from_u64(3), Normal::new(0.5, 0.01).unwrap());
+        let rates: Vec<f64> = (0..60_000).map(|_| normal.sample(&mut random)).collect();
+        let noise = Allan::new(&rates).noise().unwrap();
+        // 0.01 rad/s at 100 Hz.
+        assert!((noise.random_walk / 1e-3 - 1.0).abs() < 0.05, "{noise:?}");
+        assert_eq!(noise.instability, None);
+    }
+
+    #[test]
+    fn a_bias_that_walks_has_a_bottom() {
+        let (mut random, normal) = (ChaCha8Rng::seed_from_u64(3), Normal::new(0.0, 1.0).unwrap());
+        let mut bias = 0.0;
+        let rates: Vec<f64> = (0..100_000)
+            .map(|_| {
+                bias += 1e-5 * normal.sample(&mut random);
+                bias + 0.01 * normal.sample(&mut random)
+            })
+            .collect();
+        let (instability, tau) = Allan::new(&rates).noise().unwrap().instability.unwrap();
+        // White noise and a walk of rate K = 1e-4 cross at tau = sqrt(3) N / K.
+        assert!((3.0..60.0).contains(&tau) && (1e-4..1e-3).contains(&instability), "{tau} s {instability}");
+    }
+
+    #[test]
+    fn too_little_has_no_figures() {
+        assert_eq!(Allan::new(&[0.0; 12]).points.len(), 1);
+        assert_eq!(Allan::new(&[]).noise(), None);
+    }
+}

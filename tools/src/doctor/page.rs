@@ -1,0 +1,118 @@
+//! The page of an examined recording.
+
+use super::allan::{Allan, Noise};
+use super::findings::{Doctor, Verdict};
+use crate::plot::page::chart::{Chart, Curve};
+use crate::plot::page::{document, escaped, table};
+
+/// Classes of the axes' curves in the style sheet.
+const AXES: [(&str, &str); 3] = [("static", "x"), ("prompt", "y"), ("default", "z")];
+
+/// Returns the page; `gains` are what calibration and training would gain, or why that is not known.
+#[must_use]
+pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
+    let mut body = format!(
+        "<h1>{}</h1>\n<p class=\"lead\">A recording of {:.0} s examined before anyone trusts it. Written by <code>gyronet \
+         doctor</code> {}.</p>\n",
+        escaped(&doctor.name),
+        doctor.seconds,
+        env!("CARGO_PKG_VERSION")
+    );
+    let count = |verdict| doctor.findings.iter().filter(|finding| finding.verdict == verdict).count();
+    let bad = count(Verdict::Bad);
+    let (class, word) = if bad == 0 { ("agrees", "none".to_owned()) } else { ("differs", bad.to_string()) };
+    let still: f64 = doctor.standstills.iter().map(|(from, to)| to - from).sum();
+    body += &format!(
+        "<dl class=\"facts\">\n<div><dt>to be cured</dt><dd><span class=\"{class}\">{word}</span></dd></div>\n\
+         <div><dt>length</dt><dd>{:.0} <small>s</small></dd></div>\n<div><dt>at rest</dt><dd>{still:.0} <small>s</small></dd></div>\n{}</dl>\n",
+        doctor.seconds,
+        noise_facts(doctor)
+    );
+    body += "<h2>Findings</h2>\n<div class=\"scroll\"><table class=\"costs\">\n<thead><tr><th>subject</th><th></th><th>finding</th></tr></thead>\n<tbody>\n";
+    for finding in &doctor.findings {
+        let (class, word) = match finding.verdict {
+            Verdict::Good => ("agrees", "good"),
+            Verdict::Note => ("note", "note"),
+            Verdict::Bad => ("differs", "cure"),
+        };
+        body += &format!(
+            "<tr><td>{}</td><td><span class=\"{class}\">{word}</span></td><td>{}</td></tr>\n",
+            finding.what,
+            escaped(&finding.text)
+        );
+    }
+    body += "</tbody></table></div>\n<h2>Yaw rate</h2>\n";
+    body += &rates(doctor);
+    body += "<h2>Noise at rest</h2>\n";
+    body += &match (&doctor.allan, &doctor.noise) {
+        (Some(allan), Some(noise)) => allan_section(allan, noise),
+        _ => "<p>No standstill is long enough.</p>\n".to_owned(),
+    };
+    body += "<h2>What could be gained</h2>\n";
+    body += &table(
+        "costs",
+        "",
+        &["by", "", "gain"],
+        gains.iter().map(|(by, text)| vec![(*by).to_owned(), String::new(), text.clone()]),
+    );
+    document(&format!("gyronet doctor: {}", doctor.name), &body)
+}
+
+fn noise_facts(doctor: &Doctor) -> String {
+    let Some([_, _, Some(Noise { random_walk, instability })]) = &doctor.noise else { return String::new() };
+    let mut html = format!(
+        "<div><dt>angular random walk, z</dt><dd>{:.3} <small>deg/&radic;h</small></dd></div>\n",
+        random_walk.to_degrees() * 60.0
+    );
+    if let Some((rate, _)) = instability {
+        let rate = rate.to_degrees() * 3_600.0;
+        html += &format!("<div><dt>bias instability, z</dt><dd>{rate:.1} <small>deg/h</small></dd></div>\n");
+    }
+    html
+}
+
+fn rates(doctor: &Doctor) -> String {
+    let [gyro, reference] = &doctor.curves;
+    let degrees =
+        |points: &[(f64, f64)]| points.iter().map(|(t, rate)| (*t, rate.to_degrees())).collect::<Vec<_>>();
+    let curve = |class, label: &str, points| Curve {
+        class,
+        label: label.into(),
+        note: String::new(),
+        points,
+        in_scale: true,
+    };
+    let mut curves = Vec::new();
+    if !reference.is_empty() {
+        curves.push(curve("reference", "reference", degrees(reference)));
+    }
+    curves.push(curve("static", "gyro", degrees(gyro)));
+    Chart { title: "Yaw rate", axes: "deg/s over s", same_scale: false, curves }.html()
+}
+
+fn allan_section(allan: &[Allan; 3], noise: &[Option<Noise>; 3]) -> String {
+    let curves = AXES.iter().zip(allan).map(|((class, label), allan)| {
+        let log = |(tau, deviation): &(f64, f64)| (tau.log10(), (deviation.to_degrees() * 3_600.0).log10());
+        let points = allan.points.iter().filter(|(_, deviation)| *deviation > 0.0).map(log).collect();
+        Curve { class, label: (*label).to_owned(), note: String::new(), points, in_scale: true }
+    });
+    let chart = Chart {
+        title: "Allan deviation",
+        axes: "deg/h over s, powers of ten",
+        same_scale: true,
+        curves: curves.collect(),
+    };
+    let rows = AXES.iter().zip(noise).map(|((_, axis), noise)| {
+        let figure = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
+        let walk = noise.map(|noise| format!("{:.3}", noise.random_walk.to_degrees() * 60.0));
+        let bottom = noise.and_then(|noise| noise.instability);
+        vec![
+            (*axis).to_owned(),
+            figure(walk),
+            figure(bottom.map(|(rate, _)| format!("{:.2}", rate.to_degrees() * 3_600.0))),
+            figure(bottom.map(|(_, tau)| format!("{tau:.0}"))),
+        ]
+    });
+    let header = ["axis", "random walk, deg/√h", "bias instability, deg/h", "at, s"];
+    chart.html() + &table("methods", "", &header, rows)
+}

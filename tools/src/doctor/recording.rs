@@ -1,0 +1,87 @@
+//! The rows of a recording as they are, with those that cannot be read counted.
+
+use crate::drive::error::DataError;
+use crate::drive::recording::{Reader, Row, WHEELS};
+use std::fs::File;
+use std::path::Path;
+
+/// Rows kept: a day at 100 Hz.
+const MOST: usize = 8_640_000;
+
+/// What a recording holds.
+#[derive(Debug)]
+pub struct Rows {
+    pub name: String,
+    /// Seconds since the first row.
+    pub seconds: Vec<f64>,
+    /// Specific force, m/s^2, and angular rate, rad/s.
+    pub force: Vec<[f64; 3]>,
+    pub rate: Vec<[f64; 3]>,
+    /// True yaw rate, rad/s, and course, rad.
+    pub reference: Vec<Option<f64>>,
+    pub course: Vec<Option<f64>>,
+    /// rad/s.
+    pub wheels: [Vec<Option<f64>>; WHEELS],
+    /// Rows that could not be read, and why the first one could not.
+    pub bad: u64,
+    pub first_bad: Option<String>,
+}
+
+impl Rows {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`DataError`]: no file, or no drive's header.
+    pub fn read(path: &Path) -> Result<Self, DataError> {
+        let shown = path.display().to_string();
+        let file = File::open(path).map_err(|source| DataError::open(&shown, source))?;
+        let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or(&shown).to_owned();
+        Self::parse(&name, Reader::new(&shown, std::io::BufReader::new(file))?)
+    }
+
+    pub fn parse(
+        name: &str,
+        reader: impl Iterator<Item = Result<Row, DataError>>,
+    ) -> Result<Self, DataError> {
+        let mut rows = Self {
+            name: name.to_owned(),
+            seconds: Vec::new(),
+            force: Vec::new(),
+            rate: Vec::new(),
+            reference: Vec::new(),
+            course: Vec::new(),
+            wheels: Default::default(),
+            bad: 0,
+            first_bad: None,
+        };
+        let mut start = None;
+        for row in reader {
+            let row = match row {
+                Ok(row) if rows.seconds.len() < MOST => row,
+                Ok(_) => {
+                    rows.bad += 1;
+                    continue;
+                }
+                Err(error) => {
+                    rows.bad += 1;
+                    rows.first_bad.get_or_insert_with(|| error.to_string());
+                    continue;
+                }
+            };
+            let time = 1e-6 * row.sample.time.0 as f64;
+            rows.seconds.push(time - *start.get_or_insert(time));
+            rows.force.push(row.sample.specific_force.map(|force| force.metre_per_sec2()));
+            rows.rate.push(row.sample.angular_rate.map(|rate| rate.rad_per_sec()));
+            rows.reference.push(row.reference);
+            rows.course.push(row.course);
+            for (wheel, rate) in rows.wheels.iter_mut().zip(row.wheels) {
+                wheel.push(rate);
+            }
+        }
+        Ok(rows)
+    }
+
+    pub fn len(&self) -> usize {
+        self.seconds.len()
+    }
+}
