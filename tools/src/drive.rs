@@ -1,9 +1,10 @@
 //! These modules handle recorded drives: [`recording`] reads one, [`wheel_frames`] turns its wheels into the frames of
-//! a vehicle's bus, [`replay`] runs it through the coprocessor as the board would, and [`candump`] writes what was
-//! sent.
+//! a vehicle's bus, [`replay`] runs it through the coprocessor as the board would, [`candump`] writes what was
+//! sent, and [`foxglove`] writes everything for Foxglove.
 
 pub mod candump;
 pub mod error;
+pub mod foxglove;
 pub mod recording;
 pub mod replay;
 pub mod wheel_frames;

@@ -14,6 +14,7 @@ mod gyronet_golden;
 mod import_logs;
 mod mounting;
 mod recordings_bad_input;
+mod replay_mcap;
 mod replay_via;
 mod standstill;
 mod still_stretches;

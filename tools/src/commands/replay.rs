@@ -4,6 +4,7 @@ use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
+use gyronet_tools::drive::foxglove;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 ///
 /// The drive runs through the pipeline that is flashed. The log has the format of `candump -L` and the recording's
 /// own time stamps; can-utils' canplayer and python-can can play it. It goes to standard output unless --out names a
-/// file. The summary goes to standard error, or with --json to standard output if the log does not.
+/// file or --mcap is given. The summary goes to standard error, or with --json to standard output if the log does not.
 ///
 /// With --via the samples go through the bytes of a part first: they are encoded as the part would send them and
 /// read back by the parser that the board runs. The summary then has the difference of the corrected yaw from that
@@ -28,6 +29,7 @@ use std::path::{Path, PathBuf};
 Examples:
   gyronet replay drive.csv --out can.log
   gyronet replay drive.csv | head
+  gyronet replay drive.csv --out can.log --mcap drive.mcap    # and drive.layout.json, for Foxglove
   gyronet replay drive.csv --via icm42688 --out can.log")]
 pub struct Args {
     /// Recorded drive.
@@ -36,6 +38,9 @@ pub struct Args {
     /// Write the log to this file [default: standard output].
     #[arg(long, value_name = "FILE.log")]
     out: Option<PathBuf>,
+    /// Write inputs, rates, heading, states and frames for Foxglove to this file, and a layout beside it.
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "via")]
+    mcap: Option<PathBuf>,
     /// Weight file [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
@@ -55,9 +60,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     bar.finish_and_clear();
     let (drive, detour) = replayed?;
     let frames = match &args.out {
+        None if args.mcap.is_some() => drive.frames().count() as u64,
         Some(path) => write_file(&drive, path)?,
         None => drive.log(BufWriter::new(io::stdout().lock()))?,
     };
+    if let Some(path) = &args.mcap {
+        write_mcap(&recording, &drive, path)?;
+    }
     if common.json {
         let summary = serde_json::json!({
             "recording": recording.path,
@@ -67,7 +76,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             "events": events(&drive).into_iter().collect::<BTreeMap<_, _>>(),
             "via": detour.as_ref().map(Detour::json),
         });
-        match args.out {
+        match args.out.as_ref().or(args.mcap.as_ref()) {
             Some(_) => print_json(&mut io::stdout().lock(), &summary)?,
             None => print_json(&mut io::stderr().lock(), &summary)?,
         }
@@ -171,6 +180,15 @@ pub(super) fn write_file(drive: &Replay, path: &Path) -> Result<u64, WriteError>
     let error = WriteError::to(path);
     let file = File::create(path).map_err(&error)?;
     drive.log(BufWriter::new(file)).map_err(&error)
+}
+
+/// Writes a drive and its layout for Foxglove.
+fn write_mcap(recording: &Recording, drive: &Replay, path: &Path) -> super::Result {
+    let error = WriteError::to(path);
+    let file = BufWriter::new(File::create(path).map_err(&error)?);
+    foxglove::write(recording, drive, file).map_err(|cause| error(io::Error::other(cause)))?;
+    let layout = path.with_extension("layout.json");
+    Ok(std::fs::write(&layout, foxglove::LAYOUT).map_err(WriteError::to(&layout))?)
 }
 
 /// Returns all counters that are not zero.

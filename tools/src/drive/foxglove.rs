@@ -1,0 +1,228 @@
+//! A replayed drive as an MCAP that Foxglove opens: inputs, rates, heading, states and CAN frames, as JSON with schemas.
+//!
+//! The heading is a `foxglove.PoseInFrame` and a change of state a `foxglove.Log`, which have panels of their own; the
+//! others are plots of numbers. Times are those of the recording.
+
+use super::recording::Recording;
+use super::replay::{Replay, Step};
+use embedded_can::{Frame, Id};
+use gyronet::coprocessor::TimedFrame;
+use gyronet::health::Status;
+use gyronet::units::Micros;
+use mcap::records::MessageHeader;
+use mcap::{Compression, McapError, WriteOptions, Writer};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::{Seek, Write};
+
+/// Levels of a `foxglove.Log`.
+const INFO: u8 = 2;
+const WARNING: u8 = 3;
+
+/// The layout for Foxglove, to be imported beside the file.
+pub const LAYOUT: &str = include_str!("foxglove/layout.json");
+
+/// The channels of a file.
+struct Channels {
+    input: u16,
+    rate: u16,
+    pose: u16,
+    status: u16,
+    can: u16,
+}
+
+/// Writes a drive, and returns the number of messages.
+///
+/// # Errors
+/// The writer's.
+pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> Result<u64, McapError> {
+    let options = WriteOptions::new()
+        .compression(Some(Compression::Lz4))
+        .library(concat!("gyronet ", env!("CARGO_PKG_VERSION")));
+    let mut file = File { writer: Writer::with_options(out, options)?, messages: 0 };
+    let channels = channels(&mut file.writer)?;
+    let mut last: Option<Status> = None;
+    for step in &replay.steps {
+        let time = step.time;
+        let row = &recording.rows[step.row];
+        let sample = &row.sample;
+        file.message(
+            channels.input,
+            time,
+            &json!({
+                "timestamp": stamp(time),
+                "angular_rate": vector(sample.angular_rate.map(|rate| rate.rad_per_sec())),
+                "specific_force": vector(sample.specific_force.map(|force| force.metre_per_sec2())),
+                "wheels": row.wheels,
+            }),
+        )?;
+        file.message(channels.rate, time, &rate(step, row.reference))?;
+        let half = 0.5 * step.vehicle.navigation.yaw.rad();
+        file.message(
+            channels.pose,
+            time,
+            &json!({
+                "timestamp": stamp(time),
+                "frame_id": "start",
+                "pose": {
+                    "position": vector([0.0; 3]),
+                    "orientation": { "x": 0.0, "y": 0.0, "z": half.sin(), "w": half.cos() },
+                },
+            }),
+        )?;
+        let status = step.vehicle.prompt.status;
+        if last != Some(status) {
+            let level = if status == Status::Ready { INFO } else { WARNING };
+            file.message(
+                channels.status,
+                time,
+                &json!({
+                    "timestamp": stamp(time),
+                    "level": level,
+                    "message": format!("{status:?}").to_lowercase(),
+                    "name": "gyronet",
+                    "file": "",
+                    "line": 0,
+                }),
+            )?;
+        }
+        last = Some(status);
+        for TimedFrame { frame, time } in &step.frames {
+            let (id, extended) = match frame.id() {
+                Id::Standard(id) => (u32::from(id.as_raw()), false),
+                Id::Extended(id) => (id.as_raw(), true),
+            };
+            let data = frame.data().iter().fold(String::new(), |mut text, byte| {
+                // Writing to a string does not fail.
+                let _ = write!(text, "{byte:02X}");
+                text
+            });
+            file.message(
+                channels.can,
+                *time,
+                &json!({
+                    "timestamp": stamp(*time),
+                    "id": id,
+                    "extended": extended,
+                    "data": data,
+                }),
+            )?;
+        }
+    }
+    file.writer.finish()?;
+    Ok(file.messages)
+}
+
+/// What is sent with a sample, and what is known of it.
+fn rate(step: &Step, reference: Option<f64>) -> Value {
+    let (prompt, navigation) = (&step.vehicle.prompt, step.navigation);
+    json!({
+        "timestamp": stamp(step.time),
+        "prompt": prompt.rate.rad_per_sec(),
+        "navigation": navigation.map(|navigation| navigation.rate.rad_per_sec()),
+        "settled": step.settled.rad_per_sec(),
+        "correction": prompt.correction.rad_per_sec(),
+        "sigma": prompt.sigma.map(|sigma| sigma.rad_per_sec()),
+        "yaw": step.vehicle.navigation.yaw.rad(),
+        "status": format!("{:?}", prompt.status).to_lowercase(),
+        "standstill": format!("{:?}", step.standstill).to_lowercase(),
+        "reference": reference,
+    })
+}
+
+struct File<W: Write + Seek> {
+    writer: Writer<W>,
+    messages: u64,
+}
+
+impl<W: Write + Seek> File<W> {
+    fn message(&mut self, channel_id: u16, time: Micros, value: &Value) -> Result<(), McapError> {
+        let nanos = 1_000 * time.0;
+        let header = MessageHeader { channel_id, sequence: 0, log_time: nanos, publish_time: nanos };
+        self.messages += 1;
+        self.writer.write_to_known_channel(&header, value.to_string().as_bytes())
+    }
+}
+
+fn channels(writer: &mut Writer<impl Write + Seek>) -> Result<Channels, McapError> {
+    let mut channel = |topic: &str, schema: &str, properties: Value| {
+        let text = json!({ "title": schema, "type": "object", "properties": properties }).to_string();
+        let schema = writer.add_schema(schema, "jsonschema", text.as_bytes())?;
+        writer.add_channel(schema, topic, "json", &BTreeMap::new())
+    };
+    let (number, text, whole) =
+        (json!({ "type": "number" }), json!({ "type": "string" }), json!({ "type": "integer" }));
+    let perhaps = json!({ "type": ["number", "null"] });
+    let object = |properties: Value| json!({ "type": "object", "properties": properties });
+    let stamp = object(json!({ "sec": whole, "nsec": whole }));
+    let vector = object(json!({ "x": number, "y": number, "z": number }));
+    let turn = object(json!({ "x": number, "y": number, "z": number, "w": number }));
+    Ok(Channels {
+        input: channel(
+            "/input",
+            "gyronet.Input",
+            json!({
+                "timestamp": stamp,
+                "angular_rate": vector,
+                "specific_force": vector,
+                "wheels": { "type": "array", "items": perhaps },
+            }),
+        )?,
+        rate: channel(
+            "/rate",
+            "gyronet.Rate",
+            json!({
+                "timestamp": stamp,
+                "prompt": number,
+                "navigation": perhaps,
+                "settled": number,
+                "correction": number,
+                "sigma": perhaps,
+                "yaw": number,
+                "status": text,
+                "standstill": text,
+                "reference": perhaps,
+            }),
+        )?,
+        pose: channel(
+            "/pose",
+            "foxglove.PoseInFrame",
+            json!({
+                "timestamp": stamp,
+                "frame_id": text,
+                "pose": object(json!({ "position": vector, "orientation": turn })),
+            }),
+        )?,
+        status: channel(
+            "/status",
+            "foxglove.Log",
+            json!({
+                "timestamp": stamp,
+                "level": whole,
+                "message": text,
+                "name": text,
+                "file": text,
+                "line": whole,
+            }),
+        )?,
+        can: channel(
+            "/can",
+            "gyronet.CanFrame",
+            json!({
+                "timestamp": stamp,
+                "id": whole,
+                "extended": { "type": "boolean" },
+                "data": text,
+            }),
+        )?,
+    })
+}
+
+fn stamp(Micros(us): Micros) -> Value {
+    json!({ "sec": us / 1_000_000, "nsec": us % 1_000_000 * 1_000 })
+}
+
+fn vector([x, y, z]: [f64; 3]) -> Value {
+    json!({ "x": x, "y": y, "z": z })
+}
