@@ -221,7 +221,7 @@ fn a_bag_and_a_bus_log_on_another_clock_become_one_drive() {
         assert!((by + 86_404.321).abs() < 0.02, "{moved}");
         let mut worst = 0.0f64;
         for (row, truth) in rows.iter().zip(&truth.rows) {
-            assert!((row.imu[5] - f64::from(truth.sample.angular_rate[2].rad_per_sec())).abs() < 1e-5);
+            assert!((row.imu[5] - truth.sample.angular_rate[2].rad_per_sec()).abs() < 1e-5);
             if (6.5..89.9).contains(&row.seconds) {
                 for (ours, theirs) in row.wheels.iter().zip(truth.wheels) {
                     worst = worst.max((ours.expect("a wheel") - theirs.unwrap().abs()).abs());

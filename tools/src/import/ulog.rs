@@ -9,10 +9,13 @@ use px4_ulog::stream_parser::model::{DataMessage, FlattenedFieldType as Type};
 
 /// First bytes of a file.
 pub const MAGIC: &[u8] = b"ULog\x01\x12\x35";
-/// Bytes that are read at a time.
-const BLOCK: usize = 1 << 16;
+/// Bytes of the file's head.
+const HEAD: usize = 16;
 
 /// Reads a file from its magic on. Damage ends it: what was read until then is kept, and the reason counted.
+///
+/// The crate gets the records that a drive needs, one at a time and of the least length that their kind has: it panics on
+/// shorter ones.
 ///
 /// # Errors
 /// The reader's.
@@ -20,16 +23,37 @@ pub fn read(input: &mut Input<'_>, log: &mut Log) -> std::io::Result<()> {
     let mut take = |message: &DataMessage<'_>| add(message, log);
     let mut parser = LogParser::default();
     parser.set_data_message_callback(&mut take);
+    let mut short = 0;
+    let mut record = read_up_to(input, HEAD)?;
     let damage = loop {
-        let block = read_up_to(input, BLOCK)?;
-        if block.is_empty() {
-            break parser.has_leftover().then(|| "the file ends within a record".to_owned());
-        }
-        if let Err(error) = parser.consume_bytes(&block) {
+        if let Err(error) = parser.consume_bytes(&record) {
             break Some(format!("damaged from here on: {}", error.description));
+        }
+        record = read_up_to(input, 3)?;
+        let [low, high, kind] = record[..] else {
+            break (!record.is_empty()).then(|| "the file ends within a record".to_owned());
+        };
+        let len = usize::from(u16::from_le_bytes([low, high]));
+        record.extend(read_up_to(input, len)?);
+        if record.len() < 3 + len {
+            break Some("the file ends within a record".to_owned());
+        }
+        let least = match kind {
+            b'B' => 40,
+            b'F' => 1,
+            b'A' => 4,
+            b'D' => 2,
+            _ => usize::MAX,
+        };
+        if len < least {
+            short += u64::from(least < usize::MAX);
+            record.clear();
         }
     };
     drop(parser);
+    for _ in 0..short {
+        log.drop("records shorter than their kind".to_owned());
+    }
     if let Some(damage) = damage {
         log.drop(damage);
     }
