@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The packages of the reference readers.
-const READERS: [&str; 6] = ["rosbags", "mcap", "pyulog", "can", "cantools", "asammdf"];
+const READERS: [&str; 5] = ["rosbags", "mcap", "pyulog", "can", "cantools"];
 /// Byte signals of the messages in the logs of CAN.
 const DBC: &str = r#"VERSION ""
 NS_ :
