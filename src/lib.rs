@@ -126,6 +126,8 @@ pub mod sensor;
 pub mod service;
 #[cfg(feature = "store")]
 pub mod store;
+#[cfg(feature = "service")]
+pub mod uds;
 pub mod units;
 
 // The stages behind `Coprocessor`. They are public for the repository's tools and tests, which look at each

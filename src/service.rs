@@ -35,6 +35,7 @@
 //! answered by the offset that comes next. Nothing here waits, and all buffers have one size.
 
 pub mod calibrate;
+mod conditions;
 #[doc(hidden)]
 pub mod crash;
 pub mod device;
@@ -48,6 +49,7 @@ pub mod message;
 pub mod standstill;
 mod text;
 
+pub use conditions::Conditions;
 pub use device::{Device, MappedSlots, SupportedHardware};
 pub use frame::{Deframer, FrameError};
 pub use message::{Reply, Request};

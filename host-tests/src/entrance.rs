@@ -5,6 +5,7 @@
 //! over the corpus and over damaged copies of it.
 
 mod can;
+mod diagnosis;
 mod logs;
 mod ram_flash;
 mod recording;
@@ -32,7 +33,7 @@ pub struct Entrance {
 }
 
 /// All entrances.
-pub const ALL: [Entrance; 16] = [
+pub const ALL: [Entrance; 17] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "dsp3000", run: sensors::dsp3000, seeds: sensors::dsp3000_seeds, mutations: 20_000 },
@@ -48,6 +49,7 @@ pub const ALL: [Entrance; 16] = [
     Entrance { name: "can_wheels", run: can::wheels, seeds: can::wheel_seeds, mutations: 20_000 },
     Entrance { name: "can_messages", run: can::messages, seeds: can::message_seeds, mutations: 20_000 },
     Entrance { name: "service", run: service::line, seeds: service::seeds, mutations: 5_000 },
+    Entrance { name: "diagnosis", run: diagnosis::frames, seeds: diagnosis::seeds, mutations: 5_000 },
     Entrance { name: "records", run: records::flash, seeds: records::seeds, mutations: 5_000 },
     Entrance { name: "gyronet_blob", run: weights::gyronet, seeds: weights::seeds, mutations: 100 },
     Entrance { name: "fognet_blob", run: weights::fognet, seeds: weights::seeds, mutations: 50 },

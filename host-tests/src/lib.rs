@@ -19,4 +19,5 @@ pub mod require;
 pub mod stored;
 pub mod stream;
 pub mod synthetic;
+pub mod tester;
 pub mod wire;

@@ -9,6 +9,7 @@ mod weights;
 pub use weights::MappedSlots;
 
 use super::calibrate::{Calibrator, State, Task};
+use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, SensorFault};
 use super::frame::{Deframer, Frame, FrameError, emit};
 use super::message::{
@@ -17,7 +18,7 @@ use super::message::{
 };
 use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
-use crate::health::{Status, count};
+use crate::health::{Faults, Status, count};
 use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Store};
@@ -63,6 +64,7 @@ pub struct Device<R: NorFlash, W> {
     standstill: StandstillGate,
     sensor: Option<SensorFault>,
     status: Status,
+    faults: Faults,
     tick: u32,
     log: EventLog,
     deframer: Deframer,
@@ -99,6 +101,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             standstill: StandstillGate::new(),
             sensor: None,
             status: Status::Init,
+            faults: Faults::NONE,
             tick: 0,
             log: EventLog::new(),
             deframer: Deframer::new(),
@@ -140,10 +143,17 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.sensor = fault;
     }
 
-    /// Takes every sample of the sensor (`None` while it is silent), with the status of what was made of it and
-    /// what the wheels show.
-    pub fn observe(&mut self, sample: Option<&ImuSample>, tick: u32, status: Status, wheels: Standstill) {
+    /// Takes every sample of the sensor (`None` while it is silent), with the status and faults of what was made of it
+    /// and what the wheels show.
+    pub fn observe(
+        &mut self,
+        sample: Option<&ImuSample>,
+        tick: u32,
+        (status, faults): (Status, Faults),
+        wheels: Standstill,
+    ) {
         self.tick = tick;
+        self.faults = faults;
         self.standstill.observe(sample, wheels, &self.configuration.static_init);
         if status != self.status {
             self.status = status;
@@ -217,7 +227,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Executes a request.
     #[inline(never)]
-    fn act(&mut self, request: &Request) -> Result<(), Refusal> {
+    pub(crate) fn act(&mut self, request: &Request) -> Result<(), Refusal> {
         // A board without a flash controller is emulated: nothing can be written, and nothing depends on it.
         if self.writable && request.interrupts() && !self.standstill.is_open() {
             return Err(Refusal::Moving);
@@ -254,7 +264,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.log.record(self.tick, kind);
     }
 
-    fn info(&self) -> Info {
+    pub(crate) fn info(&self) -> Info {
         Info {
             protocol: PROTOCOL,
             identity: self.identity,
@@ -269,6 +279,24 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             refused_slots: self.refused_slots,
             status: self.status,
         }
+    }
+
+    /// Returns what the memory of troubles is updated from.
+    pub(crate) fn conditions(&self) -> Conditions {
+        Conditions {
+            status: self.status,
+            faults: self.faults,
+            no_weights: self.weights == WeightSource::None,
+            sensor_refused: self.sensor.is_some(),
+            clock_fault: self.identity.clock_fault.is_some(),
+            can_fault: self.identity.can_fault.is_some(),
+            crashed: self.identity.crash.is_some(),
+        }
+    }
+
+    /// Returns how a calibration goes.
+    pub(crate) fn calibration_state(&self) -> State {
+        self.calibration_state
     }
 
     fn calibrate(&mut self, what: Calibrate) -> Result<(), Refusal> {

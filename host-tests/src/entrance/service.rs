@@ -6,7 +6,7 @@ use super::{Seed, byte, take};
 use crate::noise::Noise;
 use crate::synthetic::idling;
 
-use gyronet::health::Status;
+use gyronet::health::{Faults, Status};
 use gyronet::model::blob::CRC;
 use gyronet::sample::Standstill;
 use gyronet::service::calibrate::Task;
@@ -52,7 +52,12 @@ pub fn line(mut data: &[u8]) {
         framed(content).iter().for_each(|byte| answer(&mut board, *byte));
         if len == 0 {
             ticks.by_ref().for_each(|tick| {
-                board.observe(Some(&idling(tick, 0.001, &mut noise)), 0, Status::Ready, Standstill::Still)
+                board.observe(
+                    Some(&idling(tick, 0.001, &mut noise)),
+                    0,
+                    (Status::Ready, Faults::NONE),
+                    Standstill::Still,
+                )
             });
         }
     }

@@ -12,4 +12,5 @@ mod power_cut;
 mod service;
 mod stored;
 mod supply;
+mod uds;
 mod wheels;

@@ -2,8 +2,10 @@
 
 mod calibration;
 mod configuration;
+mod isotp;
 mod line;
 mod log;
+mod uds;
 mod weights;
 
 use gyronet::model::weights::DEFAULT;

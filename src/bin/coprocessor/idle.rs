@@ -1,6 +1,7 @@
-//! The idle task runs the service line and checks the weights against their checksum.
+//! The idle task runs the service line and diagnosis and checks the weights against their checksum.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
+use crate::diagnosis::Diagnosis;
 use crate::fog_network::{FogNetwork, FogParts};
 use crate::imu::BringUp;
 use crate::regions::{Records, Slots};
@@ -8,7 +9,7 @@ use crate::ring::Ring;
 use crate::serial;
 use crate::stm32f405::{clocks, timer};
 use embedded_io::{Write, WriteReady};
-use gyronet::health::Status;
+use gyronet::health::{Faults, Status};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::{ImuSample, Standstill};
 use gyronet::service::Device;
@@ -29,6 +30,7 @@ pub struct Observation {
     pub sample: Option<ImuSample>,
     pub tick: u32,
     pub status: Status,
+    pub faults: Faults,
     pub wheels: Standstill,
 }
 
@@ -42,6 +44,7 @@ pub struct Idle {
     device: &'static mut Device<Records, Slots>,
     check: Option<BackgroundCheck<'static>>,
     service: serial::Port,
+    diagnosis: Diagnosis,
     fog_network: FogNetwork,
     bring_up: Option<BringUp>,
     /// The reason why the internal oscillator runs, and the time of the last look whether that is over, ms.
@@ -70,6 +73,7 @@ impl Idle {
             device,
             check,
             service,
+            diagnosis: Diagnosis::new(),
             fog_network,
             bring_up,
             clock_fault,
@@ -83,13 +87,14 @@ impl Idle {
     /// Does a bounded piece of work, and returns whether the weights were found to be damaged.
     #[inline(never)]
     pub fn turn(&mut self, counters: &AllCounters) -> bool {
-        while let Some(Observation { sample, tick, status, wheels }) = OBSERVATIONS.pop() {
-            self.device.observe(sample.as_ref(), tick, status, wheels);
+        while let Some(Observation { sample, tick, status, faults, wheels }) = OBSERVATIONS.pop() {
+            self.device.observe(sample.as_ref(), tick, (status, faults), wheels);
         }
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::turn) {
             self.device.sensor(result);
         }
         self.answer(counters);
+        self.diagnosis.turn(self.device, counters);
         self.retry_clock();
         self.check()
     }

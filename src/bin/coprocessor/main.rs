@@ -9,7 +9,7 @@
 //! | USART3 | KVH DSP-1760 |
 //! | USART2 | SLCAN |
 //! | USART6 | service line |
-//! | CAN1 | 500 kbit/s |
+//! | CAN1 | 500 kbit/s: messages, wheels, diagnosis |
 //!
 //! # What runs when
 //! | priority | task | when | what |
@@ -19,7 +19,7 @@
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 2 | `output` | pended by these | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
-//! | 0 | `idle` | the rest | FoGNet in pieces, service line, weights against their checksum; else it sleeps |
+//! | 0 | `idle` | the rest | FoGNet in pieces, service line, diagnosis, weights against their checksum; else it sleeps |
 //!
 //! The library's `Coprocessor` is shared by `output`, `window` and `idle`; the rest is handed over in queues of fixed
 //! length, and what does not fit is counted. An estimate is used two samples after its window, so the time at
@@ -41,6 +41,8 @@ mod board;
 mod boards;
 #[cfg(target_os = "none")]
 mod crash;
+#[cfg(target_os = "none")]
+mod diagnosis;
 #[cfg(target_os = "none")]
 mod fog_network;
 #[cfg(target_os = "none")]

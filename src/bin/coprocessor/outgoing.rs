@@ -1,5 +1,6 @@
 //! The two lines that frames leave by: SLCAN always, CAN where its controller is up.
 
+use crate::diagnosis::{Line, RESPONSES};
 use crate::serial;
 use crate::stm32f405::can::{self, Can, STALE_MS, State};
 use gyronet::can::DataFrame;
@@ -49,6 +50,13 @@ impl Outgoing {
             State::Off => StatusFlags::BUS_ERROR,
         });
         self.slcan.advance();
+        // One at a time, when the rates are out.
+        if let Some((Line::Slcan, frame)) = RESPONSES.oldest().first()
+            && self.port.outgoing().is_none()
+        {
+            self.port.enqueue(*frame, Micros(1_000 * u64::from(self.now)));
+            RESPONSES.drop_oldest(1);
+        }
         // A byte that the line lost is answered as a bad line, or missing in it.
         let _ = self.port.service(&mut self.slcan, take);
         self.refill();
@@ -73,6 +81,13 @@ impl Outgoing {
             } else {
                 break;
             }
+        }
+        while let Some((Line::Can, frame)) = RESPONSES.oldest().first() {
+            // Where the bus is off, the tester hears nothing either.
+            if !off && (!self.queue.is_empty() || !can.transmit(frame, self.now)) {
+                break;
+            }
+            RESPONSES.drop_oldest(1);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::board::SUPERVISOR;
 use crate::boards::BOARD;
+use crate::diagnosis::FROM_SLCAN;
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{Imu, TURN};
 use crate::outgoing::Outgoing;
@@ -10,11 +11,13 @@ use crate::received::{self, FRAMES};
 use crate::serial;
 use crate::stm32f405::can::{Can, State};
 use crate::stm32f405::{timer, watchdog};
+use embedded_can::Frame as _;
 use gyronet::coprocessor::{self, Coprocessor};
 use gyronet::health::count;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
+use gyronet::uds;
 use gyronet::units::Micros;
 
 /// Half a period of the LED, ms; a power of two.
@@ -37,6 +40,8 @@ pub struct Output {
     /// True once CAN takes part in the bus.
     joined: bool,
     lines: LineCounters,
+    /// Frames of a tester on SLCAN that found no room.
+    unread: u32,
 }
 
 type Ports = (serial::Port, serial::Port, serial::Port, Option<Can>);
@@ -52,6 +57,7 @@ impl OutputParts {
             looked: 0,
             joined: false,
             lines: LineCounters::NONE,
+            unread: 0,
         }
     }
 }
@@ -146,7 +152,7 @@ impl Output {
     /// Reports lost frames and the state of the bus to the coprocessor.
     fn report_bus(&mut self, coprocessor: &mut Coprocessor) {
         self.lines.unsent = self.outgoing.dropped();
-        self.lines.frames_lost = received::lost();
+        self.lines.frames_lost = received::lost().saturating_add(self.unread);
         let lost = self.lines.unsent.saturating_add(self.lines.frames_lost);
         coprocessor.bus(lost, self.outgoing.state() >= State::Passive);
     }
@@ -155,8 +161,8 @@ impl Output {
     #[inline(never)]
     fn note(&mut self, observation: &coprocessor::Observation) {
         let coprocessor::Observation { sample, vehicle, wheels, .. } = observation;
-        let (tick, status) = (vehicle.tick, vehicle.prompt.status);
-        let note = Observation { sample: *sample, tick, status, wheels: *wheels };
+        let (tick, status, faults) = (vehicle.tick, vehicle.prompt.status, vehicle.prompt.faults);
+        let note = Observation { sample: *sample, tick, status, faults, wheels: *wheels };
         count(&mut self.lines.overruns, u32::from(!OBSERVATIONS.push(note)));
     }
 
@@ -170,8 +176,13 @@ impl Output {
     #[inline(never)]
     fn send(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
         self.queue(coprocessor);
+        let unread = &mut self.unread;
         self.outgoing.service(|frame| {
-            let _ = coprocessor.can(&frame, now);
+            if uds::target(frame.id()).is_some() {
+                count(unread, u32::from(!FROM_SLCAN.push(frame)));
+            } else {
+                let _ = coprocessor.can(&frame, now);
+            }
         });
         let ([lost, held], [slcan_lost, slcan_held]) = (self.imu.line_faults(), self.outgoing.line_faults());
         self.lines.line_errors = lost.saturating_add(self.fog.lost()).saturating_add(slcan_lost);

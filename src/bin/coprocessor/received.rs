@@ -1,10 +1,14 @@
-//! Frames that the bus has brought, from the receive interrupt to the output task.
+//! Frames that the bus has brought, from the receive interrupt to the output task, or to idle where they are a
+//! tester's.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
+use crate::diagnosis::FROM_CAN;
 use crate::ring::Ring;
 use crate::stm32f405::can::{self, Received};
 use core::sync::atomic::{AtomicU32, Ordering};
+use embedded_can::Frame as _;
 use gyronet::can::DataFrame;
+use gyronet::uds;
 
 /// Wheel frames that wait; the output task looks at them every millisecond.
 pub static FRAMES: Ring<DataFrame, 8> =
@@ -16,10 +20,15 @@ static LOST: AtomicU32 = AtomicU32::new(0);
 /// Handles the receive interrupt: takes every frame that has come.
 pub fn take() {
     while let Some(Received { frame, lost }) = can::receive() {
-        let full = frame.is_some_and(|frame| !FRAMES.push(frame));
+        let full = frame.is_some_and(|frame| !push(frame));
         let lost = LOST.load(Ordering::Relaxed).saturating_add(u32::from(lost) + u32::from(full));
         LOST.store(lost, Ordering::Relaxed);
     }
+}
+
+/// Hands a frame on. Returns whether there was room.
+fn push(frame: DataFrame) -> bool {
+    if uds::target(frame.id()).is_some() { FROM_CAN.push(frame) } else { FRAMES.push(frame) }
 }
 
 /// Frames lost since the start. The controller does not count how many it loses at once, so those

@@ -17,6 +17,7 @@ use gyronet::model::seconds::WindowCopy;
 use gyronet::model::{Blob, FogBlob, FogNet, weights};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{FogPart, ImuPart};
+use gyronet::uds;
 
 /// The hardware that this image drives. It listens to a fibre-optic gyro whether one is configured or not.
 const DRIVES: SupportedHardware = SupportedHardware {
@@ -29,7 +30,7 @@ fn receive(board: &Board, wheels: &WheelSettings, config: &Config) {
     let wheels = wheels.frames.into_iter().flatten().map(|frame| frame.id);
     let latitude = config.latitude.map(|latitude| latitude.id());
     if let Some(can) = &board.can {
-        can.receive_only(wheels.chain(latitude));
+        can.receive_only(uds::request_ids().chain(wheels).chain(latitude));
     }
 }
 

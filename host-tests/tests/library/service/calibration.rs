@@ -1,7 +1,7 @@
 //! A calibration runs at standstill, and its result is stored when that is asked for.
 
 use super::{Board, ask, sample, set, start};
-use gyronet::health::Status;
+use gyronet::health::{Faults, Status};
 use gyronet::mounting::GyroMap;
 use gyronet::sample::Standstill;
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
@@ -19,7 +19,12 @@ fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> Sta
     assert_eq!(ask(board, &Request::Calibrate(Calibrate::Start(task))), Reply::Done);
     for k in 0..301u64 {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
-        board.observe(Some(&sample(k, force, rate)), k as u32, Status::Ready, Standstill::Still);
+        board.observe(
+            Some(&sample(k, force, rate)),
+            k as u32,
+            (Status::Ready, Faults::NONE),
+            Standstill::Still,
+        );
     }
     match ask(board, &Request::GetCalibration) {
         Reply::Calibration { state, .. } => state,

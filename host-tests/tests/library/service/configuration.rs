@@ -4,7 +4,7 @@ use super::{Board, DRIVES, IDENTITY, ask, bare, info, sample, set, start};
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
 use gyronet::can::wheel::{WheelConfigError, WheelFrame, WheelSettings};
-use gyronet::health::Status;
+use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
 use gyronet::service::event::EventKind;
 use gyronet::service::message::{Calibrate, FlashState, Origin, Refusal};
@@ -139,7 +139,12 @@ fn nothing_is_stored_without_flash() {
 fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standstill) -> bool {
     for k in samples {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
-        board.observe(Some(&sample(k, [0.0, 0.0, 9.81], rate)), k as u32, Status::Ready, wheels);
+        board.observe(
+            Some(&sample(k, [0.0, 0.0, 9.81], rate)),
+            k as u32,
+            (Status::Ready, Faults::NONE),
+            wheels,
+        );
     }
     match ask(board, &set(Configuration::DEFAULT)) {
         Reply::Done => true,
@@ -158,9 +163,9 @@ fn flash_is_written_at_standstill_alone() {
     assert!(!storable(&mut board, 2..202, 0.001, Standstill::Unknown), "quiet for two seconds");
     assert!(storable(&mut board, 202..402, 0.001, Standstill::Unknown), "quiet for more than three");
     assert!(!storable(&mut board, 402..602, 0.3, Standstill::Unknown), "a gyro that moves");
-    board.observe(None, 700, Status::Silent, Standstill::Unknown);
+    board.observe(None, 700, (Status::Silent, Faults::NONE), Standstill::Unknown);
     assert!(storable(&mut board, 0..0, 0.0, Standstill::Unknown), "a bench without a sensor");
-    board.observe(None, 701, Status::Silent, Standstill::Moving);
+    board.observe(None, 701, (Status::Silent, Faults::NONE), Standstill::Moving);
     for request in [
         Request::WeightsBegin { length: 64 },
         Request::WeightsBlock { offset: 0, bytes: heapless::Vec::new() },

@@ -1,7 +1,7 @@
 //! The log keeps the latest events and counts those that it has dropped.
 
 use super::{Board, IDENTITY, ask, bare, info, sample};
-use gyronet::health::Status;
+use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
 use gyronet::service::event::{EventKind, ResetCause, SensorFault};
 use gyronet::service::{Reply, Request};
@@ -33,7 +33,12 @@ fn the_log_is_bounded_and_reports_what_is_lost() {
     assert_eq!(kinds, [EventKind::Started(ResetCause::Software), EventKind::Crashed(crash)]);
     for k in 0..100 {
         let status = if k % 2 == 0 { Status::Ready } else { Status::Degraded };
-        board.observe(Some(&sample(k, [0.0, 0.0, 9.8], 0.0)), k as u32, status, Standstill::Still);
+        board.observe(
+            Some(&sample(k, [0.0, 0.0, 9.8], 0.0)),
+            k as u32,
+            (status, Faults::NONE),
+            Standstill::Still,
+        );
     }
     let (mut after, mut events, mut lost) = (2, 0, 0);
     loop {

@@ -1,0 +1,157 @@
+//! Diagnosis on CAN with the image as flashed: a tester of ours, and udsoncan over can-isotp as they come from their
+//! authors.
+
+use crate::common::{self, START, drive};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::model::weights;
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::require;
+use gyronet_host_tests::stored::other_weights;
+use gyronet_host_tests::tester::Tester;
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+/// Time that passes while a tester waits for the next frame.
+const TURN: Duration = Duration::from_millis(1);
+
+fn frame(id: u16, data: &[u8]) -> DataFrame {
+    DataFrame::new(Id::Standard(StandardId::new(id).expect("11 bits")), data).expect("eight bytes")
+}
+
+fn raw(frame: &DataFrame) -> u16 {
+    match frame.id() {
+        Id::Standard(id) => id.as_raw(),
+        Id::Extended(_) => u16::MAX,
+    }
+}
+
+/// Sends frames to the server and returns its own of the next millisecond.
+fn exchange(board: &mut Board, frames: &[[u8; 8]]) -> Vec<[u8; 8]> {
+    frames.iter().for_each(|data| board.can_send(&frame(0x7E0, data)));
+    board.run(TURN);
+    let sent = common::frames(&board.can_frames());
+    let ours = sent.iter().filter(|frame| raw(frame) == 0x7E8);
+    ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
+}
+
+fn ask(board: &mut Board, request: &[u8]) -> Option<Vec<u8>> {
+    Tester::default().ask(request, 8_000, |frames| exchange(board, frames))
+}
+
+/// A weight file of the size of the built-in one is up and running in under a minute, the restart included.
+#[test]
+fn a_weight_file_comes_over_can_and_is_used() {
+    const TEST: &str = "a_weight_file_comes_over_can_and_is_used";
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let file = other_weights(1);
+    let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum")).to_be_bytes();
+    let running = |source: u8, file: &[u8]| Some([&[0x62, 1, 3, source][..], &crc(file)].concat());
+    assert_eq!(ask(&mut board, &[0x22, 1, 3]), running(1, &weights::DEFAULT.0));
+    let from = board.counts().time;
+    assert_eq!(ask(&mut board, &[0x10, 2]), Some(vec![0x50, 2, 0, 50, 0x01, 0xF4]));
+    let [a, b, c, d] = (file.len() as u32).to_be_bytes();
+    let mut tester = Tester::default();
+    let begin = [0x34, 0, 0x44, 0, 0, 0, 0, a, b, c, d];
+    let begun = tester.ask(&begin, 8_000, |frames| exchange(&mut board, frames));
+    assert_eq!(
+        (begun, tester.pending),
+        (Some(vec![0x74, 0x20, 1, 2]), 1),
+        "pending goes out before the erase"
+    );
+    for (number, bytes) in (1..=255u8).chain(0..=255).cycle().zip(file.chunks(256)) {
+        assert_eq!(ask(&mut board, &[&[0x36, number], bytes].concat()), Some(vec![0x76, number]));
+    }
+    assert_eq!(ask(&mut board, &[0x37]), Some(vec![0x77]));
+    assert_eq!(ask(&mut board, &[0x31, 1, 0xFF, 1]), Some(vec![0x71, 1, 0xFF, 1]));
+    assert_eq!(ask(&mut board, &[0x11, 1]), Some(vec![0x51, 1]));
+    board.run(START);
+    assert_eq!(ask(&mut board, &[0x22, 1, 3]), running(2, &file));
+    let took = board.counts().time - from;
+    println!("{} bytes, modelled: {:.1} s", file.len(), took.as_secs_f64());
+    assert!(took < Duration::from_secs(60), "{took:?}");
+    let counters = common::counters(&mut board);
+    assert_eq!(counters.lines.frames_lost, 0);
+}
+
+#[test]
+fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
+    const TEST: &str = "a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place";
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let now = board.counts().time;
+    common::send(&mut board, &drive(100), now);
+    // A tester that reads all the time takes nothing from the rates.
+    let mut reads = 0;
+    let mut rates = 0;
+    while board.counts().time < now + Duration::from_secs(1) {
+        let read = Tester::default().ask(&[0x22, 1, 6], 100, |frames| {
+            frames.iter().for_each(|data| board.can_send(&frame(0x7E0, data)));
+            board.run(TURN);
+            let sent = common::frames(&board.can_frames());
+            rates += sent.iter().filter(|frame| raw(frame) < 0x700).count();
+            let ours = sent.iter().filter(|frame| raw(frame) == 0x7E8);
+            ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
+        });
+        assert_eq!(read.map(|bytes| bytes.len()), Some(3 + 4 * 20));
+        reads += 1;
+    }
+    println!("{reads} reads of 83 bytes and {rates} frames of rates in a second");
+    assert!(rates >= 6 * 99, "{rates}");
+    board.run(Duration::from_millis(500));
+    let silent = [0x5A, 0x01, 0x31];
+    let listed = ask(&mut board, &[0x19, 2, 1]).expect("troubles");
+    assert!(listed[3..].chunks(4).any(|trouble| trouble[..3] == silent), "{listed:02x?}");
+}
+
+/// Relays frames between the client's pipes and the board, a millisecond of the board's time for each turn.
+#[test]
+fn udsoncan_reads_writes_and_downloads() {
+    const TEST: &str = "udsoncan_reads_writes_and_downloads";
+    let Some(python) = require::python(TEST, &["isotp", "udsoncan"]) else { return };
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("uds_weights.bin");
+    std::fs::write(&file, other_weights(2)).expect("there is room");
+    let mut client = Command::new(python)
+        .arg(workspace().join("host-tests/tests/clients/uds_client.py"))
+        .arg(&file)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("Python");
+    let mut to_client = client.stdin.take().expect("a pipe");
+    let from_client = BufReader::new(client.stdout.take().expect("a pipe"));
+    let mut said = Vec::new();
+    // Each line is a turn: frames to the board (identifier#data), or what the client has seen.
+    for line in from_client.lines() {
+        let line = line.expect("text");
+        let Some(frames) = line.strip_prefix("turn") else {
+            said.push(line);
+            continue;
+        };
+        for text in frames.split_whitespace() {
+            let (id, data) = text.split_once('#').expect("identifier#data");
+            let bytes: Vec<u8> = (0..data.len())
+                .step_by(2)
+                .map(|k| u8::from_str_radix(&data[k..k + 2], 16).expect("hexadecimal"))
+                .collect();
+            board.can_send(&frame(u16::from_str_radix(id, 16).expect("hexadecimal"), &bytes));
+        }
+        board.run(TURN);
+        let sent = common::frames(&board.can_frames());
+        let answers: String = sent
+            .iter()
+            .filter(|frame| raw(frame) == 0x7E8)
+            .map(|frame| frame.data().iter().map(|byte| format!("{byte:02x}")).collect::<String>() + " ")
+            .collect();
+        // The client may have ended.
+        let _ = writeln!(to_client, "{answers}");
+    }
+    assert!(client.wait().expect("it ends").success(), "{said:#?}");
+    println!("{}", said.join("\n"));
+    assert_eq!(said.last().map(String::as_str), Some("done"));
+}

@@ -1,0 +1,143 @@
+"""Diagnoses the board with udsoncan over can-isotp, as they are published.
+
+The bus is two pipes: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
+comes back the server's frames. Time is counted in turns, so that a slow model of the board breaks no timeout.
+"""
+
+import struct
+import sys
+from pathlib import Path
+
+import isotp
+import udsoncan
+from udsoncan.client import Client
+from udsoncan.connections import BaseConnection
+from udsoncan.exceptions import NegativeResponseException, TimeoutException
+from udsoncan.services import ControlDTCSetting, DiagnosticSessionControl, ECUReset
+
+SERVER, ALL, RESPONSE = 0x7E0, 0x7DF, 0x7E8
+
+
+class Pipes(BaseConnection):
+    """Carries whole messages: can-isotp cuts them into frames, the pipes carry the frames."""
+
+    def __init__(self):
+        super().__init__("pipes")
+        self.received = []
+        self.outgoing = []
+        address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=SERVER, rxid=RESPONSE)
+        params = {"stmin": 0, "blocksize": 0, "tx_padding": 0xAA, "rx_flowcontrol_timeout": 60_000,
+                  "rx_consecutive_frame_timeout": 60_000}
+        self.layer = isotp.TransportLayerLogic(self.take, self.outgoing.append, address, params=params,
+                                               error_handler=self.fail)
+        self.errors = []
+
+    def fail(self, error):
+        self.errors.append(error)
+
+    def take(self, _timeout=0):
+        return self.received.pop(0) if self.received else None
+
+    def turn(self):
+        """Lets a millisecond pass."""
+        self.layer.process(0)
+        frames = " ".join(f"{frame.arbitration_id:x}#{frame.data.hex()}" for frame in self.outgoing)
+        self.outgoing.clear()
+        print("turn", frames, flush=True)
+        for data in sys.stdin.readline().split():
+            self.received.append(isotp.CanMessage(arbitration_id=RESPONSE, dlc=8, data=bytes.fromhex(data)))
+        self.layer.process(0)
+
+    def specific_send(self, payload, timeout=None):
+        self.layer.send(payload)
+
+    def specific_wait_frame(self, timeout=None):
+        for _ in range(20_000):
+            self.turn()
+            if self.layer.available():
+                return bytes(self.layer.recv())
+        raise TimeoutException(f"no message in 20 s; {self.errors}")
+
+    def open(self):
+        return self
+
+    def close(self):
+        pass
+
+    def empty_rxqueue(self):
+        self.layer.recv()
+
+    def is_open(self):
+        return True
+
+
+class Bytes(udsoncan.DidCodec):
+    """Leaves data as they are."""
+
+    def encode(self, value):
+        return value
+
+    def decode(self, payload):
+        return payload
+
+    def __len__(self):
+        raise udsoncan.DidCodec.ReadAllRemainingData
+
+
+def refused(code, call, *arguments, **named):
+    """Expects a negative response."""
+    try:
+        call(*arguments, **named)
+    except NegativeResponseException as error:
+        assert error.response.code == code, error
+    else:
+        raise AssertionError(f"{call} was not refused with {code:02x}")
+
+
+def main():
+    weights = Path(sys.argv[1]).read_bytes()
+    dids = (0xF186, 0xF189, 0xF197, 0x0100, 0x0101, 0x0102, 0x0103, 0x0104, 0x0105, 0x0106, 0x0107)
+    config = dict(udsoncan.configs.default_client_config, data_identifiers={did: Bytes for did in dids},
+                  request_timeout=None, p2_timeout=20, p2_star_timeout=60)
+    pipes = Pipes()
+    with Client(pipes, config=config) as client:
+        for did in dids:
+            value = client.read_data_by_identifier(did).service_data.values[did]
+            print(f"{did:04x} {value.hex()}")
+            assert value
+        refused(0x7F, client.request_download, udsoncan.MemoryLocation(0, 4, 32, 32))
+        troubles = client.get_supported_dtc().service_data.dtcs
+        assert len(troubles) == 13, troubles
+        client.change_session(DiagnosticSessionControl.Session.extendedDiagnosticSession)
+        client.tester_present()
+        client.control_dtc_setting(ControlDTCSetting.SettingType.off)
+        client.control_dtc_setting(ControlDTCSetting.SettingType.on)
+        client.clear_dtc()
+        number = client.get_number_of_dtc_by_status_mask(0x08).service_data.dtc_count
+        print(f"{number} troubles after they were cleared")
+        configuration = client.read_data_by_identifier(0x0100).service_data.values[0x0100]
+        client.write_data_by_identifier(0x0100, configuration)
+        refused(0x13, client.write_data_by_identifier, 0x0100, configuration[:-1])
+        refused(0x31, client.write_data_by_identifier, 0xF186, b"\1")
+        client.start_routine(0x0200)
+        assert client.get_routine_result(0x0200).service_data.routine_status_record == b"\1"
+        client.stop_routine(0x0200)
+
+        client.change_session(DiagnosticSessionControl.Session.programmingSession)
+        place = udsoncan.MemoryLocation(0, len(weights), 32, 32)
+        length = client.request_download(place).service_data.max_length - 2
+        for number, start in enumerate(range(0, len(weights), length), 1):
+            client.transfer_data(number & 0xFF, weights[start:start + length])
+        client.request_transfer_exit()
+        client.start_routine(0xFF01)
+        client.ecu_reset(ECUReset.ResetType.hardReset)
+        for _ in range(300):
+            pipes.turn()
+        source, crc = struct.unpack(">BI", client.read_data_by_identifier(0x0103).service_data.values[0x0103])
+        assert (source, crc) == (2, struct.unpack("<I", weights[-4:])[0]), (source, crc)
+        assert not pipes.errors, pipes.errors
+    print("done")
+
+
+if __name__ == "__main__":
+    main()

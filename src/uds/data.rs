@@ -1,0 +1,186 @@
+//! Data identifiers: what a tester reads and writes by number (ISO 14229-1 C.1).
+//!
+//! | identifier | bytes | what | written |
+//! |---|---|---|---|
+//! | F186 | 1 | session: 1 default, 2 programming, 3 extended | |
+//! | F189 | 1, 1, 1 | version of the firmware | |
+//! | F197 | text | name of the system, "gyronet" | |
+//! | 0100 | 1, then the record | layout of the configuration, the configuration as it is stored (postcard) | extended |
+//! | 0101 | the record | wheel frames that are received, as they are stored (postcard) | extended |
+//! | 0102 | 1, then the record | layout of the calibration, the calibration as it is stored (postcard) | |
+//! | 0103 | 1, 4 | weights: 0 none, 1 built in, 2 slot A, 3 slot B; their CRC-32 | |
+//! | 0104 | 1, 1 | status of the yaw rate, fault bits, both as on CAN | |
+//! | 0105 | 4 each | counters of the pipeline, in the order of [`crate::health::Counters`] | |
+//! | 0106 | 4 each | counters of the sensor's monitor, of the inputs and of the lines, in the order of their types | |
+//! | 0107 | 4 each | conversations of diagnosis that went wrong, in the order of [`TransportErrors`] | |
+//!
+//! Numbers are big-endian, as everywhere in ISO 14229.
+
+use super::isotp::TransportErrors;
+use super::response::{Nrc, Response, put};
+use crate::health::{Counters, InputCounters, MonitorCounters};
+use crate::service::message::{AllCounters, LineCounters, Request};
+use crate::service::{Device, MappedSlots};
+use crate::store::slots::WeightSource;
+use crate::store::{Calibration, Configuration, Record, Slot};
+use embedded_storage::nor_flash::NorFlash;
+use serde::Serialize;
+
+/// What a read looks at.
+pub(super) struct Sources<'a, R: NorFlash, W> {
+    pub device: &'a Device<R, W>,
+    pub counters: &'a AllCounters,
+    /// Number of the session.
+    pub session: u8,
+    pub errors: TransportErrors,
+}
+
+/// Appends the value of an identifier.
+pub(super) fn read<R: NorFlash, W: MappedSlots>(
+    id: u16,
+    from: &Sources<'_, R, W>,
+    out: &mut Response,
+) -> Result<(), Nrc> {
+    let Sources { device, counters, session, errors } = from;
+    match id {
+        0xF186 => put(out, &[*session]),
+        0xF189 => put(out, &device.info().identity.firmware),
+        0xF197 => put(out, b"gyronet"),
+        0x0100 => {
+            put(out, &[Configuration::VERSION])?;
+            put_record(out, device.configuration())
+        }
+        0x0101 => put_record(out, device.wheels()),
+        0x0102 => {
+            put(out, &[Calibration::VERSION])?;
+            put_record(out, device.calibration())
+        }
+        0x0103 => {
+            let info = device.info();
+            let source = match info.weights {
+                WeightSource::None => 0,
+                WeightSource::BuiltIn => 1,
+                WeightSource::Slot(Slot::A) => 2,
+                WeightSource::Slot(Slot::B) => 3,
+            };
+            put(out, &[source])?;
+            put(out, &info.weights_crc.unwrap_or(0).to_be_bytes())
+        }
+        0x0104 => {
+            let now = device.conditions();
+            put(out, &[now.status as u8, now.faults.0])
+        }
+        0x0105 => put_words(out, &pipeline(&counters.pipeline)),
+        0x0106 => {
+            put_words(out, &monitor(&counters.watch))?;
+            put_words(out, &inputs(&counters.inputs))?;
+            put_words(out, &lines(&counters.lines))
+        }
+        0x0107 => {
+            let TransportErrors { unexpected, sequence, overflow, timeout } = *errors;
+            put_words(out, &[unexpected, sequence, overflow, timeout])
+        }
+        _ => Err(Nrc::RequestOutOfRange),
+    }
+}
+
+/// Returns the request that writes these bytes under an identifier.
+pub(super) fn write(id: u16, bytes: &[u8]) -> Result<Request, Nrc> {
+    let length = Nrc::IncorrectMessageLengthOrInvalidFormat;
+    match id {
+        0x0100 => {
+            let (version, record) = bytes.split_first().ok_or(length)?;
+            if *version != Configuration::VERSION {
+                return Err(Nrc::RequestOutOfRange);
+            }
+            let (configuration, rest) = postcard::take_from_bytes(record).map_err(|_| length)?;
+            let request = Request::SetConfiguration { version: *version, configuration };
+            if rest.is_empty() { Ok(request) } else { Err(length) }
+        }
+        0x0101 => match postcard::take_from_bytes(bytes) {
+            Ok((wheels, [])) => Ok(Request::SetWheels(wheels)),
+            Ok(_) | Err(_) => Err(length),
+        },
+        _ => Err(Nrc::RequestOutOfRange),
+    }
+}
+
+fn put_record(out: &mut Response, record: &impl Serialize) -> Result<(), Nrc> {
+    let start = out.len();
+    let room = out.capacity();
+    out.resize_default(room).map_err(|_| Nrc::ResponseTooLong)?;
+    let written =
+        postcard::to_slice(record, out.get_mut(start..).unwrap_or_default()).map(|bytes| bytes.len());
+    out.truncate(start + written.as_ref().map_or(0, |len| *len));
+    written.map(|_| ()).map_err(|_| Nrc::ResponseTooLong)
+}
+
+fn put_words(out: &mut Response, words: &[u32]) -> Result<(), Nrc> {
+    words.iter().try_for_each(|word| put(out, &word.to_be_bytes()))
+}
+
+fn pipeline(counters: &Counters) -> [u32; 12] {
+    let Counters {
+        samples,
+        missing,
+        misplaced,
+        clock_jumps,
+        invalid,
+        moving,
+        windows,
+        clamped_inputs,
+        implausible,
+        late,
+        zero_rate_updates,
+        contradicted,
+    } = *counters;
+    [
+        samples,
+        missing,
+        misplaced,
+        clock_jumps,
+        invalid,
+        moving,
+        windows,
+        clamped_inputs,
+        implausible,
+        late,
+        zero_rate_updates,
+        contradicted,
+    ]
+}
+
+fn monitor(counters: &MonitorCounters) -> [u32; 5] {
+    let MonitorCounters { silences, stuck, held, wrong, clock_off } = *counters;
+    [silences, stuck, held, wrong, clock_off]
+}
+
+fn inputs(counters: &InputCounters) -> [u32; 9] {
+    let InputCounters {
+        imu_errors,
+        fog_errors,
+        wheel_errors,
+        latitude_errors,
+        clock_back,
+        unclaimed_estimates,
+        replaced_windows,
+        replaced_frames,
+        out_of_range,
+    } = *counters;
+    [
+        imu_errors,
+        fog_errors,
+        wheel_errors,
+        latitude_errors,
+        clock_back,
+        unclaimed_estimates,
+        replaced_windows,
+        replaced_frames,
+        out_of_range,
+    ]
+}
+
+fn lines(counters: &LineCounters) -> [u32; 6] {
+    let LineCounters { unsent, line_errors, held, overruns, service_errors, frames_lost } = *counters;
+    [unsent, line_errors, held, overruns, service_errors, frames_lost]
+}

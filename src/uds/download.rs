@@ -1,0 +1,82 @@
+//! A download brings a weight file into the slot that is not in use (services 0x34, 0x36, 0x37).
+//!
+//! The file is used only after routine FF01, and from the next start on; a download that ends anywhere before leaves
+//! the old one in use.
+
+use super::response::{Nrc, Response, nrc, put};
+use crate::service::message::{BLOCK, Request};
+use crate::service::{Device, MappedSlots};
+use embedded_storage::nor_flash::NorFlash;
+use heapless::Vec;
+
+/// A download under way.
+#[derive(Debug)]
+pub(super) struct Download {
+    length: u32,
+    offset: u32,
+    /// Number of the next block; it starts at 1 and wraps around through 0.
+    next: u8,
+}
+
+impl Download {
+    /// Begins from the parameters of 0x34: no compression, address 0, the length of the file.
+    pub fn begin<R: NorFlash, W: MappedSlots>(
+        parameters: &[u8],
+        device: &mut Device<R, W>,
+        out: &mut Response,
+    ) -> Result<Self, Nrc> {
+        let [format, sizes, rest @ ..] = parameters else {
+            return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+        };
+        let (length_bytes, address_bytes) = (usize::from(sizes >> 4), usize::from(sizes & 0xF));
+        if *format != 0 || !(1..=4).contains(&length_bytes) || !(1..=4).contains(&address_bytes) {
+            return Err(Nrc::RequestOutOfRange);
+        }
+        if rest.len() != length_bytes + address_bytes {
+            return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+        }
+        let (address, length) = rest.split_at(address_bytes);
+        let number = |bytes: &[u8]| bytes.iter().fold(0u32, |sum, byte| sum << 8 | u32::from(*byte));
+        if number(address) != 0 {
+            return Err(Nrc::RequestOutOfRange);
+        }
+        let length = number(length);
+        device.act(&Request::WeightsBegin { length }).map_err(nrc)?;
+        let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
+        put(out, &[0x20, high, low])?;
+        Ok(Self { length, offset: 0, next: 1 })
+    }
+
+    /// Takes a block. The last one again is answered again: its response may have been lost.
+    pub fn block<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        parameters: &[u8],
+        device: &mut Device<R, W>,
+        out: &mut Response,
+    ) -> Result<(), Nrc> {
+        let (&number, bytes) = parameters.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        put(out, &[number])?;
+        if number == self.next.wrapping_sub(1) && self.offset > 0 {
+            return Ok(());
+        }
+        if number != self.next {
+            return Err(Nrc::WrongBlockSequenceCounter);
+        }
+        let left = self.length - self.offset;
+        let expected = left.min(BLOCK as u32) as usize;
+        let bytes = Vec::from_slice(bytes).ok().filter(|bytes| bytes.len() == expected && expected > 0);
+        let bytes = bytes.ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        device.act(&Request::WeightsBlock { offset: self.offset, bytes }).map_err(nrc)?;
+        self.offset += expected as u32;
+        self.next = self.next.wrapping_add(1);
+        Ok(())
+    }
+
+    /// Checks the whole file where it lies.
+    pub fn finish<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) -> Result<(), Nrc> {
+        if self.offset < self.length {
+            return Err(Nrc::RequestSequenceError);
+        }
+        device.act(&Request::WeightsVerify).map_err(nrc)
+    }
+}

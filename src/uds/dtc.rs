@@ -1,0 +1,163 @@
+//! The trouble memory holds what was found to be wrong, as a workshop reads it (ISO 14229-1 D.2).
+//!
+//! A fault is confirmed at once, because the pipeline has already waited as long as each needs; it stays in the memory
+//! until a tester clears it, so that one that comes and goes is found, too.
+
+use crate::health::{Faults, Status};
+use crate::service::Conditions;
+
+/// Bits of a trouble's status.
+pub mod bit {
+    /// The fault is present.
+    pub const FAILED: u8 = 1;
+    /// It was present since the start.
+    pub const FAILED_THIS_CYCLE: u8 = 1 << 1;
+    /// It was present in this operation cycle or the last one.
+    pub const PENDING: u8 = 1 << 2;
+    /// It is in the memory.
+    pub const CONFIRMED: u8 = 1 << 3;
+    /// It has not been looked for since the memory was cleared.
+    pub const UNTESTED_SINCE_CLEAR: u8 = 1 << 4;
+    /// It was present since the memory was cleared.
+    pub const FAILED_SINCE_CLEAR: u8 = 1 << 5;
+    /// It has not been looked for since the start.
+    pub const UNTESTED_THIS_CYCLE: u8 = 1 << 6;
+    /// The bits that this server has.
+    pub const AVAILABLE: u8 = 0x7F;
+}
+
+/// A trouble that can be in the memory.
+#[derive(Debug)]
+pub struct Trouble {
+    /// ISO 15031-6 code and failure type, three bytes.
+    pub code: u32,
+    /// A short name.
+    pub name: &'static str,
+    cause: Cause,
+}
+
+/// The condition that a trouble stands for.
+#[derive(Debug, Clone, Copy)]
+enum Cause {
+    Status(Status),
+    Fault(Faults),
+    SensorRefused,
+    NoWeights,
+    Crash,
+    Clock,
+    Can,
+}
+
+impl Cause {
+    fn is_present(self, now: &Conditions) -> bool {
+        match self {
+            Self::Status(status) => now.status == status,
+            Self::Fault(fault) => now.faults.contains(fault),
+            Self::SensorRefused => now.sensor_refused,
+            Self::NoWeights => now.no_weights,
+            Self::Crash => now.crashed,
+            Self::Clock => now.clock_fault,
+            Self::Can => now.can_fault,
+        }
+    }
+}
+
+/// All troubles, in the order of the documents.
+pub static TROUBLES: [Trouble; 13] = [
+    trouble(0x5A01, 0x31, "inertial sensor: no signal", Cause::Status(Status::Silent)),
+    trouble(0x5A01, 0x2A, "inertial sensor: readings stand still", Cause::Status(Status::Stuck)),
+    trouble(0x5A01, 0x22, "inertial sensor: saturated", Cause::Status(Status::Clipped)),
+    trouble(
+        0x5A01,
+        0x62,
+        "inertial sensor: implausible, or its clock is off",
+        Cause::Fault(Faults::IMPLAUSIBLE),
+    ),
+    trouble(0x5A01, 0x49, "inertial sensor: could not be set up", Cause::SensorRefused),
+    trouble(0x5A01, 0x38, "inertial sensor: samples are missing", Cause::Fault(Faults::GAP)),
+    trouble(0x5A02, 0x44, "stored data are damaged", Cause::Fault(Faults::STORED)),
+    trouble(0x5A02, 0x46, "no weights that can be used", Cause::NoWeights),
+    trouble(0x5A03, 0x47, "the software crashed", Cause::Crash),
+    trouble(0x5A03, 0x38, "the processor's clock is not the crystal's", Cause::Clock),
+    trouble(0xDA01, 0x88, "CAN: no bus, or frames were lost", Cause::Fault(Faults::BUS)),
+    trouble(0xDA01, 0x49, "CAN: the controller does not start", Cause::Can),
+    trouble(0xDA02, 0x87, "wheels: silent, or they contradict the gyro", Cause::Fault(Faults::WHEELS)),
+];
+
+/// Makes a trouble of a code (0x5A01 is C1A01, 0xDA01 is U1A01) and a failure type.
+const fn trouble(code: u16, failure: u8, name: &'static str, cause: Cause) -> Trouble {
+    Trouble { code: (code as u32) << 8 | failure as u32, name, cause }
+}
+
+/// What is known of one trouble.
+#[derive(Debug, Clone, Copy)]
+pub struct Entry {
+    /// See [`bit`].
+    pub status: u8,
+    /// Times that it came, since the memory was cleared.
+    pub occurrences: u8,
+}
+
+const UNTESTED: Entry =
+    Entry { status: bit::UNTESTED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE, occurrences: 0 };
+
+/// Holds an entry for each of [`TROUBLES`].
+#[derive(Debug)]
+pub struct Memory {
+    entries: [Entry; TROUBLES.len()],
+    /// A tester may stop the memory while it works on the vehicle.
+    pub is_enabled: bool,
+}
+
+impl Memory {
+    /// Makes an empty memory.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true }
+    }
+
+    /// Notes what is present now.
+    pub fn observe(&mut self, now: &Conditions) {
+        if !self.is_enabled {
+            return;
+        }
+        for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
+            entry.status &= !(bit::UNTESTED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE);
+            let was_present = entry.status & bit::FAILED != 0;
+            let is_present = trouble.cause.is_present(now);
+            if is_present && !was_present {
+                entry.occurrences = entry.occurrences.saturating_add(1);
+                entry.status |= bit::FAILED
+                    | bit::FAILED_THIS_CYCLE
+                    | bit::PENDING
+                    | bit::CONFIRMED
+                    | bit::FAILED_SINCE_CLEAR;
+            } else if !is_present {
+                entry.status &= !bit::FAILED;
+            }
+        }
+    }
+
+    /// Clears one trouble, or all for `0xFF_FFFF`. Returns whether there is such a one.
+    pub fn clear(&mut self, code: u32) -> bool {
+        let mut found = false;
+        for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
+            if code == 0xFF_FFFF || code == trouble.code {
+                *entry = UNTESTED;
+                found = true;
+            }
+        }
+        found
+    }
+
+    /// Returns each trouble with its entry.
+    pub fn entries(&self) -> impl Iterator<Item = (&'static Trouble, &Entry)> {
+        TROUBLES.iter().zip(&self.entries)
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,43 @@
+//! Responses are written by these, and refusals get the standard's codes (ISO 14229-1 A.1).
+
+use super::isotp::LONGEST;
+use crate::service::message::Refusal;
+use crate::store::StoreError;
+use crate::store::slots::SlotError;
+pub use automotive_diag::uds::UdsError as Nrc;
+use heapless::Vec;
+
+/// A response as it is written.
+pub(super) type Response = Vec<u8, LONGEST>;
+
+/// Appends bytes to a response.
+pub(super) fn put(out: &mut Response, bytes: &[u8]) -> Result<(), Nrc> {
+    out.extend_from_slice(bytes).map_err(|_| Nrc::ResponseTooLong)
+}
+
+/// Returns the bytes if there are `N`.
+pub(super) fn exactly<const N: usize>(bytes: &[u8]) -> Result<[u8; N], Nrc> {
+    bytes.try_into().map_err(|_| Nrc::IncorrectMessageLengthOrInvalidFormat)
+}
+
+/// Returns the standard's code for a refusal.
+pub(super) fn nrc(refusal: Refusal) -> Nrc {
+    match refusal {
+        Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,
+        Refusal::Unknown | Refusal::Version { .. } | Refusal::OtherWeights { .. } => Nrc::RequestOutOfRange,
+        Refusal::Store(StoreError::Field(_) | StoreError::Version { .. } | StoreError::Encoding) => {
+            Nrc::RequestOutOfRange
+        }
+        Refusal::Store(StoreError::NoFlash) | Refusal::Slot(SlotError::NoFlash) => Nrc::ConditionsNotCorrect,
+        Refusal::Store(StoreError::Flash(_) | StoreError::Full) | Refusal::Slot(SlotError::Flash(_)) => {
+            Nrc::GeneralProgrammingFailure
+        }
+        Refusal::Slot(SlotError::NotBegun | SlotError::Offset { .. } | SlotError::Incomplete { .. }) => {
+            Nrc::RequestSequenceError
+        }
+        Refusal::Slot(SlotError::Length(_)) => Nrc::UploadDownloadNotAccepted,
+        Refusal::Slot(SlotError::Empty | SlotError::NotAccepted(_) | SlotError::Blob(_)) => {
+            Nrc::GeneralProgrammingFailure
+        }
+    }
+}
