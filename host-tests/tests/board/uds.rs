@@ -111,13 +111,14 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
 #[test]
 fn udsoncan_reads_writes_and_downloads() {
     const TEST: &str = "udsoncan_reads_writes_and_downloads";
-    let Some(python) = require::python(TEST, &["isotp", "udsoncan"]) else { return };
+    let Some(python) = require::python(TEST, &["can", "isotp", "udsoncan"]) else { return };
     let Some(mut board) = common::boot(TEST) else { return };
     board.run(START);
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("uds_weights.bin");
     std::fs::write(&file, other_weights(2)).expect("there is room");
     let mut client = Command::new(python)
         .arg(workspace().join("host-tests/tests/clients/uds_client.py"))
+        .arg("pipes")
         .arg(&file)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

@@ -1,6 +1,7 @@
 """Diagnoses the board with udsoncan over can-isotp, as they are published.
 
-The bus is two pipes: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
+`uds_client.py slcan URL` reads over a serial line. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
+pipes: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
 comes back the server's frames. Time is counted in turns, so that a slow model of the board breaks no timeout.
 """
 
@@ -8,10 +9,11 @@ import struct
 import sys
 from pathlib import Path
 
+import can
 import isotp
 import udsoncan
 from udsoncan.client import Client
-from udsoncan.connections import BaseConnection
+from udsoncan.connections import BaseConnection, PythonIsoTpConnection
 from udsoncan.exceptions import NegativeResponseException, TimeoutException
 from udsoncan.services import ControlDTCSetting, DiagnosticSessionControl, ECUReset
 
@@ -94,48 +96,73 @@ def refused(code, call, *arguments, **named):
         raise AssertionError(f"{call} was not refused with {code:02x}")
 
 
-def main():
-    weights = Path(sys.argv[1]).read_bytes()
-    dids = (0xF186, 0xF189, 0xF197, 0x0100, 0x0101, 0x0102, 0x0103, 0x0104, 0x0105, 0x0106, 0x0107)
-    config = dict(udsoncan.configs.default_client_config, data_identifiers={did: Bytes for did in dids},
-                  request_timeout=None, p2_timeout=20, p2_star_timeout=60)
-    pipes = Pipes()
-    with Client(pipes, config=config) as client:
-        for did in dids:
-            value = client.read_data_by_identifier(did).service_data.values[did]
-            print(f"{did:04x} {value.hex()}")
-            assert value
-        refused(0x7F, client.request_download, udsoncan.MemoryLocation(0, 4, 32, 32))
-        troubles = client.get_supported_dtc().service_data.dtcs
-        assert len(troubles) == 13, troubles
-        client.change_session(DiagnosticSessionControl.Session.extendedDiagnosticSession)
-        client.tester_present()
-        client.control_dtc_setting(ControlDTCSetting.SettingType.off)
-        client.control_dtc_setting(ControlDTCSetting.SettingType.on)
-        client.clear_dtc()
-        number = client.get_number_of_dtc_by_status_mask(0x08).service_data.dtc_count
-        print(f"{number} troubles after they were cleared")
-        configuration = client.read_data_by_identifier(0x0100).service_data.values[0x0100]
-        client.write_data_by_identifier(0x0100, configuration)
-        refused(0x13, client.write_data_by_identifier, 0x0100, configuration[:-1])
-        refused(0x31, client.write_data_by_identifier, 0xF186, b"\1")
-        client.start_routine(0x0200)
-        assert client.get_routine_result(0x0200).service_data.routine_status_record == b"\1"
-        client.stop_routine(0x0200)
+DIDS = (0xF186, 0xF189, 0xF197, 0x0100, 0x0101, 0x0102, 0x0103, 0x0104, 0x0105, 0x0106, 0x0107)
+# An emulated or modelled board does not keep real time, so its own time-outs do not count.
+CONFIG = dict(udsoncan.configs.default_client_config, data_identifiers={did: Bytes for did in DIDS}, request_timeout=None,
+              p2_timeout=20, p2_star_timeout=60, use_server_timing=False)
 
-        client.change_session(DiagnosticSessionControl.Session.programmingSession)
-        place = udsoncan.MemoryLocation(0, len(weights), 32, 32)
-        length = client.request_download(place).service_data.max_length - 2
-        for number, start in enumerate(range(0, len(weights), length), 1):
-            client.transfer_data(number & 0xFF, weights[start:start + length])
-        client.request_transfer_exit()
-        client.start_routine(0xFF01)
-        client.ecu_reset(ECUReset.ResetType.hardReset)
-        for _ in range(300):
-            pipes.turn()
-        source, crc = struct.unpack(">BI", client.read_data_by_identifier(0x0103).service_data.values[0x0103])
-        assert (source, crc) == (2, struct.unpack("<I", weights[-4:])[0]), (source, crc)
-        assert not pipes.errors, pipes.errors
+
+def examine(client):
+    """Reads everything, and leaves the board in an extended session."""
+    for did in DIDS:
+        value = client.read_data_by_identifier(did).service_data.values[did]
+        print(f"{did:04x} {value.hex()}")
+        assert value
+    place = udsoncan.MemoryLocation(0, 4, 32, 32)
+    refused(0x7F, client.request_download, place)
+    troubles = client.get_supported_dtc().service_data.dtcs
+    assert len(troubles) == 13, troubles
+    client.change_session(DiagnosticSessionControl.Session.extendedDiagnosticSession)
+    client.tester_present()
+    client.control_dtc_setting(ControlDTCSetting.SettingType.off)
+    client.control_dtc_setting(ControlDTCSetting.SettingType.on)
+    client.clear_dtc()
+    number = client.get_number_of_dtc_by_status_mask(0x08).service_data.dtc_count
+    print(f"{number} troubles after they were cleared")
+    client.start_routine(0x0200)
+    assert client.get_routine_result(0x0200).service_data.routine_status_record == b"\1"
+    client.stop_routine(0x0200)
+    return client.read_data_by_identifier(0x0100).service_data.values[0x0100]
+
+
+def write(client, pipes, weights):
+    """Writes a configuration, and a weight file that then runs."""
+    configuration = examine(client)
+    client.write_data_by_identifier(0x0100, configuration)
+    refused(0x13, client.write_data_by_identifier, 0x0100, configuration[:-1])
+    refused(0x31, client.write_data_by_identifier, 0xF186, b"\1")
+    client.change_session(DiagnosticSessionControl.Session.programmingSession)
+    place = udsoncan.MemoryLocation(0, len(weights), 32, 32)
+    length = client.request_download(place).service_data.max_length - 2
+    for number, start in enumerate(range(0, len(weights), length), 1):
+        client.transfer_data(number & 0xFF, weights[start:start + length])
+    client.request_transfer_exit()
+    client.start_routine(0xFF01)
+    client.ecu_reset(ECUReset.ResetType.hardReset)
+    for _ in range(300):
+        pipes.turn()
+    source, crc = struct.unpack(">BI", client.read_data_by_identifier(0x0103).service_data.values[0x0103])
+    assert (source, crc) == (2, struct.unpack("<I", weights[-4:])[0]), (source, crc)
+    assert not pipes.errors, pipes.errors
+
+
+def main():
+    line, name = sys.argv[1:]
+    if line == "pipes":
+        pipes = Pipes()
+        with Client(pipes, config=CONFIG) as client:
+            write(client, pipes, Path(name).read_bytes())
+    else:
+        bus = can.Bus(interface="slcan", channel=name, bitrate=500_000)
+        notifier = can.Notifier(bus, [])
+        address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=SERVER, rxid=RESPONSE)
+        stack = isotp.NotifierBasedCanStack(bus=bus, notifier=notifier, address=address, params={"tx_padding": 0xAA})
+        with Client(PythonIsoTpConnection(stack), config=CONFIG) as client:
+            configuration = examine(client)
+            # The emulator has no flash controller.
+            refused(0x22, client.write_data_by_identifier, 0x0100, configuration)
+        notifier.stop()
+        bus.shutdown()
     print("done")
 
 

@@ -15,3 +15,4 @@ mod monitor;
 mod python_clients;
 mod small_cores;
 mod target_counts;
+mod uds_slcan;
