@@ -5,6 +5,8 @@ use crate::health::{Faults, Status};
 /// What the faults are read from.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Conditions {
+    /// 10 ms steps of the sensor's time since the start.
+    pub tick: u32,
     /// Status of the yaw rate.
     pub status: Status,
     /// Its fault bits.

@@ -21,7 +21,7 @@ use crate::can::wheel::WheelSettings;
 use crate::health::{Faults, Status, count};
 use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
-use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Store};
+use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Store, Troubles};
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
 
@@ -57,6 +57,7 @@ pub struct Device<R: NorFlash, W> {
     calibrator: Option<Calibrator>,
     calibration_state: State,
     accepted: Accepted,
+    troubles: Troubles,
     weights: WeightSource,
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
@@ -94,6 +95,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             calibrator: None,
             calibration_state: State::Idle,
             accepted: Accepted::NONE,
+            troubles: Troubles::NONE,
             weights: WeightSource::None,
             weights_crc: None,
             refused_slots: [None; 2],
@@ -289,6 +291,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             no_weights: self.weights == WeightSource::None,
             sensor_refused: self.sensor.is_some(),
             clock_fault: self.identity.clock_fault.is_some(),
+            tick: self.tick,
             can_fault: self.identity.can_fault.is_some(),
             crashed: self.identity.crash.is_some(),
         }

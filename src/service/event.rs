@@ -95,6 +95,8 @@ pub enum EventKind {
     RecordsDamaged,
     /// The part on SPI was set up; or why not: it is tried again every second.
     Sensor(Option<SensorFault>),
+    /// The memory of troubles could not be read or stored.
+    TroublesRefused(StoreError),
 }
 
 /// Something that happened.

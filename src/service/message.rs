@@ -11,7 +11,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// The version of the messages; it is raised when one changes.
-pub const PROTOCOL: u8 = 7;
+pub const PROTOCOL: u8 = 8;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 

@@ -103,6 +103,7 @@ impl Display for EventKind {
             Self::WeightsDamaged => f.write_str("weights in use damaged: the network is off"),
             Self::RecordsDamaged => f.write_str("stored records damaged: older or built-in ones are used"),
             Self::Sensor(None) => f.write_str("sensor set up"),
+            Self::TroublesRefused(error) => write!(f, "memory of troubles not read or stored: {error}"),
             Self::Sensor(Some(fault)) => write!(f, "sensor not set up: {fault}"),
         }
     }

@@ -192,6 +192,13 @@ impl<F: NorFlash> Store<F> {
         self.write(&raw)
     }
 
+    /// Returns whether the next record of any length fits without an erase.
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        let end = self.current.map(|(sector, _)| self.range(sector).end);
+        self.free.zip(end).is_some_and(|(at, end)| at + BUFFER as u32 <= end)
+    }
+
     /// Writes an encoded record. It is separate from [`Store::set`], which is compiled once for each kind of record.
     #[inline(never)]
     fn write(&mut self, raw: &Raw) -> Result<(), StoreError> {

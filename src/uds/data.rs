@@ -13,6 +13,7 @@
 //! | 0105 | 4 each | counters of the pipeline, in the order of [`crate::health::Counters`] | |
 //! | 0106 | 4 each | counters of the sensor's monitor, of the inputs and of the lines, in the order of their types | |
 //! | 0107 | 4 each | conversations of diagnosis that went wrong, in the order of [`TransportErrors`] | |
+//! | 0108 | 4 | 10 ms steps of the sensor's time since the start | |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
 
@@ -80,6 +81,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             let TransportErrors { unexpected, sequence, overflow, timeout } = *errors;
             put_words(out, &[unexpected, sequence, overflow, timeout])
         }
+        0x0108 => put(out, &device.conditions().tick.to_be_bytes()),
         _ => Err(Nrc::RequestOutOfRange),
     }
 }

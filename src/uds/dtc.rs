@@ -1,10 +1,11 @@
 //! The trouble memory holds what was found to be wrong, as a workshop reads it (ISO 14229-1 D.2).
 //!
 //! A fault is confirmed at once, because the pipeline has already waited as long as each needs; it stays in the memory
-//! until a tester clears it, so that one that comes and goes is found, too.
+//! until a tester clears it, also over a restart, so that one that comes and goes is found, too.
 
 use crate::health::{Faults, Status};
 use crate::service::Conditions;
+use crate::store::{MOST_TROUBLES, Snapshot, StoredTrouble, Troubles};
 
 /// Bits of a trouble's status.
 pub mod bit {
@@ -12,7 +13,7 @@ pub mod bit {
     pub const FAILED: u8 = 1;
     /// It was present since the start.
     pub const FAILED_THIS_CYCLE: u8 = 1 << 1;
-    /// It was present in this operation cycle or the last one.
+    /// It was present since the start, which is when an operation cycle begins.
     pub const PENDING: u8 = 1 << 2;
     /// It is in the memory.
     pub const CONFIRMED: u8 = 1 << 3;
@@ -84,6 +85,8 @@ pub static TROUBLES: [Trouble; 13] = [
     trouble(0xDA02, 0x87, "wheels: silent, or they contradict the gyro", Cause::Fault(Faults::WHEELS)),
 ];
 
+const _: () = assert!(TROUBLES.len() <= MOST_TROUBLES, "a record has room for all");
+
 /// Makes a trouble of a code (0x5A01 is C1A01, 0xDA01 is U1A01) and a failure type.
 const fn trouble(code: u16, failure: u8, name: &'static str, cause: Cause) -> Trouble {
     Trouble { code: (code as u32) << 8 | failure as u32, name, cause }
@@ -96,10 +99,21 @@ pub struct Entry {
     pub status: u8,
     /// Times that it came, since the memory was cleared.
     pub occurrences: u8,
+    /// The state of the board when it came first.
+    pub snapshot: Snapshot,
 }
 
-const UNTESTED: Entry =
-    Entry { status: bit::UNTESTED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE, occurrences: 0 };
+const UNTESTED: Entry = Entry {
+    status: bit::UNTESTED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE,
+    occurrences: 0,
+    snapshot: Snapshot { tick: 0, status: 0, faults: 0 },
+};
+
+impl From<&Conditions> for Snapshot {
+    fn from(now: &Conditions) -> Self {
+        Self { tick: now.tick, status: now.status as u8, faults: now.faults.0 }
+    }
+}
 
 /// Holds an entry for each of [`TROUBLES`].
 #[derive(Debug)]
@@ -107,13 +121,15 @@ pub struct Memory {
     entries: [Entry; TROUBLES.len()],
     /// A tester may stop the memory while it works on the vehicle.
     pub is_enabled: bool,
+    /// The confirmed troubles differ from those that are stored.
+    pub is_changed: bool,
 }
 
 impl Memory {
     /// Makes an empty memory.
     #[must_use]
     pub const fn new() -> Self {
-        Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true }
+        Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false }
     }
 
     /// Notes what is present now.
@@ -127,6 +143,10 @@ impl Memory {
             let is_present = trouble.cause.is_present(now);
             if is_present && !was_present {
                 entry.occurrences = entry.occurrences.saturating_add(1);
+                if entry.status & bit::CONFIRMED == 0 {
+                    entry.snapshot = now.into();
+                    self.is_changed = true;
+                }
                 entry.status |= bit::FAILED
                     | bit::FAILED_THIS_CYCLE
                     | bit::PENDING
@@ -143,11 +163,35 @@ impl Memory {
         let mut found = false;
         for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
             if code == 0xFF_FFFF || code == trouble.code {
+                self.is_changed |= entry.status & bit::CONFIRMED != 0;
                 *entry = UNTESTED;
                 found = true;
             }
         }
         found
+    }
+
+    /// Takes over what was stored before the start; a code that this firmware does not have is left out.
+    pub fn restore(&mut self, stored: &Troubles) {
+        for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
+            let found = stored.confirmed.iter().find(|stored| stored.code == trouble.code);
+            if let Some(StoredTrouble { occurrences, snapshot, .. }) = found {
+                entry.status = bit::CONFIRMED | bit::FAILED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE;
+                (entry.occurrences, entry.snapshot) = (*occurrences, *snapshot);
+            }
+        }
+    }
+
+    /// Returns what is to be stored.
+    #[must_use]
+    pub fn confirmed(&self) -> Troubles {
+        let mut troubles = Troubles::NONE;
+        for (trouble, entry) in self.entries().filter(|(_, entry)| entry.status & bit::CONFIRMED != 0) {
+            let Entry { occurrences, snapshot, .. } = *entry;
+            // There is room for all.
+            let _ = troubles.confirmed.push(StoredTrouble { code: trouble.code, occurrences, snapshot });
+        }
+        troubles
     }
 
     /// Returns each trouble with its entry.

@@ -60,6 +60,7 @@ impl Server {
             heard: 0,
             is_functional: false,
             memory: Memory::new(),
+            is_restored: false,
             download: None,
         };
         Self { transport: Transport::new(), services, is_pending: false }
@@ -101,7 +102,7 @@ impl Server {
     ) {
         self.transport.expire(now);
         let services = &mut self.services;
-        services.memory.observe(&device.conditions());
+        services.remember(device);
         services.expire(now);
         if let Some(request) = self.transport.request()
             && !self.is_pending
@@ -139,6 +140,8 @@ struct Services {
     /// The request came for all servers.
     is_functional: bool,
     memory: Memory,
+    /// The memory has taken over what was stored before the start.
+    is_restored: bool,
     download: Option<Download>,
 }
 
@@ -153,6 +156,18 @@ impl Services {
     fn hear(&mut self, now: u32) {
         self.expire(now);
         self.heard = now;
+    }
+
+    /// Notes present faults, and stores those that are new.
+    fn remember<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) {
+        if !core::mem::replace(&mut self.is_restored, true) {
+            self.memory.restore(device.troubles());
+        }
+        self.memory.observe(&device.conditions());
+        if self.memory.is_changed {
+            let in_workshop = self.session != Session::Default;
+            self.memory.is_changed = !device.store_troubles(&self.memory.confirmed(), in_workshop);
+        }
     }
 
     fn enter(&mut self, session: Session) {
@@ -349,6 +364,20 @@ impl Services {
                     put(out, &[entry.status])?;
                 }
                 Ok(())
+            }
+            Some(DtcSubFunction::ReportDtcSnapshotRecordByDtcNumber) => {
+                let [a, b, c, record] = exactly(rest)?;
+                let wanted = u32::from_be_bytes([0, a, b, c]);
+                let known = self.memory.entries().find(|(trouble, _)| trouble.code == wanted);
+                let (_, entry) =
+                    known.filter(|_| matches!(record, 1 | 0xFF)).ok_or(Nrc::RequestOutOfRange)?;
+                put(out, &[a, b, c, entry.status])?;
+                if entry.status & bit::CONFIRMED == 0 {
+                    return Ok(());
+                }
+                // One record of two data identifiers.
+                put(out, &[1, 2, 0x01, 0x04, entry.snapshot.status, entry.snapshot.faults, 0x01, 0x08])?;
+                put(out, &entry.snapshot.tick.to_be_bytes())
             }
             Some(DtcSubFunction::ReportDtcExtendedDataRecordByDtcNumber) => {
                 let [a, b, c, record] = exactly(rest)?;

@@ -105,6 +105,14 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
     let silent = [0x5A, 0x01, 0x31];
     let listed = ask(&mut board, &[0x19, 2, 1]).expect("troubles");
     assert!(listed[3..].chunks(4).any(|trouble| trouble[..3] == silent), "{listed:02x?}");
+    // It outlives a restart: on a new board the record wants an erase, which waits for a session.
+    assert_eq!(ask(&mut board, &[0x10, 3]), Some(vec![0x50, 3, 0, 50, 0x01, 0xF4]));
+    board.run(Duration::from_secs(2));
+    assert_eq!(ask(&mut board, &[0x11, 1]), Some(vec![0x51, 1]));
+    board.run(START);
+    let state = ask(&mut board, &[&[0x19, 4][..], &silent, &[1]].concat()).expect("the state when it came");
+    assert_eq!(state.len(), 18, "{state:02x?}");
+    assert_eq!(state[5] & 8, 8, "{state:02x?}");
 }
 
 /// Relays frames between the client's pipes and the board, a millisecond of the board's time for each turn.

@@ -96,7 +96,7 @@ def refused(code, call, *arguments, **named):
         raise AssertionError(f"{call} was not refused with {code:02x}")
 
 
-DIDS = (0xF186, 0xF189, 0xF197, 0x0100, 0x0101, 0x0102, 0x0103, 0x0104, 0x0105, 0x0106, 0x0107)
+DIDS = (0xF186, 0xF189, 0xF197, 0x0100, 0x0101, 0x0102, 0x0103, 0x0104, 0x0105, 0x0106, 0x0107, 0x0108)
 # An emulated or modelled board does not keep real time, so its own time-outs do not count.
 CONFIG = dict(udsoncan.configs.default_client_config, data_identifiers={did: Bytes for did in DIDS}, request_timeout=None,
               p2_timeout=20, p2_star_timeout=60, use_server_timing=False)

@@ -4,7 +4,9 @@ use super::{Device, MappedSlots, SupportedHardware};
 use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
-use crate::store::{Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError, UnitMap};
+use crate::store::{
+    Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError, Troubles, UnitMap,
+};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
@@ -63,6 +65,10 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
         let (accepted, _) = self.take(store.get(), EventKind::AcceptedRefused);
         self.accepted = accepted.unwrap_or(Accepted::NONE);
+        match store.get() {
+            Ok(troubles) => self.troubles = troubles.unwrap_or(Troubles::NONE),
+            Err(error) => self.note(EventKind::TroublesRefused(error)),
+        }
         self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
         self.store = self.writable.then_some(store);
     }
@@ -148,5 +154,26 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.calibration_origin = Origin::Stored;
         self.note(EventKind::CalibrationStored);
         Ok(())
+    }
+
+    /// Returns the troubles as they were stored last.
+    pub(crate) fn troubles(&self) -> &Troubles {
+        &self.troubles
+    }
+
+    /// Stores the troubles, which needs an erase now and then: that waits for `may_erase` and standstill. Returns
+    /// whether they are stored, or cannot be.
+    #[inline(never)]
+    pub(crate) fn store_troubles(&mut self, troubles: &Troubles, may_erase: bool) -> bool {
+        let may_erase = may_erase && self.standstill.is_open();
+        let Some(store) = self.store.as_mut() else { return true };
+        if !store.has_room() && !may_erase {
+            return false;
+        }
+        // One that the flash refuses is not tried again and again.
+        if let Err(error) = store.set(troubles) {
+            self.note(EventKind::TroublesRefused(error));
+        }
+        true
     }
 }

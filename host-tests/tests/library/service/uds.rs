@@ -179,6 +179,46 @@ fn a_trouble_is_kept_when_its_cause_is_over_and_until_it_is_cleared() {
 }
 
 #[test]
+fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
+    let (flash, mut bench) = bench();
+    // Something has been stored before: there is room without an erase.
+    assert_eq!(super::ask(&mut bench.board, &set(Configuration::DEFAULT)), Reply::Done);
+    bench.board.observe(None, 1_234, (Status::Silent, Faults::GAP), Standstill::Unknown);
+    let operations = flash.borrow().operations();
+    bench.server.turn(&mut bench.board, &AllCounters::default(), 0);
+    assert!(flash.borrow().operations() > operations);
+    // It is stored once, whatever it does afterwards.
+    let operations = flash.borrow().operations();
+    for _ in 0..10 {
+        bench.fail(Status::Ready, Faults::NONE);
+        bench.fail(Status::Silent, Faults::GAP);
+    }
+    assert_eq!(flash.borrow().operations(), operations);
+    let mut after = Bench::new(&flash);
+    let snapshot = [1, 2, 1, 4, Status::Silent as u8, Faults::GAP.0, 1, 8, 0, 0, 0x04, 0xD2];
+    let response = [&[0x59, 4, 0x5A, 0x01, 0x31, 0x28][..], &snapshot].concat();
+    after.fail(Status::Ready, Faults::NONE);
+    after.expect(&[0x19, 4, 0x5A, 0x01, 0x31, 1], &response);
+    after.expect(&[0x14, 0xFF, 0xFF, 0xFF], &[0x54]);
+    after.fail(Status::Ready, Faults::NONE);
+    let mut cleared = Bench::new(&flash);
+    cleared.expect(&[0x19, 4, 0x5A, 0x01, 0x31, 1], &[0x59, 4, 0x5A, 0x01, 0x31, 0]);
+}
+
+#[test]
+fn a_trouble_erases_nothing_before_a_tester_s_session_at_standstill() {
+    let (flash, mut bench) = bench();
+    bench.fail(Status::Silent, Faults::NONE);
+    assert_eq!(flash.borrow().operations(), 0, "the flash of a new board has no room without an erase");
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    bench.fail(Status::Silent, Faults::NONE);
+    assert!(flash.borrow().operations() > 0);
+    let mut after = Bench::new(&flash);
+    after.expect(&[0x19, 6, 0x5A, 0x01, 0x31, 1], &[0x59, 6, 0x5A, 0x01, 0x31, 0x28, 1, 1]);
+}
+
+#[test]
 fn each_trouble_has_a_code_of_its_own_and_one_condition() {
     for (k, trouble) in TROUBLES.iter().enumerate() {
         assert!(trouble.code < 0xFF_FFFF && !trouble.name.is_empty());
