@@ -10,6 +10,7 @@
 //! | 0x11 | any | restart (1, 3), at standstill |
 //! | 0x14, 0x19 | any | troubles: clear; count (01), list (02, 0A), state when it came (04), occurrences (06) |
 //! | 0x22 | any | [data by identifier](data) |
+//! | 0x28 | 2, 3 | stop (1) and continue (0) the messages of the board, at standstill |
 //! | 0x2E | 2, 3 | the same, where they can be written, at standstill |
 //! | 0x31 | 2, 3 | 0200 static, 0201 mounting calibration; 0202 stores it; FF01 (session 2) uses the download |
 //! | 0x34, 0x36, 0x37 | 2 | download of a weight file to address 0 |

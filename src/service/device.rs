@@ -230,8 +230,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Executes a request.
     #[inline(never)]
     pub(crate) fn act(&mut self, request: &Request) -> Result<(), Refusal> {
-        // A board without a flash controller is emulated: nothing can be written, and nothing depends on it.
-        if self.writable && request.interrupts() && !self.standstill.is_open() {
+        if request.interrupts() && !self.may_interrupt() {
             return Err(Refusal::Moving);
         }
         match request {
@@ -255,6 +254,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             | Request::Log { .. }
             | Request::Counters => Ok(()),
         }
+    }
+
+    /// Returns whether the output may be interrupted: the vehicle is proven to stand. A board without a flash
+    /// controller is emulated, and nothing depends on it.
+    pub(crate) fn may_interrupt(&self) -> bool {
+        !self.writable || self.standstill.is_open()
     }
 
     fn refuse(&mut self, kind: EventKind) {

@@ -61,6 +61,7 @@ impl Server {
             is_functional: false,
             memory: Memory::new(),
             is_restored: false,
+            is_silenced: false,
             download: None,
         };
         Self { transport: Transport::new(), services, is_pending: false }
@@ -91,6 +92,12 @@ impl Server {
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.transport.is_idle()
+    }
+
+    /// Returns whether a tester has stopped the messages of the board.
+    #[must_use]
+    pub fn is_silenced(&self) -> bool {
+        self.services.is_silenced
     }
 
     /// Notes present faults, ends what has timed out, and answers a request.
@@ -142,6 +149,8 @@ struct Services {
     memory: Memory,
     /// The memory has taken over what was stored before the start.
     is_restored: bool,
+    /// The messages of the board are stopped.
+    is_silenced: bool,
     download: Option<Download>,
 }
 
@@ -175,6 +184,7 @@ impl Services {
         self.download = None;
         if session == Session::Default {
             self.memory.is_enabled = true;
+            self.is_silenced = false;
         }
     }
 
@@ -261,6 +271,25 @@ impl Services {
                     return Err(Nrc::SubFunctionNotSupported);
                 }
                 put(out, &[0])?;
+                Ok(sub & SUPPRESS == 0)
+            }
+            UdsCommand::CommunicationControl => {
+                self.needs(Session::Extended)?;
+                let [sub, what] = exactly(rest)?;
+                let is_silenced = match sub & !SUPPRESS {
+                    0 => false,
+                    1 => true,
+                    _ => return Err(Nrc::SubFunctionNotSupported),
+                };
+                // Normal messages, or they and those of a network management that this board has not got.
+                if !matches!(what, 1 | 3) {
+                    return Err(Nrc::RequestOutOfRange);
+                }
+                if is_silenced && !device.may_interrupt() {
+                    return Err(Nrc::ConditionsNotCorrect);
+                }
+                self.is_silenced = is_silenced;
+                put(out, &[sub & !SUPPRESS])?;
                 Ok(sub & SUPPRESS == 0)
             }
             UdsCommand::ControlDTCSetting => {

@@ -8,6 +8,7 @@ use crate::pause;
 use crate::regions::{Records, Slots};
 use crate::ring::Ring;
 use crate::stm32f405::timer;
+use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::peripheral::SCB;
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
@@ -34,6 +35,14 @@ pub static FROM_SLCAN: Ring<DataFrame, 16> =
 pub static RESPONSES: Ring<(Line, DataFrame), 16> =
     // SAFETY: idle writes, the output task reads.
     unsafe { Ring::new() };
+
+/// A tester has stopped the messages of the board.
+static SILENCED: AtomicBool = AtomicBool::new(false);
+
+/// Returns whether a tester has stopped the messages of the board.
+pub fn is_silenced() -> bool {
+    SILENCED.load(Ordering::Relaxed)
+}
 
 /// Serves one tester at a time, on either line.
 pub struct Diagnosis {
@@ -63,6 +72,7 @@ impl Diagnosis {
             }
         }
         self.server.turn(device, counters, now);
+        SILENCED.store(self.server.is_silenced(), Ordering::Relaxed);
         while !RESPONSES.is_full()
             && let Some(data) = self.server.next_frame(now)
         {

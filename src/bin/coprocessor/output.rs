@@ -2,7 +2,7 @@
 
 use crate::board::SUPERVISOR;
 use crate::boards::BOARD;
-use crate::diagnosis::FROM_SLCAN;
+use crate::diagnosis::{self, FROM_SLCAN};
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{Imu, TURN};
 use crate::outgoing::Outgoing;
@@ -168,7 +168,9 @@ impl Output {
 
     fn queue(&mut self, coprocessor: &mut Coprocessor) {
         while let Some(sent) = coprocessor.next_frame() {
-            self.outgoing.push(sent.frame, sent.time);
+            if !diagnosis::is_silenced() {
+                self.outgoing.push(sent.frame, sent.time);
+            }
         }
     }
 

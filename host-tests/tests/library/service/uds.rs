@@ -98,6 +98,7 @@ fn what_is_wrong_with_a_request_has_the_standard_s_code() {
         (&[0x22, 0xF1], 0x13),
         (&[0x22, 0x12, 0x34], 0x31),
         (&[0x23, 1], 0x11),
+        (&[0x28, 1, 1], 0x7F),
         (&[0x2E, 1, 0, 0], 0x7F),
         (&[0x31, 1, 2, 0], 0x7F),
         (&[0x34, 0, 0x11, 0, 4], 0x7F),
@@ -111,7 +112,10 @@ fn what_is_wrong_with_a_request_has_the_standard_s_code() {
     }
     bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
     for (request, code) in [
-        (&[0x2E, 0xF1, 0x86, 1][..], 0x31),
+        (&[0x28, 2, 1][..], 0x12),
+        (&[0x28, 1, 2], 0x31),
+        (&[0x28, 1], 0x13),
+        (&[0x2E, 0xF1, 0x86, 1], 0x31),
         (&[0x2E, 1, 0], 0x13),
         (&[0x2E, 1, 0, 99, 0], 0x31),
         (&[0x31, 1, 9, 9], 0x31),
@@ -224,6 +228,25 @@ fn each_trouble_has_a_code_of_its_own_and_one_condition() {
         assert!(trouble.code < 0xFF_FFFF && !trouble.name.is_empty());
         assert!(TROUBLES[..k].iter().all(|other| other.code != trouble.code), "{:06x}", trouble.code);
     }
+}
+
+#[test]
+fn messages_are_stopped_at_standstill_and_for_the_length_of_a_session() {
+    let (_, mut bench) = bench();
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
+    bench.board.observe(Some(&turning), 0, (Status::Ready, Faults::NONE), Standstill::Moving);
+    bench.expect(&[0x28, 1, 1], &[0x7F, 0x28, 0x22]);
+    assert!(!bench.server.is_silenced());
+    bench.stand();
+    bench.expect(&[0x28, 1, 1], &[0x68, 1]);
+    assert!(bench.server.is_silenced());
+    bench.expect(&[0x28, 0, 1], &[0x68, 0]);
+    assert!(!bench.server.is_silenced());
+    bench.expect(&[0x28, 1, 3], &[0x68, 1]);
+    bench.now += 5_001;
+    bench.fail(Status::Ready, Faults::NONE);
+    assert!(!bench.server.is_silenced(), "the session has ended");
 }
 
 #[test]
