@@ -3,6 +3,7 @@
 pub mod bosch;
 mod carry;
 pub mod config;
+pub mod diagnosis;
 #[doc(hidden)]
 pub mod e2e;
 #[doc(hidden)]

@@ -1,7 +1,7 @@
 //! UDS (ISO 14229) over ISO-TP (ISO 15765-2): the diagnosis that a workshop's tools speak.
 //!
-//! [`Server`] takes the data of frames to its identifier (0x7E0 unless configured) or to all (0x7DF) and has frames to
-//! send (0x7E8); what it reads and writes is the [`crate::service::Device`]. A tester of the shelf works: udsoncan and
+//! [`Server`] takes the data of frames to its identifier or to all and has frames to send
+//! ([`crate::can::diagnosis`]); what it reads and writes is the [`crate::service::Device`]. A tester of the shelf works: udsoncan and
 //! can-isotp do so in the tests.
 //!
 //! | service | session | what |
@@ -26,45 +26,3 @@ mod server;
 
 pub use response::Nrc;
 pub use server::{Server, Session};
-
-use embedded_can::{Id, StandardId};
-
-/// Identifier of requests to this server.
-pub const REQUEST: u16 = 0x7E0;
-/// Identifier of requests to all servers.
-pub const FUNCTIONAL: u16 = 0x7DF;
-/// Identifier of this server's frames.
-pub const RESPONSE: u16 = 0x7E8;
-
-/// The servers that a request is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Target {
-    /// This one.
-    Server,
-    /// All on the bus.
-    All,
-}
-
-/// Returns whom a frame is for; `None` where it is no request.
-#[must_use]
-pub fn target(id: Id) -> Option<Target> {
-    match id {
-        Id::Standard(id) if id.as_raw() == REQUEST => Some(Target::Server),
-        Id::Standard(id) if id.as_raw() == FUNCTIONAL => Some(Target::All),
-        Id::Standard(_) | Id::Extended(_) => None,
-    }
-}
-
-/// Returns the identifiers of requests.
-pub fn request_ids() -> impl Iterator<Item = Id> {
-    [REQUEST, FUNCTIONAL].into_iter().filter_map(StandardId::new).map(Id::Standard)
-}
-
-/// Returns the identifier of this server's frames.
-#[must_use]
-pub const fn response_id() -> StandardId {
-    match StandardId::new(RESPONSE) {
-        Some(id) => id,
-        None => StandardId::MAX,
-    }
-}

@@ -6,6 +6,7 @@ use super::record::Record;
 use super::{Calibration, Level};
 use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
+use crate::can::diagnosis::DiagnosisIds;
 use crate::can::latitude::{LatitudeConfigError, LatitudeReceiver, LatitudeSettings};
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
@@ -95,6 +96,11 @@ pub struct Configuration {
     pub fog_ids: [u16; 3],
     /// The correction of the fibre-optic gyro.
     pub fog_lane: FogLane,
+    /// Wheel and latitude frames that a host sends over SLCAN are used, for a bench without a bus. On a vehicle they
+    /// would let whoever reaches that line move the rate.
+    pub slcan_inputs: bool,
+    /// Identifiers of diagnosis.
+    pub diagnosis: DiagnosisIds,
 }
 
 impl Configuration {
@@ -109,6 +115,8 @@ impl Configuration {
         compensate: CompensateConfig::DEFAULT,
         fog_ids: FOG_IDS,
         fog_lane: FogLane { tilt_deg: 0.0, fognet: FogNetUse::Off, latitude_frame: None },
+        slcan_inputs: false,
+        diagnosis: DiagnosisIds::DEFAULT,
     };
 }
 
@@ -187,15 +195,17 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 3;
+    const VERSION: u8 = 4;
 
     /// Returns the bytes that older layouts lack at their end: 1 ended before `fog_ids`, which were [`FOG_IDS`], here
-    /// as varints; 2 ended before `fog_lane`.
+    /// as varints; 2 ended before `fog_lane`, 3 before `slcan_inputs`.
     fn missing(version: u8) -> Option<&'static [u8]> {
-        const ALL: &[u8] = &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0];
+        const ALL: &[u8] =
+            &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0xE0, 0x0F, 0xDF, 0x0F, 0xE8, 0x0F];
         match version {
             1 => Some(ALL),
             2 => ALL.get(6..),
+            3 => ALL.get(12..),
             _ => None,
         }
     }
@@ -208,6 +218,11 @@ impl Record for Configuration {
         {
             let id = self.fog_lane.latitude_frame.map_or(0, |frame| frame.id);
             return Err(FieldError::Latitude(LatitudeConfigError::Own(id)));
+        }
+        let ids = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;
+        let latitude_id = self.fog_lane.latitude_frame.map_or(u32::MAX, |frame| frame.id);
+        if self.own_identifier(ids.into_iter()).is_some() || latitude_id == self.diagnosis.request {
+            return Err(FieldError::Diagnosis(self.diagnosis.request));
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;

@@ -95,6 +95,9 @@ pub enum FieldError {
     /// This firmware image does not drive the bus at this rate, bit/s.
     #[error("can.bits_per_second: this firmware image does not drive the bus at {0} bit/s")]
     BitRateNotInImage(u32),
+    /// An identifier of diagnosis has too many bits, or is used twice.
+    #[error("diagnosis: identifier {0:#x} has too many bits, or is used twice")]
+    Diagnosis(u32),
 }
 
 /// Checks that a value is inside its range.

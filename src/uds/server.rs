@@ -62,6 +62,7 @@ impl Server {
             memory: Memory::new(),
             is_restored: false,
             is_silenced: false,
+            is_restarting: false,
             download: None,
         };
         Self { transport: Transport::new(), services, is_pending: false }
@@ -98,6 +99,12 @@ impl Server {
     #[must_use]
     pub fn is_silenced(&self) -> bool {
         self.services.is_silenced
+    }
+
+    /// Returns whether a tester has asked for a restart and has its response.
+    #[must_use]
+    pub fn restart_is_due(&self) -> bool {
+        self.services.is_restarting && self.is_idle()
     }
 
     /// Notes present faults, ends what has timed out, and answers a request.
@@ -151,6 +158,8 @@ struct Services {
     is_restored: bool,
     /// The messages of the board are stopped.
     is_silenced: bool,
+    /// A tester has asked for a restart.
+    is_restarting: bool,
     download: Option<Download>,
 }
 
@@ -262,6 +271,7 @@ impl Services {
                     return Err(Nrc::SubFunctionNotSupported);
                 }
                 device.act(&Request::Restart).map_err(nrc)?;
+                self.is_restarting = true;
                 put(out, &[sub & !SUPPRESS])?;
                 Ok(sub & SUPPRESS == 0)
             }

@@ -4,7 +4,9 @@
 use crate::common::{self, START, drive};
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
+use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::model::weights;
+use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
@@ -126,14 +128,44 @@ fn a_tester_stops_the_messages_until_it_is_gone() {
     assert_eq!(ask(&mut board, &[0x10, 3]), Some(vec![0x50, 3, 0, 50, 0x01, 0xF4]));
     assert_eq!(ask(&mut board, &[0x28, 1, 1]), Some(vec![0x68, 1]));
     board.run(Duration::from_millis(20));
-    board.can_frames();
+    let _ = board.can_frames();
     board.run(Duration::from_secs(1));
     assert_eq!(board.can_frames().len(), 0);
     // The session ends by itself.
     board.run(Duration::from_millis(4_500));
-    board.can_frames();
+    let _ = board.can_frames();
     board.run(Duration::from_millis(200));
     assert!(board.can_frames().len() >= 6 * 19);
+}
+
+#[test]
+fn diagnosis_with_29_bits_is_configured_over_itself() {
+    const TEST: &str = "diagnosis_with_29_bits_is_configured_over_itself";
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let ids =
+        DiagnosisIds { extended: true, request: 0x18DA_10F1, functional: 0x18DB_33F1, response: 0x18DA_F110 };
+    let configuration = Configuration { diagnosis: ids, ..Configuration::DEFAULT };
+    let record = postcard::to_stdvec(&configuration).expect("it fits");
+    assert_eq!(ask(&mut board, &[0x10, 3]), Some(vec![0x50, 3, 0, 50, 0x01, 0xF4]));
+    let write = [&[0x2E, 1, 0, Configuration::VERSION][..], &record].concat();
+    assert_eq!(ask(&mut board, &write), Some(vec![0x6E, 1, 0]));
+    assert_eq!(ask(&mut board, &[0x11, 1]), Some(vec![0x51, 1]));
+    board.run(START);
+    assert_eq!(Tester::default().ask(&[0x3E, 0], 100, |frames| exchange(&mut board, frames)), None);
+    let [request, functional, response] = ids.ids().expect("they are valid");
+    for (id, answer) in [(request, Some(vec![0x7E, 0])), (functional, Some(vec![0x7E, 0])), (response, None)]
+    {
+        let heard = Tester::default().ask(&[0x3E, 0], 100, |frames| {
+            let frame = |data: &[u8; 8]| DataFrame::new(id, data).expect("eight bytes");
+            frames.iter().for_each(|data| board.can_send(&frame(data)));
+            board.run(TURN);
+            let sent = common::frames(&board.can_frames());
+            let ours = sent.iter().filter(|frame| frame.id() == response);
+            ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
+        });
+        assert_eq!(heard, answer, "{id:?}");
+    }
 }
 
 /// Relays frames between the client's pipes and the board, a millisecond of the board's time for each turn.

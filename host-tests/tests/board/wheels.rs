@@ -2,11 +2,12 @@
 
 use crate::common::{self, SAMPLE, START, drive, frames};
 use crate::service::ask;
-use embedded_can::{ExtendedId, Frame, Id};
-use gyronet::can::DataFrame;
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::yaw::AngleMessage;
+use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
 use gyronet::service::{Reply, Request};
+use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::Board;
 use gyronet_tools::wheels::{WheelFile, from_dbc};
 
@@ -96,4 +97,29 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
     let without = silent.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
     assert!(without > 10, "{without} of {} sets report the wheels", silent.len());
     assert_eq!(common::counters(&mut board).inputs.wheel_errors, 60);
+}
+
+/// The frames are damaged: one that is taken is counted.
+#[test]
+fn wheel_frames_over_slcan_are_used_on_a_bench_alone() {
+    const TEST: &str = "wheel_frames_over_slcan_are_used_on_a_bench_alone";
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let damaged =
+        DataFrame::new(Id::Standard(StandardId::new(0xAA).expect("11 bits")), &[1; 7]).expect("a frame");
+    let refused = |board: &mut Board| {
+        board.send(common::SLCAN, b"O\r");
+        for _ in 0..3 {
+            board.send(common::SLCAN, &slcan::emit(&damaged).expect("a data frame"));
+            board.run(SAMPLE);
+        }
+        common::counters(board).inputs.wheel_errors
+    };
+    assert_eq!(refused(&mut board), 0);
+    let bench = Configuration { slcan_inputs: true, ..Configuration::DEFAULT };
+    let set = Request::SetConfiguration { version: Configuration::VERSION, configuration: bench };
+    assert_eq!(ask(&mut board, &set), Ok(Reply::Done));
+    assert_eq!(ask(&mut board, &Request::Restart), Ok(Reply::Done));
+    board.run(START);
+    assert_eq!(refused(&mut board), 3);
 }

@@ -11,7 +11,8 @@ use gyronet::sample::RATE_HZ;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
-    Accepted, Calibration, Configuration, Field, FieldError, Level, Mounting, Record, Slot, Store, StoreError,
+    Accepted, Calibration, Configuration, Field, FieldError, FogLane, Level, Mounting, Record, Slot, Store,
+    StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, Duration, WheelSpeed};
 use gyronet_host_tests::flash::{F405, Region};
@@ -194,7 +195,7 @@ fn another_layout_is_named() {
     let flash = Flash::default();
     let mut store = open(&flash);
     store.set(&Later { value: 7 }).expect("it is stored");
-    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 4, expected: 3 }));
+    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 5, expected: 4 }));
     store.set(&Alien { value: [200; 3] }).expect("it is stored");
     assert_eq!(store.get::<Configuration>(), Err(StoreError::Encoding));
 }
@@ -217,6 +218,10 @@ fn older_layouts_are_read() {
     let fog_ids = [0x2A4, 0x2A5, 0x2A6];
     let layout_2 = [LAYOUT_1, &FOG_IDS_OF_LAYOUT_2].concat();
     older_layout(2, &layout_2, Configuration { fog_ids, ..wanted });
+    let fog_lane = FogLane { tilt_deg: 1.5, ..FogLane::default() };
+    // Layout 3 ended with `fog_lane`.
+    let layout_3 = [&layout_2[..], &1.5_f32.to_le_bytes(), &[0, 0]].concat();
+    older_layout(3, &layout_3, Configuration { fog_ids, fog_lane, ..wanted });
 }
 
 fn older_layout(version: u8, content: &[u8], mut wanted: Configuration) {

@@ -8,13 +8,13 @@ use crate::pause;
 use crate::regions::{Records, Slots};
 use crate::ring::Ring;
 use crate::stm32f405::timer;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
-use embedded_can::{Frame, Id};
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::service::Device;
 use gyronet::service::message::AllCounters;
-use gyronet::uds::{Server, Target, response_id, target};
+use gyronet::uds::Server;
 
 /// A line that testers use.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -35,6 +35,43 @@ pub static FROM_SLCAN: Ring<DataFrame, 16> =
 pub static RESPONSES: Ring<(Line, DataFrame), 16> =
     // SAFETY: idle writes, the output task reads.
     unsafe { Ring::new() };
+
+/// The identifiers of requests to this board, requests to all, and frames of this board, as [`pack`] makes them. Set
+/// before any task runs.
+static IDS: [AtomicU32; 3] = [const { AtomicU32::new(u32::MAX) }; 3];
+
+/// Sets the identifiers.
+pub fn set_ids(ids: [Id; 3]) {
+    IDS.iter().zip(ids).for_each(|(place, id)| place.store(pack(id), Ordering::Relaxed));
+}
+
+/// Returns whether a frame is a request.
+pub fn is_request(id: Id) -> bool {
+    let [request, functional, _] = ids();
+    [request, functional].contains(&pack(id))
+}
+
+fn ids() -> [u32; 3] {
+    let [request, functional, response] = &IDS;
+    [request, functional, response].map(|id| id.load(Ordering::Relaxed))
+}
+
+/// The mark of 29 bits.
+const EXTENDED: u32 = 1 << 31;
+
+fn pack(id: Id) -> u32 {
+    match id {
+        Id::Standard(id) => u32::from(id.as_raw()),
+        Id::Extended(id) => id.as_raw() | EXTENDED,
+    }
+}
+
+fn unpack(packed: u32) -> Option<Id> {
+    match packed & EXTENDED {
+        0 => StandardId::new(packed as u16).map(Id::Standard),
+        _ => ExtendedId::new(packed & !EXTENDED).map(Id::Extended),
+    }
+}
 
 /// A tester has stopped the messages of the board.
 static SILENCED: AtomicBool = AtomicBool::new(false);
@@ -76,19 +113,21 @@ impl Diagnosis {
         while !RESPONSES.is_full()
             && let Some(data) = self.server.next_frame(now)
         {
-            let frame = DataFrame::new(Id::Standard(response_id()), &data);
+            let [.., response] = ids();
+            let frame = unpack(response).and_then(|id| DataFrame::new(id, &data));
             frame.into_iter().for_each(|frame| _ = RESPONSES.push((self.line, frame)));
         }
-        if device.restart_wanted() && self.server.is_idle() && RESPONSES.is_empty() {
+        if self.server.restart_is_due() && RESPONSES.is_empty() {
             pause::announced(SCB::sys_reset);
         }
     }
 
     fn receive(&mut self, frame: &DataFrame, now: u32) {
-        match target(frame.id()) {
-            Some(Target::Server) => self.server.receive(frame.data(), now),
-            Some(Target::All) => self.server.receive_functional(frame.data(), now),
-            None => {}
+        let [_, functional, _] = ids();
+        if pack(frame.id()) == functional {
+            self.server.receive_functional(frame.data(), now);
+        } else {
+            self.server.receive(frame.data(), now);
         }
     }
 }

@@ -17,7 +17,6 @@ use gyronet::health::count;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
-use gyronet::uds;
 use gyronet::units::Micros;
 
 /// Half a period of the LED, ms; a power of two.
@@ -27,6 +26,8 @@ const BLINK_MS: u32 = 512;
 pub struct OutputParts {
     pub part: ImuPart,
     pub bits_per_second: u32,
+    /// Wheel and latitude frames of a host on SLCAN are used.
+    pub slcan_inputs: bool,
 }
 
 /// Holds the state of the output task.
@@ -40,6 +41,8 @@ pub struct Output {
     /// True once CAN takes part in the bus.
     joined: bool,
     lines: LineCounters,
+    /// Wheel and latitude frames of a host on SLCAN are used.
+    slcan_inputs: bool,
     /// Frames of a tester on SLCAN that found no room.
     unread: u32,
 }
@@ -57,6 +60,7 @@ impl OutputParts {
             looked: 0,
             joined: false,
             lines: LineCounters::NONE,
+            slcan_inputs: self.slcan_inputs,
             unread: 0,
         }
     }
@@ -178,11 +182,11 @@ impl Output {
     #[inline(never)]
     fn send(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
         self.queue(coprocessor);
-        let unread = &mut self.unread;
+        let (unread, takes_inputs) = (&mut self.unread, self.slcan_inputs);
         self.outgoing.service(|frame| {
-            if uds::target(frame.id()).is_some() {
+            if diagnosis::is_request(frame.id()) {
                 count(unread, u32::from(!FROM_SLCAN.push(frame)));
-            } else {
+            } else if takes_inputs {
                 let _ = coprocessor.can(&frame, now);
             }
         });

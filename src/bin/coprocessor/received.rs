@@ -2,13 +2,12 @@
 //! tester's.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::diagnosis::FROM_CAN;
+use crate::diagnosis::{self, FROM_CAN};
 use crate::ring::Ring;
 use crate::stm32f405::can::{self, Received};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_can::Frame as _;
 use gyronet::can::DataFrame;
-use gyronet::uds;
 
 /// Wheel frames that wait; the output task looks at them every millisecond.
 pub static FRAMES: Ring<DataFrame, 8> =
@@ -28,7 +27,7 @@ pub fn take() {
 
 /// Hands a frame on. Returns whether there was room.
 fn push(frame: DataFrame) -> bool {
-    if uds::target(frame.id()).is_some() { FROM_CAN.push(frame) } else { FRAMES.push(frame) }
+    if diagnosis::is_request(frame.id()) { FROM_CAN.push(frame) } else { FRAMES.push(frame) }
 }
 
 /// Frames lost since the start. The controller does not count how many it loses at once, so those

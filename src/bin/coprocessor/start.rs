@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "a peripheral that is taken; the block says why it is sound")]
 
 use crate::board::Board;
+use crate::diagnosis;
 use crate::fog_network::FogParts;
 use crate::idle::Stored;
 use crate::output::OutputParts;
@@ -16,8 +17,7 @@ use gyronet::model::fognet::FogNetState;
 use gyronet::model::seconds::WindowCopy;
 use gyronet::model::{Blob, FogBlob, FogNet, weights};
 use gyronet::service::{Device, SupportedHardware};
-use gyronet::store::{FogPart, ImuPart};
-use gyronet::uds;
+use gyronet::store::{Configuration, FogPart, ImuPart};
 
 /// The hardware that this image drives. It listens to a fibre-optic gyro whether one is configured or not.
 const DRIVES: SupportedHardware = SupportedHardware {
@@ -26,11 +26,15 @@ const DRIVES: SupportedHardware = SupportedHardware {
     bits_per_second: &[BITS_PER_SECOND],
 };
 /// Has CAN receive the frames that the configuration names.
-fn receive(board: &Board, wheels: &WheelSettings, config: &Config) {
+fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings, config: &Config) {
     let wheels = wheels.frames.into_iter().flatten().map(|frame| frame.id);
     let latitude = config.latitude.map(|latitude| latitude.id());
+    // A stored configuration has been checked.
+    let ids = configuration.diagnosis.ids().ok();
+    ids.into_iter().for_each(diagnosis::set_ids);
+    let requests = ids.into_iter().flat_map(|[request, functional, _]| [request, functional]);
     if let Some(can) = &board.can {
-        can.receive_only(uds::request_ids().chain(wheels).chain(latitude));
+        can.receive_only(requests.into_iter().chain(wheels).chain(latitude));
     }
 }
 
@@ -72,10 +76,15 @@ pub fn parts(board: &Board) -> Option<Parts> {
         },
         ..configuration.coprocessor(device.calibration(), weights)
     };
-    receive(board, device.wheels(), &config);
+    receive(board, configuration, device.wheels(), &config);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
-        output: OutputParts { part, bits_per_second },
+        // In the emulator SLCAN is the only bus.
+        output: OutputParts {
+            part,
+            bits_per_second,
+            slcan_inputs: board.emulated || configuration.slcan_inputs,
+        },
         config,
         weights: blob,
         fog_network,

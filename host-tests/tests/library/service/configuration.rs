@@ -3,6 +3,7 @@
 use super::{Board, DRIVES, IDENTITY, ask, bare, info, sample, set, start};
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
+use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::wheel::{WheelConfigError, WheelFrame, WheelSettings};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
@@ -27,7 +28,7 @@ fn configuration_is_kept_whole() {
     let mut board = start(&flash);
     assert_eq!(
         ask(&mut board, &Request::GetConfiguration),
-        Reply::Configuration { version: 3, origin: Origin::Stored, configuration: wanted }
+        Reply::Configuration { version: 4, origin: Origin::Stored, configuration: wanted }
     );
     assert_eq!(*board.configuration(), wanted);
     // Refused, and named, and the old one stays.
@@ -52,7 +53,7 @@ fn configuration_is_kept_whole() {
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
     assert_eq!(ask(&mut board, &set(with_fog)), refused(FieldError::PartNotInImage));
     let request = Request::SetConfiguration { version: 9, configuration: wanted };
-    assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 3 }));
+    assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 4 }));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 
@@ -133,6 +134,28 @@ fn nothing_is_stored_without_flash() {
         ask(&mut board, &Request::WeightsActivate),
         Reply::Refused(Refusal::Slot(SlotError::NotBegun))
     );
+}
+
+#[test]
+fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
+    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let mut ask = |extended, [request, functional, response]: [u32; 3]| {
+        let diagnosis = DiagnosisIds { extended, request, functional, response };
+        ask(&mut board, &set(Configuration { diagnosis, ..Configuration::DEFAULT }))
+    };
+    assert_eq!(ask(false, [0x700, 0x7DF, 0x708]), Reply::Done);
+    assert_eq!(ask(true, [0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110]), Reply::Done);
+    for (extended, ids, named) in [
+        (false, [0x800, 0x7DF, 0x7E8], 0x800),
+        (true, [0x18DA_10F1, 0x18DB_33F1, 1 << 29], 1 << 29),
+        (false, [0x7E0, 0x7E0, 0x7E8], 0x7E0),
+        (false, [0x7E0, 0x7DF, 0x7E0], 0x7E0),
+        // The rate's own.
+        (false, [0x7E0, 0x7DF, 0x1A0], 0x7E0),
+    ] {
+        let refused = Reply::Refused(Refusal::Store(StoreError::Field(FieldError::Diagnosis(named))));
+        assert_eq!(ask(extended, ids), refused, "{ids:x?}");
+    }
 }
 
 /// Returns whether a configuration can be stored after so many samples.

@@ -319,7 +319,7 @@ fn weights_are_downloaded_and_used_after_a_restart() {
     bench.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 1][..], &crc(&weights::DEFAULT.0)].concat());
     bench.expect(&[0x31, 1, 0xFF, 1], &[0x71, 1, 0xFF, 1]);
     bench.expect(&[0x11, 1], &[0x51, 1]);
-    assert!(bench.board.restart_wanted());
+    assert!(bench.server.restart_is_due());
     let mut after = Bench::new(&flash);
     after.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 2][..], &crc(&file)].concat());
 }
