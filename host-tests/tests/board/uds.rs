@@ -172,7 +172,7 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
 #[test]
 fn udsoncan_reads_writes_and_downloads() {
     const TEST: &str = "udsoncan_reads_writes_and_downloads";
-    let Some(python) = require::python(TEST, &["can", "isotp", "udsoncan"]) else { return };
+    let Some(python) = require::python(TEST, &["can", "isotp", "udsoncan", "yaml"]) else { return };
     let Some(mut board) = common::boot(TEST) else { return };
     board.run(START);
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("uds_weights.bin");

@@ -12,6 +12,7 @@ from pathlib import Path
 import can
 import isotp
 import udsoncan
+import yaml
 from udsoncan.client import Client
 from udsoncan.connections import BaseConnection, PythonIsoTpConnection
 from udsoncan.exceptions import NegativeResponseException, TimeoutException
@@ -96,9 +97,10 @@ def refused(code, call, *arguments, **named):
         raise AssertionError(f"{call} was not refused with {code:02x}")
 
 
-DIDS = (0xF186, 0xF189, 0xF197, 0x0100, 0x0101, 0x0102, 0x0103, 0x0104, 0x0105, 0x0106, 0x0107, 0x0108)
+DESCRIPTION = yaml.safe_load((Path(__file__).parents[3] / "tools/gyronet_uds.yaml").read_text())
+DIDS = {did: Bytes if data["format"] == "bytes" else data["format"] for did, data in DESCRIPTION["data"].items()}
 # An emulated or modelled board does not keep real time, so its own time-outs do not count.
-CONFIG = dict(udsoncan.configs.default_client_config, data_identifiers={did: Bytes for did in DIDS}, request_timeout=None,
+CONFIG = dict(udsoncan.configs.default_client_config, data_identifiers=DIDS, request_timeout=None,
               p2_timeout=20, p2_star_timeout=60, use_server_timing=False)
 
 
@@ -106,12 +108,13 @@ def examine(client):
     """Reads everything, and leaves the board in an extended session."""
     for did in DIDS:
         value = client.read_data_by_identifier(did).service_data.values[did]
-        print(f"{did:04x} {value.hex()}")
-        assert value
+        print(f"{did:04x} {DESCRIPTION['data'][did]['name']}: {value}")
+        fields = DESCRIPTION["data"][did].get("fields", [])
+        assert value and len(fields) in (0, len(value)), did
     place = udsoncan.MemoryLocation(0, 4, 32, 32)
     refused(0x7F, client.request_download, place)
     troubles = client.get_supported_dtc().service_data.dtcs
-    assert len(troubles) == 13, troubles
+    assert {trouble.id for trouble in troubles} == set(DESCRIPTION["troubles"]), troubles
     client.change_session(DiagnosticSessionControl.Session.extendedDiagnosticSession)
     client.tester_present()
     client.control_dtc_setting(ControlDTCSetting.SettingType.off)
@@ -130,7 +133,7 @@ def write(client, pipes, weights):
     configuration = examine(client)
     client.write_data_by_identifier(0x0100, configuration)
     refused(0x13, client.write_data_by_identifier, 0x0100, configuration[:-1])
-    refused(0x31, client.write_data_by_identifier, 0xF186, b"\1")
+    refused(0x31, client.write_data_by_identifier, 0xF186, 1)
     client.change_session(DiagnosticSessionControl.Session.programmingSession)
     place = udsoncan.MemoryLocation(0, len(weights), 32, 32)
     length = client.request_download(place).service_data.max_length - 2
@@ -141,7 +144,7 @@ def write(client, pipes, weights):
     client.ecu_reset(ECUReset.ResetType.hardReset)
     for _ in range(300):
         pipes.turn()
-    source, crc = struct.unpack(">BI", client.read_data_by_identifier(0x0103).service_data.values[0x0103])
+    source, crc = client.read_data_by_identifier(0x0103).service_data.values[0x0103]
     assert (source, crc) == (2, struct.unpack("<I", weights[-4:])[0]), (source, crc)
     assert not pipes.errors, pipes.errors
 

@@ -10,7 +10,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 #[test]
 fn udsoncan_reads_the_board_over_slcan() {
     const TEST: &str = "udsoncan_reads_the_board_over_slcan";
-    let Some(python) = require::python(TEST, &["can", "isotp", "serial", "udsoncan"]) else { return };
+    let Some(python) = require::python(TEST, &["can", "isotp", "serial", "udsoncan", "yaml"]) else { return };
     let Some(elf) = image::coprocessor(TEST, env!("CARGO_TARGET_TMPDIR")) else { return };
     let mut board = qemu::Board::boot(&elf, 2, &[]);
     let address = board.serve(2);

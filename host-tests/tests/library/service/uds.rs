@@ -11,6 +11,7 @@ use gyronet::store::{Configuration, Record};
 use gyronet::uds::Server;
 use gyronet::uds::dtc::{TROUBLES, bit};
 use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::{Tester, frame};
 use std::cell::RefCell;
@@ -227,6 +228,13 @@ fn each_trouble_has_a_code_of_its_own_and_one_condition() {
     for (k, trouble) in TROUBLES.iter().enumerate() {
         assert!(trouble.code < 0xFF_FFFF && !trouble.name.is_empty());
         assert!(TROUBLES[..k].iter().all(|other| other.code != trouble.code), "{:06x}", trouble.code);
+    }
+    // Other people's tools read them here.
+    let description =
+        std::fs::read_to_string(workspace().join("tools/gyronet_uds.yaml")).expect("it is there");
+    for trouble in &TROUBLES {
+        let line = description.lines().find(|line| line.starts_with(&format!("  0x{:06X}: ", trouble.code)));
+        assert!(line.is_some_and(|line| line.contains(trouble.name)), "{:06x}", trouble.code);
     }
 }
 
