@@ -21,6 +21,9 @@ from .lwoi_sequence import PERIOD_NS, STEPS, Sequence
 
 MODES = ("odometry", "constant", "model", "filter")
 LEVEL = slice(3, 5)  # of a twist: roll and pitch
+# The least deviations of the inertial sensor's rotation (rad), gain of velocity (m/s) and way (m), as lwoi sets them.
+# Its process states less, but takes errors of successive seconds as independent: a gyro's bias is the same in all.
+LEAST_STD = np.repeat([2 / 180, 0.1, 0.2], 3)
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ def run(sequence: Sequence, expected: Expected, mode: str) -> Track:
         positions.append(state.position + state.attitude.apply(within[1]))
         state.move(Motion(rotation[k], way[k], np.diag(twists.variance[k])))
         if mode == "filter":
-            spread = np.diag(expected.inertial.variance[k])
+            spread = np.diag(np.maximum(expected.inertial.variance[k], LEAST_STD**2))
             state.update(Measured(measured[k], spread, (speeds[k], speeds[k + 1]), expected.speed_variance))
         attitudes[-1][-1], positions[-1][-1] = state.attitude.as_quat(), state.position
         covariances.append(state.covariance[:6, :6].copy())

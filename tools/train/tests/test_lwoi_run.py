@@ -2,6 +2,7 @@
 
 import tempfile
 import unittest
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,16 @@ class Runs(unittest.TestCase):
         track = run(drive, expect(drive), "filter")
         self.assertLess(trajectory_error(track.position, drive.position, False), 0.05)
         self.assertEqual(track.refused, 0)
+
+    def test_a_lasting_gyro_bias_moves_the_heading_little(self):
+        time = np.arange(20_000)
+        drive = make_drive(np.where(time < 400, 0.0, SPEED), np.where(time < 400, 0.0, 0.05))
+        drive.inertial[:, :, 2] += 3e-4
+        expected = expect(drive)
+        sure = Errors(expected.inertial.mean, np.full((len(drive), 9), 1e-7))
+        track = run(drive, replace(expected, inertial=sure), "filter")
+        # By the gyro alone it would be 0.06 rad.
+        self.assertLess((track.attitude[-1] * drive.attitude[-1].inv()).magnitude(), 0.003)
 
     def test_a_pose_that_is_a_second_late_is_wrong_by_a_seconds_way(self):
         drive = start_and_go()
