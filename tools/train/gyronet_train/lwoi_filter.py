@@ -71,7 +71,7 @@ class Filter:
             raise FilterError(f"second {self.seconds}: the covariance is not finite")
 
     def update(self, measured: Measured) -> bool:
-        """Corrects pose and copy by the inertial sensor's measurement, and returns whether it was near enough to do so."""
+        """Corrects pose and copy by the inertial sensor's measurement; returns whether it was near enough to do so."""
         expected, jacobian, by_speeds = expectation(self, measured.speeds)
         noise = measured.covariance + measured.speed_variance * by_speeds @ by_speeds.T
         spread = jacobian @ self.covariance @ jacobian.T + noise

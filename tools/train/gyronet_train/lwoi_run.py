@@ -21,8 +21,9 @@ from .lwoi_sequence import PERIOD_NS, STEPS, Sequence
 
 MODES = ("odometry", "constant", "model", "filter")
 LEVEL = slice(3, 5)  # of a twist: roll and pitch
-# The least deviations of the inertial sensor's rotation (rad), gain of velocity (m/s) and way (m), as lwoi sets them.
-# Its process states less, but takes errors of successive seconds as independent: a gyro's bias is the same in all.
+# The least deviations of the inertial sensor's rotation (rad), gain of velocity (m/s) and way (m): the fixed ones of
+# lwoi's authors (of their two for the way the smaller). The process states less, but takes errors of successive
+# seconds as independent: a gyro's bias is the same in all.
 LEAST_STD = np.repeat([2 / 180, 0.1, 0.2], 3)
 
 
