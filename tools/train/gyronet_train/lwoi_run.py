@@ -1,7 +1,7 @@
 """A drive by lwoi: from windows and trained processes to a pose every 10 ms.
 
 There are four ways to run it. `odometry` moves on by wheels and fibre-optic gyro alone, level as it
-starts; `constant` adds the mean error of the training's seconds, to show how much of the gain six
+starts; `constant` adds the mean error of the training's seconds, to show how much of the gain four
 numbers have; `model` adds what the process expects of each second, roll and pitch left out; `filter`
 starts with the true attitude and has each second corrected by the inertial sensor as well.
 """
