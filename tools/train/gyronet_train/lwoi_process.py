@@ -1,0 +1,161 @@
+"""The Gaussian processes of lwoi: what a second's measurements say of their own error, and how surely.
+
+Independent processes, one for each component of the error, share the features that a small
+convolutional network makes of a window. Inducing points are windows themselves, 100 of them, which
+are optimised with all else: exact processes on thousands of windows would cost the cube of that.
+Targets are divided by their RMS in training, not centred: far from all it has seen a process then
+returns to no correction, with the full RMS as its spread.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import gpytorch
+import numpy as np
+import torch
+from torch import nn
+
+FEATURES = 20
+INDUCING = 100
+START_NOISE = 0.1
+NOISE_RATE = 10.0  # of the noise's rate over the others': in 100 steps of 0.01 it could not leave 0.04 to 0.25
+DECAY = 0.999  # of the rate, a step
+CHUNK = 2000  # windows that are predicted at once
+
+
+class ProcessError(ValueError):
+    """A process that cannot be trained. Its text says at which step, or on what data."""
+
+
+class Features(nn.Module):
+    """Two convolutions and one layer: windows (n, 100 * channels) to 20 numbers."""
+
+    def __init__(self, channels: int, kernel: int, stride: int, flat: int):
+        super().__init__()
+        self.channels = channels
+        self.layers = nn.Sequential(
+            nn.Conv1d(channels, 100, kernel, stride),
+            nn.ReLU(),
+            nn.Conv1d(100, 50, kernel, stride),
+            nn.ReLU(),
+            nn.Flatten(),
+            nn.Linear(flat, FEATURES),
+        )
+
+    def forward(self, windows: torch.Tensor) -> torch.Tensor:
+        return self.layers(windows.unflatten(-1, (-1, self.channels)).transpose(-1, -2))
+
+
+def odometry_features() -> Features:
+    """The network before the process of the odometry's errors."""
+    return Features(3, 3, 5, 200)
+
+
+def inertial_features() -> Features:
+    """The network before the process of the inertial sensor's errors."""
+    return Features(6, 6, 4, 250)
+
+
+class SparseProcess(gpytorch.models.ApproximateGP):
+    """Independent processes with Matern 5/2 kernels on common features."""
+
+    def __init__(self, features: nn.Module, inducing: torch.Tensor, outputs: int):
+        batch = torch.Size([outputs])
+        posterior = gpytorch.variational.CholeskyVariationalDistribution(len(inducing), batch_shape=batch)
+        strategy = gpytorch.variational.VariationalStrategy(self, inducing, posterior)
+        super().__init__(gpytorch.variational.IndependentMultitaskVariationalStrategy(strategy, outputs))
+        self.features = features
+        self.mean = gpytorch.means.ZeroMean(batch_shape=batch)
+        matern = gpytorch.kernels.MaternKernel(2.5, ard_num_dims=FEATURES, batch_shape=batch)
+        self.covariance = gpytorch.kernels.ScaleKernel(matern, batch_shape=batch)
+        matern.lengthscale = 1.0
+        self.covariance.outputscale = 1.0
+
+    def forward(self, windows: torch.Tensor) -> gpytorch.distributions.MultivariateNormal:
+        seen = self.features(windows)
+        return gpytorch.distributions.MultivariateNormal(self.mean(seen), self.covariance(seen))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a process is trained."""
+
+    steps: int = 100
+    rate: float = 0.01
+    jitter: float = 1e-3
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class Errors:
+    """The expected errors of windows (n, outputs) and their variances, the noise of one window included."""
+
+    mean: np.ndarray
+    variance: np.ndarray
+
+
+class Trained:
+    """A trained process with the units of its inputs and targets."""
+
+    def __init__(self, model, likelihood, units, scale: np.ndarray, settings: Settings, seconds: float):
+        self.model, self.likelihood, self.units = model, likelihood, units
+        self.scale, self.settings, self.seconds = scale, settings, seconds
+
+    @torch.no_grad()
+    def predict(self, windows: np.ndarray) -> Errors:
+        """The errors of windows (n, 100, channels)."""
+        inputs = standardised(windows, *self.units)
+        with gpytorch.settings.variational_cholesky_jitter(self.settings.jitter):
+            parts = [self.likelihood(self.model(part)) for part in inputs.split(CHUNK)]
+            mean = torch.cat([part.mean for part in parts]).double().numpy()
+            variance = torch.cat([part.variance for part in parts]).double().numpy()
+        return Errors(mean * self.scale, variance * self.scale**2)
+
+
+def standardised(windows: np.ndarray, mean: np.ndarray, spread: np.ndarray) -> torch.Tensor:
+    """Flat windows (n, 100 * channels) in units of each channel's spread."""
+    return torch.from_numpy(((windows - mean) / spread).reshape(len(windows), -1)).float()
+
+
+def train(
+    windows: np.ndarray,
+    errors: np.ndarray,
+    features: Callable[[], Features],
+    settings: Settings,
+    report: Callable[[int, float], None] = lambda step, loss: None,
+) -> Trained:
+    """Fits a process to windows (n, 100, channels) and errors (n, outputs); each step of Adam is on all of them."""
+    begin = time.monotonic()
+    torch.manual_seed(settings.seed)
+    units = windows.mean(axis=(0, 1)), windows.std(axis=(0, 1))
+    scale = np.sqrt((errors**2).mean(axis=0))
+    if not (np.isfinite(scale).all() and (scale > 0).all() and (units[1] > 0).all()):
+        raise ProcessError(f"{len(windows)} windows: a channel or an error is constant or not a number")
+    inputs, targets = standardised(windows, *units), torch.from_numpy(errors / scale).float()
+    chosen = np.linspace(0, len(inputs) - 1, min(INDUCING, len(inputs))).astype(int)
+    outputs = errors.shape[1]
+    model = SparseProcess(features(), inputs[chosen].clone(), outputs)
+    likelihood = gpytorch.likelihoods.MultitaskGaussianLikelihood(outputs, has_global_noise=False)
+    likelihood.task_noises = torch.full((outputs,), START_NOISE)
+    bound = gpytorch.mlls.VariationalELBO(likelihood, model, len(inputs))
+    parameters = [*model.parameters(), *likelihood.parameters()]
+    noise = {"params": likelihood.parameters(), "lr": NOISE_RATE * settings.rate}
+    optimiser = torch.optim.Adam([{"params": model.parameters()}, noise], settings.rate)
+    schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, DECAY)
+    with gpytorch.settings.variational_cholesky_jitter(settings.jitter):
+        for step in range(1, settings.steps + 1):
+            optimiser.zero_grad()
+            loss = -bound(model(inputs), targets)
+            if not torch.isfinite(loss):
+                raise ProcessError(f"step {step}: the loss is not a number")
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(parameters, 1.0)
+            optimiser.step()
+            schedule.step()
+            report(step, loss.item())
+    model.eval()
+    likelihood.eval()
+    return Trained(model, likelihood, units, scale, settings, time.monotonic() - begin)

@@ -1,0 +1,112 @@
+"""Sequences as lwoi sees them: windows of one second on a 100 Hz grid, and the true poses.
+
+The grid begins with the first row of the inertial sensor that all other files have reached, as in
+`gyronet tables`, and has whole seconds only. Ways and turns are interpolated as sums, so that no
+increment is lost or counted twice; the inertial sensor's values are means over a step. Its gyro is
+taken less its mean over the first three seconds, which stand still.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from .seconds import STATIC_S, encoder_scale, table
+
+STEPS = 100  # of a window
+DT = 0.01  # s
+PERIOD_NS = 10_000_000
+STANDING_M = 0.01  # the most that wheels may turn while the gyro's mean is taken
+
+
+class SequenceError(ValueError):
+    """A sequence that lwoi cannot use. Its text names the folder and what is wrong."""
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """One drive of N windows. Lengths are in m, angles in rad, the truth is at the N * 100 + 1 steps."""
+
+    name: str
+    sha256: str
+    start_ns: int
+    odometry: np.ndarray  # (N, 100, 3): ways of the left and the right wheel, turn by the fibre-optic gyro
+    inertial: np.ndarray  # (N, 100, 6): gyro, accelerometer
+    attitude: Rotation
+    position: np.ndarray  # (N * 100 + 1, 3)
+
+    def __len__(self) -> int:
+        return len(self.odometry)
+
+    @property
+    def edges(self) -> slice:
+        """The steps at which windows begin and end."""
+        return slice(None, None, STEPS)
+
+    @property
+    def edge_speed(self) -> np.ndarray:
+        """Speed by the wheels at the edges, m/s: a tenth of a second around each, since one step has few counts."""
+        way = np.concatenate([[0.0], np.cumsum(self.odometry[:, :, :2].mean(axis=2).ravel())])
+        middle = np.arange(0, len(way), STEPS)
+        after, before = np.minimum(middle + 5, len(way) - 1), np.maximum(middle - 5, 0)
+        return (way[after] - way[before]) / ((after - before) * DT)
+
+    @property
+    def edge_velocity(self) -> np.ndarray:
+        """True velocity at the edges, m/s: the slope of a parabola through five steps (Savitzky and Golay), at either
+        end of the drive two steps inwards."""
+        middle = np.clip(np.arange(0, len(self.position), STEPS), 2, len(self.position) - 3)
+        return sum(k * self.position[middle + k] for k in (-2, -1, 1, 2)) / (10 * DT)
+
+
+def load_sequence(folder: Path) -> Sequence:
+    """Read a folder in the KAIST Urban layout. Raises SequenceError that names what is wrong."""
+    try:
+        return read(folder)
+    except (OSError, ValueError) as error:
+        raise SequenceError(f"{folder}: {error}") from error
+
+
+def read(folder: Path) -> Sequence:
+    """Reads the four files and the encoder's calibration, and puts them on the grid."""
+    digest = hashlib.sha256()
+    sensors = folder / "sensor_data"
+    imu = table(sensors / "xsens_imu.csv", 17, digest)
+    fog = table(sensors / "fog.csv", 4, digest)
+    encoder = table(sensors / "encoder.csv", 3, digest)
+    pose = table(folder / "global_pose.csv", 13, digest)
+    scale = encoder_scale(folder / "calibration" / "EncoderParameter.txt")
+    files = (imu, fog, encoder, pose)
+    latest = max(t[0, 0] for t in files)
+    start = imu[np.searchsorted(imu[:, 0], latest), 0]
+    count = int((min(t[-1, 0] for t in files) - start) // 10**9)
+    if count < STATIC_S + 1:
+        raise SequenceError(f"its files have {count} s in common, and at least {STATIC_S + 1:.0f} s are needed")
+    grid = np.arange(count * STEPS + 1) * DT
+
+    def on_grid(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return np.interp(grid, (times - start) / 1e9, values)
+
+    wheels = [np.diff(on_grid(encoder[:, 0], encoder[:, 1 + k] * scale[k])) for k in range(2)]
+    turns = np.diff(on_grid(fog[:, 0], np.cumsum(fog[:, 3])))
+    samples = np.stack([on_grid(imu[:, 0], imu[:, k]) for k in range(8, 14)], axis=1)
+    inertial = (samples[1:] + samples[:-1]) / 2
+    standing = int(STATIC_S / DT)
+    if abs(wheels[0][:standing].sum() + wheels[1][:standing].sum()) > 2 * STANDING_M:
+        raise SequenceError(f"it moves in its first {STATIC_S:.0f} s, in which the gyro's mean is taken")
+    inertial[:, :3] -= inertial[:standing, :3].mean(axis=0)
+    matrices = pose[:, [1, 2, 3, 5, 6, 7, 9, 10, 11]].reshape(-1, 3, 3)
+    times = (pose[:, 0] - start) / 1e9
+    return Sequence(
+        name=folder.name,
+        sha256=digest.hexdigest(),
+        start_ns=int(start),
+        odometry=np.stack([*wheels, turns], axis=1).reshape(count, STEPS, 3),
+        inertial=inertial.reshape(count, STEPS, 6),
+        attitude=Slerp(times, Rotation.from_matrix(matrices))(np.clip(grid, times[0], times[-1])),
+        position=np.stack([on_grid(pose[:, 0], pose[:, k]) for k in (4, 8, 12)], axis=1),
+    )
