@@ -113,6 +113,11 @@ impl Transport {
         self.state == State::Idle && self.urgent.is_none()
     }
 
+    /// Counts a frame that is not taken.
+    pub fn refuse(&mut self) {
+        count(&mut self.errors.unexpected, 1);
+    }
+
     /// Takes a frame's data at `now`, in milliseconds of a clock that wraps around.
     pub fn receive(&mut self, data: &[u8], now: u32) {
         match data {

@@ -74,13 +74,20 @@ impl Server {
         self.transport.receive(data, now);
     }
 
+    /// Counts a frame of a tester that has to wait: another one is being served.
+    pub fn refuse(&mut self) {
+        self.transport.refuse();
+    }
+
     /// Takes the data of a frame to all servers: one frame is the whole request. While another one is being answered
     /// it only keeps the session.
     pub fn receive_functional(&mut self, data: &[u8], now: u32) {
         self.services.hear(now);
         if self.transport.is_idle() && data.first().is_some_and(|head| *head < 0x10) {
-            self.services.is_functional = true;
             self.transport.receive(data, now);
+            self.services.is_functional = self.transport.request().is_some();
+        } else if data.get(1) != Some(&(UdsCommand::TesterPresent as u8)) {
+            self.refuse();
         }
     }
 
@@ -388,8 +395,8 @@ impl Services {
             Some(DtcSubFunction::ReportNumberOfDtcByStatusMask) => {
                 let [mask] = exactly(rest)?;
                 let matching = self.memory.entries().filter(|(_, entry)| entry.status & mask != 0).count();
-                // The codes are those of ISO 14229-1.
-                put(out, &[bit::AVAILABLE, 1, 0, matching as u8])
+                // The codes are those of SAE J2012-DA, with a failure type.
+                put(out, &[bit::AVAILABLE, 0, 0, matching as u8])
             }
             Some(sub @ (DtcSubFunction::ReportDtcByStatusMask | DtcSubFunction::ReportSupportedDtc)) => {
                 let mask = match sub {

@@ -102,9 +102,11 @@ impl Diagnosis {
                 if self.server.is_idle() {
                     self.line = line;
                 }
-                // A tester on the other line has to wait until the bus is free for it.
+                // A tester on the other line has to wait.
                 if self.line == line {
                     self.receive(&frame, now);
+                } else {
+                    self.server.refuse();
                 }
             }
         }

@@ -147,6 +147,18 @@ fn requests_to_all_servers_are_refused_in_silence() {
     assert_eq!(functional(&[0x22, 0x12, 0x34]), None);
     assert_eq!(functional(&[0x3E, 0x80]), None);
     assert_eq!(functional(&[0x10]), Some(vec![0x7F, 0x10, 0x13]), "a length is refused aloud");
+    // One that is no request changes nothing for the next, and all but "tester present" is counted.
+    assert_eq!(functional(&[]), None);
+    bench.expect(&[0xBA], &[0x7F, 0xBA, 0x11]);
+    bench.server.receive(&[0x10, 20, 0x22, 1, 0, 1, 1, 1], bench.now);
+    bench.server.receive_functional(&[2, 0x3E, 0x80], bench.now);
+    bench.server.receive_functional(&[2, 0x10, 1], bench.now);
+    let _ = bench.server.next_frame(bench.now);
+    bench.now += 1_001;
+    bench.fail(Status::Ready, Faults::NONE);
+    let errors = bench.ask(&[0x22, 1, 7]).expect("the errors");
+    assert_eq!(errors[3..7], [0, 0, 0, 2], "the empty one and the one that had to wait");
+    assert_eq!(errors[15..19], [0, 0, 0, 1], "the request that stayed in pieces");
 }
 
 #[test]
@@ -162,9 +174,9 @@ fn a_trouble_is_kept_when_its_cause_is_over_and_until_it_is_cleared() {
     bench.fail(Status::Silent, Faults::NONE);
     bench.fail(Status::Ready, Faults::NONE);
     bench.fail(Status::Silent, Faults::BUS);
-    bench.expect(&[0x19, 1, 1], &[0x59, 1, bit::AVAILABLE, 1, 0, 3]);
+    bench.expect(&[0x19, 1, 1], &[0x59, 1, bit::AVAILABLE, 0, 0, 3]);
     bench.fail(Status::Ready, Faults::NONE);
-    bench.expect(&[0x19, 1, 1], &[0x59, 1, bit::AVAILABLE, 1, 0, 1]);
+    bench.expect(&[0x19, 1, 1], &[0x59, 1, bit::AVAILABLE, 0, 0, 1]);
     // Silence: came twice, is over.
     bench.expect(&[0x19, 6, 0x5A, 0x01, 0x31, 1], &[0x59, 6, 0x5A, 0x01, 0x31, 0x2E, 1, 2]);
     bench.expect(&[0x14, 0x5A, 0x01, 0x31], &[0x54]);
@@ -177,10 +189,10 @@ fn a_trouble_is_kept_when_its_cause_is_over_and_until_it_is_cleared() {
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     bench.expect(&[0x85, 2], &[0xC5, 2]);
     bench.fail(Status::Stuck, Faults::NONE);
-    bench.expect(&[0x19, 1, 8], &[0x59, 1, bit::AVAILABLE, 1, 0, 1]);
+    bench.expect(&[0x19, 1, 8], &[0x59, 1, bit::AVAILABLE, 0, 0, 1]);
     bench.expect(&[0x10, 1], &[0x50, 1, 0, 50, 0x01, 0xF4]);
     bench.fail(Status::Stuck, Faults::NONE);
-    bench.expect(&[0x19, 1, 8], &[0x59, 1, bit::AVAILABLE, 1, 0, 2]);
+    bench.expect(&[0x19, 1, 8], &[0x59, 1, bit::AVAILABLE, 0, 0, 2]);
 }
 
 #[test]
