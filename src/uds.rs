@@ -23,6 +23,9 @@ pub mod dtc;
 pub mod isotp;
 mod response;
 mod server;
+mod services;
+mod troubles;
 
 pub use response::Nrc;
-pub use server::{Server, Session};
+pub use server::Server;
+pub use services::Session;

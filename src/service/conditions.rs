@@ -2,7 +2,7 @@
 
 use crate::health::{Faults, Status};
 
-/// What the faults are read from.
+/// Holds the present faults and the state in which they are.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Conditions {
     /// 10 ms steps of the sensor's time since the start.

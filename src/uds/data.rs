@@ -27,7 +27,15 @@ use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
 use serde::Serialize;
 
-/// What a read looks at.
+/// Lists the fields of a type in this order; one that is left out does not compile.
+macro_rules! words {
+    ($from:expr => $type:ident { $($field:ident),* }) => {{
+        let $type { $($field),* } = $from;
+        [$($field),*]
+    }};
+}
+
+/// Holds the sources of the values that are read.
 pub(super) struct Sources<'a, R: NorFlash, W> {
     pub device: &'a Device<R, W>,
     pub counters: &'a AllCounters,
@@ -71,15 +79,29 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             let now = device.conditions();
             put(out, &[now.status as u8, now.faults.0])
         }
-        0x0105 => put_words(out, &pipeline(&counters.pipeline)),
+        0x0105 => put_words(
+            out,
+            &words!(counters.pipeline => Counters {
+                samples, missing, misplaced, clock_jumps, invalid, moving, windows, clamped_inputs, implausible, late,
+                zero_rate_updates, contradicted
+            }),
+        ),
         0x0106 => {
-            put_words(out, &monitor(&counters.watch))?;
-            put_words(out, &inputs(&counters.inputs))?;
-            put_words(out, &lines(&counters.lines))
+            let monitor =
+                words!(counters.watch => MonitorCounters { silences, stuck, held, wrong, clock_off });
+            let inputs = words!(counters.inputs => InputCounters {
+                imu_errors, fog_errors, wheel_errors, latitude_errors, clock_back, unclaimed_estimates,
+                replaced_windows, replaced_frames, out_of_range
+            });
+            let lines = words!(counters.lines => LineCounters {
+                unsent, line_errors, held, overruns, service_errors, frames_lost
+            });
+            put_words(out, &monitor)?;
+            put_words(out, &inputs)?;
+            put_words(out, &lines)
         }
         0x0107 => {
-            let TransportErrors { unexpected, sequence, overflow, timeout } = *errors;
-            put_words(out, &[unexpected, sequence, overflow, timeout])
+            put_words(out, &words!(*errors => TransportErrors { unexpected, sequence, overflow, timeout }))
         }
         0x0108 => put(out, &device.conditions().tick.to_be_bytes()),
         _ => Err(Nrc::RequestOutOfRange),
@@ -119,70 +141,4 @@ fn put_record(out: &mut Response, record: &impl Serialize) -> Result<(), Nrc> {
 
 fn put_words(out: &mut Response, words: &[u32]) -> Result<(), Nrc> {
     words.iter().try_for_each(|word| put(out, &word.to_be_bytes()))
-}
-
-fn pipeline(counters: &Counters) -> [u32; 12] {
-    let Counters {
-        samples,
-        missing,
-        misplaced,
-        clock_jumps,
-        invalid,
-        moving,
-        windows,
-        clamped_inputs,
-        implausible,
-        late,
-        zero_rate_updates,
-        contradicted,
-    } = *counters;
-    [
-        samples,
-        missing,
-        misplaced,
-        clock_jumps,
-        invalid,
-        moving,
-        windows,
-        clamped_inputs,
-        implausible,
-        late,
-        zero_rate_updates,
-        contradicted,
-    ]
-}
-
-fn monitor(counters: &MonitorCounters) -> [u32; 5] {
-    let MonitorCounters { silences, stuck, held, wrong, clock_off } = *counters;
-    [silences, stuck, held, wrong, clock_off]
-}
-
-fn inputs(counters: &InputCounters) -> [u32; 9] {
-    let InputCounters {
-        imu_errors,
-        fog_errors,
-        wheel_errors,
-        latitude_errors,
-        clock_back,
-        unclaimed_estimates,
-        replaced_windows,
-        replaced_frames,
-        out_of_range,
-    } = *counters;
-    [
-        imu_errors,
-        fog_errors,
-        wheel_errors,
-        latitude_errors,
-        clock_back,
-        unclaimed_estimates,
-        replaced_windows,
-        replaced_frames,
-        out_of_range,
-    ]
-}
-
-fn lines(counters: &LineCounters) -> [u32; 6] {
-    let LineCounters { unsent, line_errors, held, overruns, service_errors, frames_lost } = *counters;
-    [unsent, line_errors, held, overruns, service_errors, frames_lost]
 }

@@ -1,4 +1,4 @@
-//! The trouble memory holds what was found to be wrong, as a workshop reads it (ISO 14229-1 D.2).
+//! The trouble memory holds the faults that the board has had, as a workshop reads them (ISO 14229-1 D.2).
 //!
 //! A fault is confirmed at once, because the pipeline has already waited as long as each needs; it stays in the memory
 //! until a tester clears it, also over a restart, so that one that comes and goes is found, too.
@@ -37,7 +37,7 @@ pub struct Trouble {
     cause: Cause,
 }
 
-/// The condition that a trouble stands for.
+/// Names the condition that a trouble stands for.
 #[derive(Debug, Clone, Copy)]
 enum Cause {
     Status(Status),
@@ -92,7 +92,7 @@ const fn trouble(code: u16, failure: u8, name: &'static str, cause: Cause) -> Tr
     Trouble { code: (code as u32) << 8 | failure as u32, name, cause }
 }
 
-/// What is known of one trouble.
+/// Holds the memory's record of one trouble.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
     /// See [`bit`].
@@ -132,7 +132,7 @@ impl Memory {
         Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false }
     }
 
-    /// Notes what is present now.
+    /// Notes the faults that are present now.
     pub fn observe(&mut self, now: &Conditions) {
         if !self.is_enabled {
             return;
@@ -171,7 +171,7 @@ impl Memory {
         found
     }
 
-    /// Takes over what was stored before the start; a code that this firmware does not have is left out.
+    /// Takes over the troubles that were stored before the start; a code that this firmware does not have is left out.
     pub fn restore(&mut self, stored: &Troubles) {
         for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
             let found = stored.confirmed.iter().find(|stored| stored.code == trouble.code);
@@ -182,7 +182,7 @@ impl Memory {
         }
     }
 
-    /// Returns what is to be stored.
+    /// Returns the troubles that are to be stored.
     #[must_use]
     pub fn confirmed(&self) -> Troubles {
         let mut troubles = Troubles::NONE;

@@ -95,7 +95,7 @@ impl Transport {
         Self { state: State::Idle, request: Vec::new(), response: Vec::new(), urgent: None, errors }
     }
 
-    /// Returns what went wrong so far.
+    /// Returns the counts of conversations that went wrong.
     #[must_use]
     pub fn errors(&self) -> TransportErrors {
         self.errors

@@ -8,14 +8,13 @@ taken less its mean over the first three seconds, which stand still.
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from .seconds import STATIC_S, encoder_scale, table
+from .seconds import STATIC_S, kaist_files
 
 STEPS = 100  # of a window
 DT = 0.01  # s
@@ -73,14 +72,8 @@ def load_sequence(folder: Path) -> Sequence:
 
 def read(folder: Path) -> Sequence:
     """Reads the four files and the encoder's calibration, and puts them on the grid."""
-    digest = hashlib.sha256()
-    sensors = folder / "sensor_data"
-    imu = table(sensors / "xsens_imu.csv", 17, digest)
-    fog = table(sensors / "fog.csv", 4, digest)
-    encoder = table(sensors / "encoder.csv", 3, digest)
-    pose = table(folder / "global_pose.csv", 13, digest)
-    scale = encoder_scale(folder / "calibration" / "EncoderParameter.txt")
-    files = (imu, fog, encoder, pose)
+    files, scale, digest = kaist_files(folder)
+    imu, fog, encoder, pose = files
     latest = max(t[0, 0] for t in files)
     start = imu[np.searchsorted(imu[:, 0], latest), 0]
     count = int((min(t[-1, 0] for t in files) - start) // 10**9)

@@ -48,8 +48,9 @@ def window_rows(end: int, padding: str) -> np.ndarray | None:
     return None
 
 
-def load_kaist(folder: Path) -> Seconds:
-    """Read a sequence in the KAIST Urban layout. Raises ValueError that names what is wrong."""
+def kaist_files(folder: Path):
+    """Read the four files of a sequence in the KAIST Urban layout (IMU, fibre-optic gyro, encoders, pose), the encoders'
+    scale, and the files' hash."""
     digest = hashlib.sha256()
     sensors = folder / "sensor_data"
     imu = table(sensors / "xsens_imu.csv", 17, digest)
@@ -57,6 +58,12 @@ def load_kaist(folder: Path) -> Seconds:
     encoder = table(sensors / "encoder.csv", 3, digest)
     pose = table(folder / "global_pose.csv", 13, digest)
     scale = encoder_scale(folder / "calibration" / "EncoderParameter.txt")
+    return (imu, fog, encoder, pose), scale, digest
+
+
+def load_kaist(folder: Path) -> Seconds:
+    """Read a sequence in the KAIST Urban layout. Raises ValueError that names what is wrong."""
+    (imu, fog, encoder, pose), scale, digest = kaist_files(folder)
     start = max(t[0, 0] for t in (imu, fog, encoder, pose))
     count = int((min(t[-1, 0] for t in (imu, fog, encoder, pose)) - start) // 10**9)
     edges = start + 10**9 * np.arange(count + 1)

@@ -1,0 +1,335 @@
+//! These are the services (ISO 14229-1) and the state between two requests.
+//!
+//! They translate requests to those that the device knows, so that both lines refuse the same. A request that writes or
+//! silences the output needs a session other than the default one, and a vehicle that is proven to stand.
+
+use super::data::{self, Sources};
+use super::download::Download;
+use super::dtc::Memory;
+use super::isotp::TransportErrors;
+use super::response::{Nrc, Response, exactly, nrc, put};
+use super::troubles;
+use crate::service::calibrate::{State, Task};
+use crate::service::message::{AllCounters, Calibrate, Request};
+use crate::service::{Device, MappedSlots};
+use automotive_diag::uds::{ResetType, RoutineControlType, UdsCommand};
+use embedded_storage::nor_flash::NorFlash;
+
+/// Longest silence of a tester in a session other than the default one, ms (S3).
+const SESSION_MS: u32 = 5_000;
+/// Longest time to a response, ms, and to one after "response pending", 10 ms (P2, P2*).
+const P2_MS: u16 = 50;
+const P2_STAR_10_MS: u16 = 500;
+/// This bit of a sub-function suppresses the positive response.
+const SUPPRESS: u8 = 0x80;
+
+/// A diagnostic session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Session {
+    /// Data and troubles can be read.
+    Default = 1,
+    /// Weights can be downloaded, too.
+    Programming = 2,
+    /// Settings can be written, and routines run.
+    Extended = 3,
+}
+
+/// First byte of a negative response.
+pub const NEGATIVE: u8 = 0x7F;
+/// Added to a service's number in a positive response.
+const POSITIVE: u8 = 0x40;
+
+/// The state between requests.
+#[derive(Debug)]
+pub(super) struct Services {
+    session: Session,
+    /// The time of the tester's last frame, ms.
+    pub heard: u32,
+    /// The request came for all servers.
+    pub is_functional: bool,
+    memory: Memory,
+    /// The memory has taken over what was stored before the start.
+    is_restored: bool,
+    /// The messages of the board are stopped.
+    pub is_silenced: bool,
+    /// A tester has asked for a restart.
+    pub is_restarting: bool,
+    download: Option<Download>,
+}
+
+impl Services {
+    /// Begins in the default session.
+    pub const fn new() -> Self {
+        Self {
+            session: Session::Default,
+            heard: 0,
+            is_functional: false,
+            memory: Memory::new(),
+            is_restored: false,
+            is_silenced: false,
+            is_restarting: false,
+            download: None,
+        }
+    }
+
+    /// Ends a session in which the tester has been silent for too long.
+    pub fn expire(&mut self, now: u32) {
+        if self.session != Session::Default && now.wrapping_sub(self.heard) > SESSION_MS {
+            self.enter(Session::Default);
+        }
+    }
+
+    /// Notes that the tester is there.
+    pub fn hear(&mut self, now: u32) {
+        self.expire(now);
+        self.heard = now;
+    }
+
+    /// Notes present faults, and stores those that are new.
+    pub fn remember<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) {
+        if !core::mem::replace(&mut self.is_restored, true) {
+            self.memory.restore(device.troubles());
+        }
+        self.memory.observe(&device.conditions());
+        if self.memory.is_changed {
+            let in_workshop = self.session != Session::Default;
+            self.memory.is_changed = !device.store_troubles(&self.memory.confirmed(), in_workshop);
+        }
+    }
+
+    fn enter(&mut self, session: Session) {
+        self.session = session;
+        self.download = None;
+        if session == Session::Default {
+            self.memory.is_enabled = true;
+            self.is_silenced = false;
+        }
+    }
+
+    /// Returns whether a request may erase the flash.
+    pub fn takes_long(&self, request: &[u8]) -> bool {
+        self.session != Session::Default
+            && matches!(request, [0x2E | 0x34, ..] | [0x31, 1, 0x02, 0x02] | [0x31, 1, 0xFF, 0x01])
+    }
+
+    /// Writes the response to a request; nothing where none is wanted.
+    pub fn answer<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        request: &[u8],
+        device: &mut Device<R, W>,
+        counters: &AllCounters,
+        errors: TransportErrors,
+        is_pending: bool,
+        out: &mut Response,
+    ) {
+        let Some((&service, rest)) = request.split_first() else { return };
+        // Room for a byte.
+        let _ = out.push(service.wrapping_add(POSITIVE));
+        match self.serve(service, rest, device, counters, errors, out) {
+            Ok(true) => {}
+            // A tester that has read "response pending" waits for the response.
+            Ok(false) if is_pending => {}
+            Ok(false) => out.clear(),
+            Err(nrc) => {
+                out.clear();
+                let is_silent = self.is_functional
+                    && matches!(
+                        nrc,
+                        Nrc::ServiceNotSupported
+                            | Nrc::SubFunctionNotSupported
+                            | Nrc::RequestOutOfRange
+                            | Nrc::SubFunctionNotSupportedInActiveSession
+                            | Nrc::ServiceNotSupportedInActiveSession
+                    );
+                if !is_silent || is_pending {
+                    let _ = out.extend_from_slice(&[NEGATIVE, service, nrc as u8]);
+                }
+            }
+        }
+    }
+
+    /// Executes a service. Returns whether a positive response is wanted.
+    #[inline(never)]
+    fn serve<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        service: u8,
+        rest: &[u8],
+        device: &mut Device<R, W>,
+        counters: &AllCounters,
+        errors: TransportErrors,
+        out: &mut Response,
+    ) -> Result<bool, Nrc> {
+        let command = UdsCommand::from_repr(service).ok_or(Nrc::ServiceNotSupported)?;
+        match command {
+            UdsCommand::DiagnosticSessionControl => {
+                let [sub] = exactly(rest)?;
+                let session = match sub & !SUPPRESS {
+                    1 => Session::Default,
+                    2 => Session::Programming,
+                    3 => Session::Extended,
+                    _ => return Err(Nrc::SubFunctionNotSupported),
+                };
+                self.enter(session);
+                let [[a, b], [c, d]] = [P2_MS.to_be_bytes(), P2_STAR_10_MS.to_be_bytes()];
+                put(out, &[session as u8, a, b, c, d])?;
+                Ok(sub & SUPPRESS == 0)
+            }
+            UdsCommand::ECUReset => {
+                let [sub] = exactly(rest)?;
+                let reset = ResetType::from_repr(sub & !SUPPRESS);
+                if !matches!(reset, Some(ResetType::HardReset | ResetType::SoftReset)) {
+                    return Err(Nrc::SubFunctionNotSupported);
+                }
+                device.act(&Request::Restart).map_err(nrc)?;
+                self.is_restarting = true;
+                put(out, &[sub & !SUPPRESS])?;
+                Ok(sub & SUPPRESS == 0)
+            }
+            UdsCommand::TesterPresent => {
+                let [sub] = exactly(rest)?;
+                if sub & !SUPPRESS != 0 {
+                    return Err(Nrc::SubFunctionNotSupported);
+                }
+                put(out, &[0])?;
+                Ok(sub & SUPPRESS == 0)
+            }
+            UdsCommand::CommunicationControl => {
+                self.needs(Session::Extended)?;
+                let [sub, what] = exactly(rest)?;
+                let is_silenced = match sub & !SUPPRESS {
+                    0 => false,
+                    1 => true,
+                    _ => return Err(Nrc::SubFunctionNotSupported),
+                };
+                // Normal messages, or they and those of a network management that this board has not got.
+                if !matches!(what, 1 | 3) {
+                    return Err(Nrc::RequestOutOfRange);
+                }
+                if is_silenced && !device.may_interrupt() {
+                    return Err(Nrc::ConditionsNotCorrect);
+                }
+                self.is_silenced = is_silenced;
+                put(out, &[sub & !SUPPRESS])?;
+                Ok(sub & SUPPRESS == 0)
+            }
+            UdsCommand::ControlDTCSetting => {
+                self.needs(Session::Extended)?;
+                let sub = *rest.first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+                self.memory.is_enabled = match sub & !SUPPRESS {
+                    1 => true,
+                    2 => false,
+                    _ => return Err(Nrc::SubFunctionNotSupported),
+                };
+                put(out, &[sub & !SUPPRESS])?;
+                Ok(sub & SUPPRESS == 0)
+            }
+            UdsCommand::ClearDiagnosticInformation => {
+                let [a, b, c] = exactly(rest)?;
+                let is_known = self.memory.clear(u32::from_be_bytes([0, a, b, c]));
+                if is_known { Ok(true) } else { Err(Nrc::RequestOutOfRange) }
+            }
+            UdsCommand::ReadDTCInformation => troubles::read(&self.memory, rest, out).map(|()| true),
+            UdsCommand::ReadDataByIdentifier => {
+                if rest.is_empty() || !rest.len().is_multiple_of(2) {
+                    return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+                }
+                let session = self.session as u8;
+                let sources = Sources { device: &*device, counters, session, errors };
+                for id in rest.chunks_exact(2) {
+                    put(out, id)?;
+                    let id = id.try_into().map_or(0, u16::from_be_bytes);
+                    data::read(id, &sources, out)?;
+                }
+                Ok(true)
+            }
+            UdsCommand::WriteDataByIdentifier => {
+                self.needs(Session::Extended)?;
+                let [high, low, bytes @ ..] = rest else {
+                    return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+                };
+                let request = data::write(u16::from_be_bytes([*high, *low]), bytes)?;
+                device.act(&request).map_err(nrc)?;
+                put(out, &[*high, *low])?;
+                Ok(true)
+            }
+            UdsCommand::RoutineControl => self.routine(rest, device, out),
+            UdsCommand::RequestDownload => {
+                self.needs(Session::Programming)?;
+                self.download = None;
+                self.download = Some(Download::begin(rest, device, out)?);
+                Ok(true)
+            }
+            UdsCommand::TransferData => {
+                self.needs(Session::Programming)?;
+                let download = self.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
+                download.block(rest, device, out)?;
+                Ok(true)
+            }
+            UdsCommand::RequestTransferExit => {
+                self.needs(Session::Programming)?;
+                if !rest.is_empty() {
+                    return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+                }
+                let download = self.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
+                download.finish(device)?;
+                self.download = None;
+                Ok(true)
+            }
+            _ => Err(Nrc::ServiceNotSupported),
+        }
+    }
+
+    /// Refuses a service that this session does not have.
+    fn needs(&self, session: Session) -> Result<(), Nrc> {
+        let has =
+            self.session == session || (self.session, session) == (Session::Programming, Session::Extended);
+        if has { Ok(()) } else { Err(Nrc::ServiceNotSupportedInActiveSession) }
+    }
+
+    /// Runs a routine; its number and, for a calibration, its state are the response.
+    fn routine<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        rest: &[u8],
+        device: &mut Device<R, W>,
+        out: &mut Response,
+    ) -> Result<bool, Nrc> {
+        self.needs(Session::Extended)?;
+        let [sub, high, low] = exactly(rest)?;
+        let id = u16::from_be_bytes([high, low]);
+        let control = RoutineControlType::from_repr(sub & !SUPPRESS).ok_or(Nrc::SubFunctionNotSupported)?;
+        let task = match id {
+            0x0200 => Some(Task::Static),
+            0x0201 => Some(Task::Mounting),
+            _ => None,
+        };
+        put(out, &[sub & !SUPPRESS, high, low])?;
+        match (id, task, control) {
+            (_, Some(task), RoutineControlType::StartRoutine) => {
+                device.act(&Request::Calibrate(Calibrate::Start(task))).map_err(nrc)?;
+            }
+            (_, Some(_), RoutineControlType::StopRoutine) => {
+                device.act(&Request::Calibrate(Calibrate::Cancel)).map_err(nrc)?;
+            }
+            (_, Some(task), RoutineControlType::RequestRoutineResult) => {
+                let state = match device.calibration_state() {
+                    State::Running(of) if of == task => 1,
+                    State::Found(of) if of == task => 2,
+                    State::Failed(of, _) if of == task => 3,
+                    _ => return Err(Nrc::RequestSequenceError),
+                };
+                put(out, &[state])?;
+            }
+            (0x0202, None, RoutineControlType::StartRoutine) => {
+                device.act(&Request::Calibrate(Calibrate::Store)).map_err(nrc)?;
+            }
+            (0xFF01, None, RoutineControlType::StartRoutine) => {
+                self.needs(Session::Programming)?;
+                device.act(&Request::WeightsActivate).map_err(nrc)?;
+            }
+            (0x0202 | 0xFF01, None, _) => return Err(Nrc::SubFunctionNotSupported),
+            _ => return Err(Nrc::RequestOutOfRange),
+        }
+        Ok(sub & SUPPRESS == 0)
+    }
+}
