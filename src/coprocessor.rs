@@ -58,7 +58,7 @@ pub struct TimedFrame {
     pub time: Micros,
 }
 
-/// The results of one sample, or of its absence, for a log or a service line.
+/// The results of one sample, or of its absence, for a log or diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
     /// The sample with its validity; `None` where the sensor is silent.

@@ -108,7 +108,7 @@ impl Faults {
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
-    /// Stored data are damaged: weights, configuration or calibration; the service line reports which.
+    /// Stored data are damaged: weights, configuration or calibration; diagnosis reports which.
     pub const STORED: Self = Self(1 << 5);
     /// The wheels are silent, or say that the vehicle stands while the gyro says that it turns.
     pub const WHEELS: Self = Self(1 << 6);

@@ -15,7 +15,7 @@
 //! | [`can`] | encodes Bosch MM5.10, our own messages, J1939, E2E, SLCAN; decodes wheel speeds |
 //! | [`estimate`], [`health`] | describe a corrected rate, its state and the counters |
 //! | [`odometry`] | reckons the vehicle's way from wheel speeds and rate |
-//! | [`store`], [`service`] | keep configuration and weights in flash; answer on the service line |
+//! | [`store`], [`service`] | keep configuration and weights in flash, and change them on request |
 //!
 //! # Ten words
 //!
@@ -98,7 +98,7 @@
 //! | feature | adds |
 //! |---|---|
 //! | `store` | [`store`]: configuration, calibration and weights in flash (serde, postcard, embedded-storage) |
-//! | `service` | [`service`]: the service line, and `store` (cobs) |
+//! | `service` | [`service`] and [`uds`]: stored data and diagnosis, and `store` (automotive_diag) |
 //! | `serde` | `Serialize` and `Deserialize` for configuration and counters |
 //! | `defmt` | `defmt::Format` for the public types |
 //!

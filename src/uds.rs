@@ -12,6 +12,7 @@
 //! | 0x22 | any | [data by identifier](data) |
 //! | 0x28 | 2, 3 | stop (1) and continue (0) the messages of the board, at standstill |
 //! | 0x2E | 2, 3 | the same, where they can be written, at standstill |
+//! | 0x31 | any | 0203 reads the log: events after a number (4 bytes) |
 //! | 0x31 | 2, 3 | 0200 static, 0201 mounting calibration; 0202 stores it; FF01 (session 2) uses the download |
 //! | 0x34, 0x36, 0x37 | 2 | download of a weight file to address 0 |
 //! | 0x3E | any | tester present |

@@ -4,16 +4,18 @@
 //! sees the same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its clock) is
 //! a panic with the model's own words.
 
-pub mod event;
+pub mod bus;
+mod event;
 pub mod line;
 mod link;
 
 use crate::{image, require};
+pub use bus::CanBus;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 pub use event::{Counts, Event};
 use gyronet::can::DataFrame;
 use gyronet_tools::target::bench;
-use line::Line;
+pub use line::Line;
 use link::{Link, hex, unhex};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -138,6 +140,11 @@ impl Board {
             .iter()
             .map(|chunk| (duration(&chunk["time_us"]), unhex(&chunk["hex"])))
             .collect()
+    }
+
+    /// The CAN bus, for a tester.
+    pub fn bus(&mut self) -> CanBus<'_> {
+        CanBus(self)
     }
 
     /// A line of the board, for code that reads and writes.

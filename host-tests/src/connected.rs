@@ -11,9 +11,7 @@ use gyronet::model::{Blob, weights};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::xsens::MtData2;
 use gyronet::service::message::AllCounters;
-use gyronet::service::{Reply, Request};
 use gyronet::store::Configuration;
-use gyronet_tools::client::device::{Device, line::Line};
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);
@@ -188,14 +186,11 @@ pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step
 ///
 /// # Panics
 /// Where it does not answer.
-pub fn counters(device: &mut Device<Line>) -> AllCounters {
+pub fn counters(device: &mut qemu::Tester) -> AllCounters {
     // Idle copies the counters before it checks for a request: if the output task ran in between, the answer is too
     // old. The next one is not.
-    let _ = device.ask(&Request::Counters);
-    match device.ask(&Request::Counters) {
-        Ok(Reply::Counters(counters)) => counters,
-        other => panic!("no counters: {other:?}"),
-    }
+    let _ = device.counters();
+    device.counters().expect("counters")
 }
 
 /// Returns the host's board of a configuration after these steps.

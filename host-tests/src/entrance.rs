@@ -12,7 +12,6 @@ mod recording;
 mod records;
 mod sensors;
 mod sequences;
-mod service;
 mod slcan;
 mod weights;
 
@@ -33,7 +32,7 @@ pub struct Entrance {
 }
 
 /// All entrances.
-pub const ALL: [Entrance; 17] = [
+pub const ALL: [Entrance; 16] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "dsp3000", run: sensors::dsp3000, seeds: sensors::dsp3000_seeds, mutations: 20_000 },
@@ -48,7 +47,6 @@ pub const ALL: [Entrance; 17] = [
     Entrance { name: "slcan_host", run: slcan::host, seeds: slcan::host_seeds, mutations: 20_000 },
     Entrance { name: "can_wheels", run: can::wheels, seeds: can::wheel_seeds, mutations: 20_000 },
     Entrance { name: "can_messages", run: can::messages, seeds: can::message_seeds, mutations: 20_000 },
-    Entrance { name: "service", run: service::line, seeds: service::seeds, mutations: 5_000 },
     Entrance { name: "diagnosis", run: diagnosis::frames, seeds: diagnosis::seeds, mutations: 5_000 },
     Entrance { name: "records", run: records::flash, seeds: records::seeds, mutations: 5_000 },
     Entrance { name: "gyronet_blob", run: weights::gyronet, seeds: weights::seeds, mutations: 100 },

@@ -1,7 +1,9 @@
 //! This module is the emulated board for tests: [`gyronet_tools::target::emulator`] with errors that end the test.
 
 use crate::require::{self, Need};
-use gyronet_tools::client::device::{Device, line::Line};
+use gyronet_tools::client::bus::SlcanBus;
+use gyronet_tools::client::connection::Connection;
+use gyronet_tools::client::device::Device;
 use gyronet_tools::target::emulator::{self, Result};
 use std::net::SocketAddr;
 use std::path::Path;
@@ -9,6 +11,9 @@ use std::time::Duration;
 
 /// The service line is on this USART.
 pub const SERVICE: usize = 6;
+
+/// A tester on the service line.
+pub type Tester = Device<SlcanBus<Connection>>;
 
 /// Checks for QEMU; without it reports that the test is skipped.
 #[must_use]
@@ -68,10 +73,10 @@ impl Board {
 
     /// Opens the service line, once the image listens to it, of a board with [`SERVICE`] USARTs.
     #[must_use]
-    pub fn device(&mut self, limit: Duration) -> Device<Line> {
-        self.send(SERVICE, &[0], limit);
+    pub fn device(&mut self, limit: Duration) -> Tester {
+        self.send(SERVICE, b"\r", limit);
         let port = self.serve(SERVICE).to_string();
-        Device::new(Line::open(&port).expect("the harness listens"), &port)
+        Device::new(SlcanBus::open(&port, 0).expect("the harness listens"), &port)
     }
 
     pub fn word(&mut self, address: u32) -> u32 {

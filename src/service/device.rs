@@ -1,7 +1,7 @@
-//! The device is the board's side of the service line: it holds the stored data and answers requests.
+//! The device holds the stored data and executes the requests that change them.
 //!
-//! Some functions are kept out of their callers: what they have on the stack, requests, replies and
-//! records, is then there only while they run.
+//! Some functions are kept out of their callers: what they have on the stack, requests and records, is then there only
+//! while they run.
 
 mod stored;
 mod weights;
@@ -10,18 +10,14 @@ pub use weights::MappedSlots;
 
 use super::calibrate::{Calibrator, State, Task};
 use super::conditions::Conditions;
-use super::event::{EventKind, EventLog, SensorFault};
-use super::frame::{Deframer, Frame, FrameError, emit};
-use super::message::{
-    AllCounters, Calibrate, FlashState, Identity, Info, LineCounters, Origin, PROTOCOL, Refusal, Reply,
-    Request,
-};
+use super::event::{EventKind, EventLog, LogPage, SensorFault};
+use super::message::{Calibrate, FlashState, Identity, Info, Origin, PROTOCOL, Refusal, Request};
 use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
-use crate::health::{Faults, Status, count};
+use crate::health::{Faults, Status};
 use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
-use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Store, Troubles};
+use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Slot, Store, Troubles};
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
 
@@ -68,9 +64,8 @@ pub struct Device<R: NorFlash, W> {
     faults: Faults,
     tick: u32,
     log: EventLog,
-    deframer: Deframer,
-    service_errors: u32,
-    restart: bool,
+    /// The reason why the last request was refused.
+    refusal: Option<Refusal>,
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
@@ -106,9 +101,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             faults: Faults::NONE,
             tick: 0,
             log: EventLog::new(),
-            deframer: Deframer::new(),
-            service_errors: 0,
-            restart: false,
+            refusal: None,
         }
     }
 
@@ -128,12 +121,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[must_use]
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
-    }
-
-    /// Returns whether a restart was requested; the answer should go out first.
-    #[must_use]
-    pub fn restart_wanted(&self) -> bool {
-        self.restart
     }
 
     /// Notes how setting the sensor up went; the same result again is not noted again.
@@ -173,63 +160,18 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    /// Takes a byte of the service line; with the last one of a request returns the answer.
-    #[inline(never)]
-    pub fn receive(&mut self, byte: u8, counters: &AllCounters) -> Option<Frame> {
-        let (number, reply) = match self.deframer.receive(byte)? {
-            Ok((number, request)) => (number, self.handle(&request, counters)),
-            Err(error) => {
-                count(&mut self.service_errors, 1);
-                let FrameError::Message { number } = error else { return None };
-                (number, Reply::Refused(Refusal::Unknown))
-            }
-        };
-        emit(number, &reply)
-    }
-
-    /// Answers a request.
-    fn handle(&mut self, request: &Request, counters: &AllCounters) -> Reply {
-        if let Some(reply) = self.reply(request, counters) {
-            return reply;
-        }
-        match (self.act(request), self.uploading) {
-            (Err(refusal), _) => Reply::Refused(refusal),
-            (Ok(()), Some(Uploading { upload, checked })) if request.uploads() => {
-                Reply::Weights { slot: upload.slot(), written: upload.written(), checked }
-            }
-            (Ok(()), _) => Reply::Done,
-        }
-    }
-
-    /// Answers a question.
-    #[inline(never)]
-    fn reply(&self, request: &Request, counters: &AllCounters) -> Option<Reply> {
-        Some(match request {
-            Request::Info => Reply::Info(self.info()),
-            Request::GetConfiguration => Reply::Configuration {
-                version: Configuration::VERSION,
-                origin: self.configuration_origin,
-                configuration: self.configuration,
-            },
-            Request::GetWheels => Reply::Wheels { origin: self.wheels_origin, wheels: self.wheels },
-            Request::GetCalibration => Reply::Calibration {
-                version: Calibration::VERSION,
-                origin: self.calibration_origin,
-                state: self.calibration_state,
-                calibration: self.calibration.clone(),
-            },
-            Request::Log { after } => Reply::Log(self.log.page(*after)),
-            Request::Counters => {
-                let lines = LineCounters { service_errors: self.service_errors, ..counters.lines };
-                Reply::Counters(AllCounters { lines, ..*counters })
-            }
-            _ => return None,
-        })
-    }
-
     /// Executes a request.
+    ///
+    /// # Errors
+    /// [`Refusal`]; nothing has changed then.
     #[inline(never)]
-    pub(crate) fn act(&mut self, request: &Request) -> Result<(), Refusal> {
+    pub fn act(&mut self, request: &Request<'_>) -> Result<(), Refusal> {
+        let result = self.execute(request);
+        self.refusal = result.err();
+        result
+    }
+
+    fn execute(&mut self, request: &Request<'_>) -> Result<(), Refusal> {
         if request.interrupts() && !self.may_interrupt() {
             return Err(Refusal::Moving);
         }
@@ -243,17 +185,32 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Request::WeightsBlock { offset, bytes } => self.weights_block(*offset, bytes),
             Request::WeightsVerify => self.weights_verify(),
             Request::WeightsActivate => self.weights_activate(),
-            Request::Restart => {
-                self.restart = true;
-                Ok(())
-            }
-            Request::Info
-            | Request::GetConfiguration
-            | Request::GetWheels
-            | Request::GetCalibration
-            | Request::Log { .. }
-            | Request::Counters => Ok(()),
+            Request::Restart => Ok(()),
         }
+    }
+
+    /// Returns the reason why the last request was refused; `None` where it was executed.
+    #[must_use]
+    pub fn refusal(&self) -> Option<Refusal> {
+        self.refusal
+    }
+
+    /// Forgets why the last request was refused.
+    pub(crate) fn forget_refusal(&mut self) {
+        self.refusal = None;
+    }
+
+    /// Returns the events after a number; 0 for all.
+    #[must_use]
+    pub fn events(&self, after: u32) -> LogPage {
+        self.log.page(after)
+    }
+
+    /// Returns the slot of the upload under way, and the file's checksum, once it is checked.
+    #[must_use]
+    pub fn uploaded(&self) -> Option<(Slot, u32)> {
+        let Uploading { upload, checked } = self.uploading?;
+        Some((upload.slot(), checked?))
     }
 
     /// Returns whether the output may be interrupted: the vehicle is proven to stand. A board without a flash
@@ -271,7 +228,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.log.record(self.tick, kind);
     }
 
-    pub(crate) fn info(&self) -> Info {
+    /// Returns the board's identity and state.
+    #[must_use]
+    pub fn info(&self) -> Info {
         Info {
             protocol: PROTOCOL,
             identity: self.identity,
@@ -279,6 +238,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             flash: self.flash,
             writable: self.writable,
             configuration: self.configuration_origin,
+            wheels: self.wheels_origin,
             calibration: self.calibration_origin,
             weights: self.weights,
             weights_crc: self.weights_crc,
@@ -303,7 +263,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns how a calibration goes.
-    pub(crate) fn calibration_state(&self) -> State {
+    #[must_use]
+    pub fn calibration_state(&self) -> State {
         self.calibration_state
     }
 

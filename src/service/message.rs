@@ -1,28 +1,23 @@
-//! These types are the requests and replies.
+//! These types are the requests that change the board, and what it reports.
 
-use super::calibrate::{State, Task};
-use super::event::{CanFault, ClockFault, Crash, LogPage, ResetCause, SensorFault};
+use super::calibrate::Task;
+use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
 use crate::can::wheel::WheelSettings;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::slots::{SlotError, WeightSource};
-use crate::store::{Calibration, Configuration, Slot, StoreError, UnitMap};
-use heapless::Vec;
+use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
-/// The version of the messages; it is raised when one changes.
-pub const PROTOCOL: u8 = 8;
+/// The version of what is encoded as these types; it is raised when one changes.
+pub const PROTOCOL: u8 = 9;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
-/// The requests.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// The requests that change something.
+#[derive(Debug, Clone, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large ones on; one exists at a time")]
-pub enum Request {
-    /// The board's identity and state.
-    Info,
-    /// The configuration.
-    GetConfiguration,
+pub enum Request<'a> {
     /// A new configuration.
     SetConfiguration {
         /// The version of its layout.
@@ -30,20 +25,13 @@ pub enum Request {
         /// Whole.
         configuration: Configuration,
     },
-    /// The calibration.
-    GetCalibration,
-    /// Something to do about it.
+    /// Other wheel frames.
+    SetWheels(WheelSettings),
+    /// Something to do about the calibration.
     Calibrate(Calibrate),
-    /// Events after a number.
-    Log {
-        /// 0 for all.
-        after: u32,
-    },
-    /// The counters.
-    Counters,
     /// A weight file will come.
     WeightsBegin {
-        /// The CRC-32 of the whole file.
+        /// Its length, bytes.
         length: u32,
     },
     /// A part of it.
@@ -51,21 +39,17 @@ pub enum Request {
         /// Its place in the file.
         offset: u32,
         /// A whole number of words.
-        bytes: Vec<u8, BLOCK>,
+        bytes: &'a [u8],
     },
     /// The file is complete.
     WeightsVerify,
     /// Use it.
     WeightsActivate,
-    /// Reset.
+    /// Reset, which is up to the caller.
     Restart,
-    /// The wheel frames that the board receives.
-    GetWheels,
-    /// Other wheel frames.
-    SetWheels(WheelSettings),
 }
 
-impl Request {
+impl Request<'_> {
     /// Returns whether the request interrupts the output, because it writes the flash or restarts the board.
     #[must_use]
     pub const fn interrupts(&self) -> bool {
@@ -77,26 +61,13 @@ impl Request {
             | Self::WeightsBlock { .. }
             | Self::WeightsActivate
             | Self::Restart => true,
-            Self::Info
-            | Self::GetConfiguration
-            | Self::GetWheels
-            | Self::GetCalibration
-            | Self::Calibrate(Calibrate::Start(_) | Calibrate::Cancel)
-            | Self::Log { .. }
-            | Self::Counters
-            | Self::WeightsVerify => false,
+            Self::Calibrate(Calibrate::Start(_) | Calibrate::Cancel) | Self::WeightsVerify => false,
         }
-    }
-
-    /// Returns whether the request is part of an upload, and is answered by its progress.
-    #[must_use]
-    pub const fn uploads(&self) -> bool {
-        matches!(self, Self::WeightsBegin { .. } | Self::WeightsBlock { .. } | Self::WeightsVerify)
     }
 }
 
 /// The action on the calibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Calibrate {
     /// Begin.
     Start(Task),
@@ -108,65 +79,10 @@ pub enum Calibrate {
     SetUnit(Option<UnitMap>),
 }
 
-/// The answers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[allow(clippy::large_enum_variant, reason = "no heap to put the large ones on; one exists at a time")]
-pub enum Reply {
-    /// The answer to `Info`.
-    Info(Info),
-    /// The answer to `GetConfiguration`.
-    Configuration {
-        /// The version of its layout.
-        version: u8,
-        /// Where it comes from.
-        origin: Origin,
-        /// The configuration that the board was started with.
-        configuration: Configuration,
-    },
-    /// The answer to `GetCalibration`.
-    Calibration {
-        /// The version of its layout.
-        version: u8,
-        /// Where it comes from.
-        origin: Origin,
-        /// The progress of a calibration.
-        state: State,
-        /// The calibration.
-        calibration: Calibration,
-    },
-    /// The answer to `Log`.
-    Log(LogPage),
-    /// The answer to `Counters`.
-    Counters(AllCounters),
-    /// The answer to the requests for weights.
-    Weights {
-        /// The slot that takes the file.
-        slot: Slot,
-        /// Bytes of it that are there; the next block begins here.
-        written: u32,
-        /// Its checksum, once checked.
-        checked: Option<u32>,
-    },
-    /// It is done.
-    Done,
-    /// It is not, and nothing has changed.
-    Refused(Refusal),
-    /// The answer to `GetWheels`.
-    Wheels {
-        /// The origin of the settings.
-        origin: Origin,
-        /// The settings that the board was started with.
-        wheels: WheelSettings,
-    },
-}
-
 /// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// This protocol version has no such request.
-    #[error("not a request of protocol {PROTOCOL}")]
-    Unknown,
     /// Another layout of the configuration.
     #[error("configuration layout {found}, the board has {expected}")]
     Version {
@@ -280,6 +196,8 @@ pub struct Info {
     pub writable: bool,
     /// The origin of the configuration.
     pub configuration: Origin,
+    /// The origin of the wheel settings.
+    pub wheels: Origin,
     /// The origin of the calibration.
     pub calibration: Origin,
     /// The weights that the network runs on.
@@ -321,7 +239,7 @@ pub struct LineCounters {
     pub held: u32,
     /// Observations for which a task of lower priority had no time.
     pub overruns: u32,
-    /// Service frames that were none.
+    /// Lines of the service line that were refused.
     pub service_errors: u32,
     /// Frames of the CAN bus that passed the filters and found no room.
     pub frames_lost: u32,

@@ -14,13 +14,19 @@
 //! | 0106 | 4 each | counters of the sensor's monitor, of the inputs and of the lines, in the order of their types | |
 //! | 0107 | 4 each | conversations of diagnosis that went wrong, in the order of [`TransportErrors`] | |
 //! | 0108 | 4 | 10 ms steps of the sensor's time since the start | |
+//! | 0109 | 4 each | counters of the fibre-optic gyro's lane, in the order of [`FogCounters`] | |
+//! | 010A | postcard | versions, part, reset, clock, stored data, weights and status: [`crate::service::message::Info`] | |
+//! | 010B | postcard | the reason why the last request was refused, where it was: [`crate::service::message::Refusal`] | |
+//! | 010C | postcard | how a calibration goes: [`crate::service::calibrate::State`] | |
+//! | 010D | postcard | gain and mounting of this unit's gyro, or none: [`crate::store::UnitMap`] (read in 0102) | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
 
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, put};
+use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
-use crate::service::message::{AllCounters, LineCounters, Request};
+use crate::service::message::{AllCounters, Calibrate, LineCounters, Request};
 use crate::service::{Device, MappedSlots};
 use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
@@ -104,12 +110,22 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             put_words(out, &words!(*errors => TransportErrors { unexpected, sequence, overflow, timeout }))
         }
         0x0108 => put(out, &device.conditions().tick.to_be_bytes()),
+        0x0109 => put_words(
+            out,
+            &words!(counters.fog => FogCounters {
+                samples, misplaced, gaps, stuck, windows, late, implausible, broken, no_latitude, zero_rate_updates,
+                contradicted, dropped
+            }),
+        ),
+        0x010A => put_record(out, &device.info()),
+        0x010B => put_record(out, &device.refusal()),
+        0x010C => put_record(out, &device.calibration_state()),
         _ => Err(Nrc::RequestOutOfRange),
     }
 }
 
 /// Returns the request that writes these bytes under an identifier.
-pub(super) fn write(id: u16, bytes: &[u8]) -> Result<Request, Nrc> {
+pub(super) fn write(id: u16, bytes: &[u8]) -> Result<Request<'static>, Nrc> {
     let length = Nrc::IncorrectMessageLengthOrInvalidFormat;
     match id {
         0x0100 => {
@@ -117,19 +133,25 @@ pub(super) fn write(id: u16, bytes: &[u8]) -> Result<Request, Nrc> {
             if *version != Configuration::VERSION {
                 return Err(Nrc::RequestOutOfRange);
             }
-            let (configuration, rest) = postcard::take_from_bytes(record).map_err(|_| length)?;
-            let request = Request::SetConfiguration { version: *version, configuration };
-            if rest.is_empty() { Ok(request) } else { Err(length) }
+            match postcard::take_from_bytes(record) {
+                Ok((configuration, [])) => Ok(Request::SetConfiguration { version: *version, configuration }),
+                Ok(_) | Err(_) => Err(length),
+            }
         }
         0x0101 => match postcard::take_from_bytes(bytes) {
             Ok((wheels, [])) => Ok(Request::SetWheels(wheels)),
+            Ok(_) | Err(_) => Err(length),
+        },
+        0x010D => match postcard::take_from_bytes(bytes) {
+            Ok((unit, [])) => Ok(Request::Calibrate(Calibrate::SetUnit(unit))),
             Ok(_) | Err(_) => Err(length),
         },
         _ => Err(Nrc::RequestOutOfRange),
     }
 }
 
-fn put_record(out: &mut Response, record: &impl Serialize) -> Result<(), Nrc> {
+/// Appends a value in postcard's encoding.
+pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<(), Nrc> {
     let start = out.len();
     let room = out.capacity();
     out.resize_default(room).map_err(|_| Nrc::ResponseTooLong)?;

@@ -7,7 +7,6 @@ use super::response::{Nrc, Response, nrc, put};
 use crate::service::message::{BLOCK, Request};
 use crate::service::{Device, MappedSlots};
 use embedded_storage::nor_flash::NorFlash;
-use heapless::Vec;
 
 /// A download under way.
 #[derive(Debug)]
@@ -64,19 +63,27 @@ impl Download {
         }
         let left = self.length - self.offset;
         let expected = left.min(BLOCK as u32) as usize;
-        let bytes = Vec::from_slice(bytes).ok().filter(|bytes| bytes.len() == expected && expected > 0);
-        let bytes = bytes.ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        if bytes.len() != expected || expected == 0 {
+            return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+        }
         device.act(&Request::WeightsBlock { offset: self.offset, bytes }).map_err(nrc)?;
         self.offset += expected as u32;
         self.next = self.next.wrapping_add(1);
         Ok(())
     }
 
-    /// Checks the whole file where it lies.
-    pub fn finish<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) -> Result<(), Nrc> {
+    /// Checks the whole file where it lies; its slot and its checksum are the response.
+    pub fn finish<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        device: &mut Device<R, W>,
+        out: &mut Response,
+    ) -> Result<(), Nrc> {
         if self.offset < self.length {
             return Err(Nrc::RequestSequenceError);
         }
-        device.act(&Request::WeightsVerify).map_err(nrc)
+        device.act(&Request::WeightsVerify).map_err(nrc)?;
+        let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
+        put(out, &[slot as u8])?;
+        put(out, &crc.to_be_bytes())
     }
 }

@@ -238,6 +238,17 @@ impl Transport {
         self.urgent = Some(frame(&[response.len().min(7) as u8], response));
     }
 
+    /// Begins to send a message, as a tester does; the response comes as a request does. Returns whether it is not longer
+    /// than [`LONGEST`].
+    pub fn send(&mut self, message: &[u8]) -> bool {
+        self.response.clear();
+        let fits = self.response.extend_from_slice(message).is_ok();
+        if fits {
+            self.state = State::Sending { sent: 0, sequence: 0, left: 0, gap_ms: 0, due: 0 };
+        }
+        fits
+    }
+
     /// Has `answer` write the response to the request, if there is one, and begins to send it; an empty one ends the
     /// request without a response. Returns whether there was a request.
     pub fn answer(&mut self, answer: impl FnOnce(&[u8], &mut Vec<u8, LONGEST>)) -> bool {

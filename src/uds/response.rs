@@ -24,7 +24,7 @@ pub(super) fn exactly<const N: usize>(bytes: &[u8]) -> Result<[u8; N], Nrc> {
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
         Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,
-        Refusal::Unknown | Refusal::Version { .. } | Refusal::OtherWeights { .. } => Nrc::RequestOutOfRange,
+        Refusal::Version { .. } | Refusal::OtherWeights { .. } => Nrc::RequestOutOfRange,
         Refusal::Store(StoreError::Field(_) | StoreError::Version { .. } | StoreError::Encoding) => {
             Nrc::RequestOutOfRange
         }

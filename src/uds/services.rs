@@ -161,6 +161,9 @@ impl Services {
         out: &mut Response,
     ) -> Result<bool, Nrc> {
         let command = UdsCommand::from_repr(service).ok_or(Nrc::ServiceNotSupported)?;
+        if command != UdsCommand::ReadDataByIdentifier {
+            device.forget_refusal();
+        }
         match command {
             UdsCommand::DiagnosticSessionControl => {
                 let [sub] = exactly(rest)?;
@@ -272,7 +275,7 @@ impl Services {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 }
                 let download = self.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
-                download.finish(device)?;
+                download.finish(device, out)?;
                 self.download = None;
                 Ok(true)
             }
@@ -294,6 +297,11 @@ impl Services {
         device: &mut Device<R, W>,
         out: &mut Response,
     ) -> Result<bool, Nrc> {
+        if let [1, 0x02, 0x03, after @ ..] = rest {
+            put(out, &[1, 0x02, 0x03])?;
+            data::put_record(out, &device.events(u32::from_be_bytes(exactly(after)?)))?;
+            return Ok(true);
+        }
         self.needs(Session::Extended)?;
         let [sub, high, low] = exactly(rest)?;
         let id = u16::from_be_bytes([high, low]);

@@ -39,6 +39,12 @@ impl Read for Line<'_> {
     }
 }
 
+impl gyronet_tools::client::bus::Line for Line<'_> {
+    fn now(&mut self) -> Duration {
+        self.board.counts().time
+    }
+}
+
 impl Write for Line<'_> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize> {
         self.board.send(self.usart, bytes);

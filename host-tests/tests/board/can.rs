@@ -2,13 +2,12 @@
 //! away gets nothing old when it is back.
 
 use crate::common::{self, SAMPLE, SET, SLCAN, START, boot, counters, drive, frames, host, resets};
+use crate::service;
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::yaw::{AngleMessage, RateMessage};
 use gyronet::health::{Faults, Quality};
-use gyronet::service::Request;
-use gyronet::service::frame::emit;
-use gyronet::store::{Configuration, Record};
+use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
@@ -271,8 +270,9 @@ fn an_erase_is_announced_and_costs_no_time() {
     }
     let _ = (board.can_frames(), board.events());
     let configuration = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
-    let request = Request::SetConfiguration { version: Configuration::VERSION, configuration };
-    board.send(common::SERVICE, &emit(1, &request).expect("it fits"));
+    service::enter(&mut board, 3);
+    let _ = board.can_frames();
+    service::send(&mut board, &service::storing(&configuration));
     board.run(Duration::from_millis(900));
     let erased = board.events().into_iter().find(|event| event.kind == "flash_erase").expect("an erase");
     let sent = board.can_frames();
@@ -296,7 +296,6 @@ fn an_erase_is_announced_and_costs_no_time() {
     let missing = ((after[after.len() - 1].0 - before[0].0).as_millis() / SAMPLE.as_millis()) as usize;
     assert!(missing - ticks(&before) - ticks(&after) >= 20, "the samples of 250 ms are missing");
     // DMA went on and wrote over what waited.
-    let _ = board.sent(common::SERVICE);
     let lost = counters(&mut board).lines.line_errors;
     assert!(lost >= 512, "{lost} bytes lost");
 }

@@ -1,12 +1,11 @@
 //! The board of these tests: an MTi on USART1, SLCAN on USART2 at 921600, the service line on USART6, CAN.
 
+use crate::service;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::service::message::{AllCounters, Info};
-use gyronet::service::{Reply, Request};
 use gyronet_host_tests::board::{self, Board};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::replay;
-use gyronet_tools::client::device::Device;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -65,26 +64,14 @@ pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
     timed.iter().map(|(_, frame)| *frame).collect()
 }
 
-fn ask(board: &mut Board, request: &Request) -> Reply {
-    // A zero ends whatever the line has brought before.
-    board.send(SERVICE, &[0]);
-    Device::new(board.line(SERVICE), "the virtual board").ask(request).expect("an answer")
-}
-
 /// The state that the board reports.
 pub fn info(board: &mut Board) -> Info {
-    match ask(board, &Request::Info) {
-        Reply::Info(info) => info,
-        other => panic!("{other:?}"),
-    }
+    service::info(board)
 }
 
 /// The board's counters.
 pub fn counters(board: &mut Board) -> AllCounters {
-    match ask(board, &Request::Counters) {
-        Reply::Counters(counters) => counters,
-        other => panic!("{other:?}"),
-    }
+    service::on_line(board).counters().expect("a response")
 }
 
 /// Times and causes of resets.

@@ -14,13 +14,14 @@ use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::can::{DataFrame, config::Config, slcan};
 use gyronet::health::InputCounters;
-use gyronet::service::frame::{Deframer, emit};
 use gyronet::service::message::{AllCounters, LineCounters};
-use gyronet::service::{Reply, Request};
+use gyronet::uds::isotp::Transport;
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::connected::Step;
 use gyronet_host_tests::recordings::Row;
 use gyronet_host_tests::replay;
+use gyronet_host_tests::tester::segment;
+use gyronet_tools::client::device::requests;
 use gyronet_tools::client::monitor::{Counts, Monitor};
 use gyronet_tools::simulate::{self, Simulation};
 use std::time::{Duration, Instant};
@@ -44,6 +45,12 @@ const WHEELS_AFTER: Duration = Duration::from_millis(8);
 const OTHERS: [u16; 3] = [0x0AB, 0x2C1, 0x3D0];
 /// Samples between two questions on the service line.
 const QUESTION: usize = 10;
+/// The questions: identity, configuration, troubles, and the counters, whose answer is the longest.
+const QUESTIONS: [&[u8]; 4] =
+    [&[0x22, 0x01, 0x0A], &[0x22, 0x01, 0x00], &[0x19, 0x02, 0xFF], &requests::COUNTERS];
+/// A flow control that grants all of an answer, and the time from a question to it: the answer's first frame is out.
+const GRANT: [u8; 8] = [0x30, 0, 0, 0, 0, 0, 0, 0];
+const GRANT_AFTER: Duration = Duration::from_millis(12);
 /// The end and the size of the stack's region (memory.x), the bytes that may be used of it, and what the rest is filled
 /// with.
 const STACK_END: u32 = 0x2000_8000;
@@ -51,24 +58,22 @@ const STACK_SIZE: u32 = 0x8000;
 const STACK_BUDGET: usize = 12 << 10;
 const PAINT: u8 = 0xA5;
 
+/// Returns a frame to the board as a line.
+fn line(data: &[u8; 8]) -> Vec<u8> {
+    let id = StandardId::new(0x7E0).expect("11 bits");
+    slcan::emit(&DataFrame::new(id, data).expect("eight bytes")).expect("a data frame").to_vec()
+}
+
 /// Holds the inputs that the outside sends and the frames that the host computes from them.
 struct Outside {
     drive: Simulation,
     number: usize,
     host: replay::Board,
-    questions: [Vec<u8>; 4],
 }
 
 impl Outside {
     fn new() -> Self {
-        let question = |request: Request| emit(0, &request).expect("it fits").to_vec();
-        let all = [Request::Info, Request::GetConfiguration, Request::Log { after: 0 }, Request::Counters];
-        Self {
-            drive: Simulation::new(&simulate::Config::DEFAULT),
-            number: 0,
-            host: replay::Board::new(),
-            questions: all.map(question),
-        }
+        Self { drive: Simulation::new(&simulate::Config::DEFAULT), number: 0, host: replay::Board::new() }
     }
 
     /// Sends a sample's 10 ms of everything.
@@ -102,7 +107,9 @@ impl Outside {
             }
         }
         if number.is_multiple_of(QUESTION) {
-            board.send_at(SERVICE, &self.questions[number / QUESTION % self.questions.len()], begin);
+            let question = QUESTIONS[number / QUESTION % QUESTIONS.len()];
+            board.send_at(SERVICE, &line(&segment(question)[0]), begin);
+            board.send_at(SERVICE, &line(&GRANT), begin + GRANT_AFTER);
         }
     }
 }
@@ -111,7 +118,8 @@ impl Outside {
 struct Received {
     can: Vec<DataFrame>,
     slcan: Vec<u8>,
-    deframer: Deframer,
+    service: Vec<u8>,
+    transport: Transport,
     monitor: Monitor,
     /// Frames of the inertial sensor's samples that were the host's, and frames of the fibre-optic gyro.
     own: usize,
@@ -125,7 +133,8 @@ impl Received {
         Self {
             can: Vec::new(),
             slcan: Vec::new(),
-            deframer: Deframer::new(),
+            service: Vec::new(),
+            transport: Transport::new(),
             monitor: Monitor::new(&Config::DEFAULT),
             own: 0,
             fog: 0,
@@ -164,17 +173,26 @@ impl Received {
         let ahead: Vec<u8> =
             lines[both..].iter().flat_map(|frame| slcan::emit(frame).expect("a data frame")).collect();
         self.slcan.splice(..0, ahead);
-        for byte in board.sent(SERVICE) {
-            match self.deframer.receive(byte) {
-                Some(Ok((_, Reply::Counters(counters)))) => {
-                    self.answers += 1;
-                    self.counters = Some(counters);
+        self.service.extend(board.sent(SERVICE));
+        let whole = self.service.iter().rposition(|byte| *byte == b'\r').map_or(0, |at| at + 1);
+        for line in self.service.drain(..whole).collect::<Vec<u8>>().split(|byte| *byte == b'\r') {
+            // An empty line says that a frame has been taken.
+            let Ok(frame) = slcan::parse::<DataFrame>(line) else {
+                assert!(line.is_empty(), "{}", line.escape_ascii());
+                continue;
+            };
+            self.transport.receive(frame.data(), 0);
+            let (answers, counters) = (&mut self.answers, &mut self.counters);
+            self.transport.answer(|message, _| {
+                *answers += 1;
+                match message {
+                    [0x62, rest @ ..] if rest.len() > 100 => {
+                        *counters = Some(requests::counters(rest).expect("counters"));
+                    }
+                    [0x59 | 0x62, ..] => {}
+                    other => panic!("{other:02x?}"),
                 }
-                Some(Ok((_, Reply::Refused(refusal)))) => panic!("{refusal}"),
-                Some(Ok(_)) => self.answers += 1,
-                Some(Err(error)) => panic!("an answer is damaged: {error}"),
-                None => {}
-            }
+            });
         }
     }
 }

@@ -4,8 +4,6 @@ use crate::common::{self, SLCAN, START};
 use crate::service;
 use embedded_can::{Frame, Id};
 use gyronet::can::yaw::{AngleMessage, RateMessage};
-use gyronet::service::Reply;
-use gyronet::service::Request;
 use gyronet::service::event::{EventKind, SensorFault};
 use gyronet::service::message::AllCounters;
 use gyronet::store::{Configuration, ImuPart};
@@ -61,13 +59,6 @@ fn of(board: &mut Board, id: u16) -> Vec<(Duration, Vec<u8>)> {
     own.map(|(time, frame)| (time, frame.data().to_vec())).collect()
 }
 
-fn counters(board: &mut Board) -> AllCounters {
-    match service::ask(board, &Request::Counters) {
-        Ok(Reply::Counters(counters)) => counters,
-        other => panic!("{other:?}"),
-    }
-}
-
 fn assert_driven_well(board: &mut Board) {
     let events = board.events();
     let fault = events.iter().find(|event| FAULTS.contains(&event.kind.as_str()));
@@ -112,7 +103,7 @@ fn in_order(test: &str, seconds: usize) {
     assert_eq!(service::info(&mut board).sensor, None);
     let per_second = on_the_grid(&mut board, seconds);
     assert!(per_second.iter().all(|samples| (99..=101).contains(samples)), "{per_second:?}");
-    let AllCounters { pipeline, watch, inputs, .. } = counters(&mut board);
+    let AllCounters { pipeline, watch, inputs, .. } = common::counters(&mut board);
     println!("{test}: {} samples in {seconds} s", per_second.iter().sum::<usize>());
     assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, inputs.imu_errors], [0; 4]);
     assert_eq!([watch.silences, watch.stuck, watch.clock_off], [0; 3]);
@@ -190,7 +181,7 @@ fn part_that_falls_silent_comes_back() {
     let turning = back.iter().rev().take(5).map(|(_, rate)| rate.expect("a rate"));
     turning.for_each(|rate| assert!((rate - 10.0).abs() < 0.2, "{rate} deg/s"));
     assert_eq!(service::info(&mut board).sensor, None);
-    let AllCounters { pipeline, watch, .. } = counters(&mut board);
+    let AllCounters { pipeline, watch, .. } = common::counters(&mut board);
     assert_eq!(watch.silences, 1);
     assert_eq!(pipeline.misplaced, 0, "every sample has a place on the grid");
 }
@@ -209,7 +200,7 @@ fn wrong_part_is_named_and_gives_no_rate() {
     board.run(SECOND * 3 / 2);
     let silent = rates(&mut board);
     assert!(silent.len() > 30 && silent.iter().all(|(_, rate)| rate.is_none()), "{silent:?}");
-    let Ok(Reply::Log(log)) = service::ask(&mut board, &Request::Log { after: 0 }) else { panic!("no log") };
+    let log = service::on_line(&mut board).log(0).expect("a response");
     let named = |kind: &EventKind| *kind == EventKind::Sensor(Some(SensorFault::Identity(OTHER)));
     // It is tried again every second, and reported once.
     assert_eq!(log.events.iter().filter(|event| named(&event.kind)).count(), 1);
@@ -260,6 +251,6 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off() {
     println!("{TEST}: {turned:.4} deg of {expected}, {per_second} samples a second");
     assert!((100.5..=101.5).contains(&per_second), "{per_second}");
     assert!((turned / expected - 1.0).abs() < 1e-3, "{turned} deg of {expected}");
-    assert_eq!(counters(&mut board).watch.clock_off, 0);
+    assert_eq!(common::counters(&mut board).watch.clock_off, 0);
     assert_driven_well(&mut board);
 }

@@ -1,12 +1,11 @@
 //! The model of the STM32F405 itself: its own tests, and the image as it is flashed running on it.
 
+use crate::service::{self, info};
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::{FlashState, Identity, Info, Origin};
-use gyronet::service::{Reply, Request};
 use gyronet_host_tests::board::{self, At, Board, PACKAGES};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{replay, require};
-use gyronet_tools::client::device::Device;
 use std::process::Command;
 use std::time::Duration;
 
@@ -26,13 +25,6 @@ fn boot(test: &str) -> Option<Board> {
     let mut board = Board::boot(test, &elf)?;
     board.configure(&format!("USART{SLCAN}.baud"), BAUD);
     Some(board)
-}
-
-fn info(board: &mut Board) -> Info {
-    match Device::new(board.line(SERVICE), "the virtual board").ask(&Request::Info) {
-        Ok(Reply::Info(info)) => info,
-        other => panic!("{other:?}"),
-    }
 }
 
 #[test]
@@ -76,8 +68,7 @@ fn image_answers_on_the_service_line_and_restarts_on_request() {
     let about = info(&mut board);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, true));
     assert_eq!(about.configuration, Origin::BuiltIn);
-    let restart = Device::new(board.line(SERVICE), "the virtual board").ask(&Request::Restart);
-    assert_eq!(restart.expect("an answer"), Reply::Done);
+    service::on_line(&mut board).restart().expect("a response");
     board.run(START);
     let causes: Vec<_> = board
         .events()

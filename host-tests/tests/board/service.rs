@@ -1,79 +1,88 @@
-//! Questions on the service line, with limits of board time: a test does the same however busy the host is.
+//! Testers of the virtual board, with limits of board time: a test does the same however busy the host is.
 
 use crate::common::SERVICE;
-use gyronet::service::frame::{Deframer, emit};
-use gyronet::service::message::{Info, Refusal};
-use gyronet::service::{Reply, Request};
-use gyronet::store::slots::Slot;
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::service::message::Info;
 use gyronet::store::{Configuration, Record};
-use gyronet_host_tests::board::Board;
+use gyronet_host_tests::board::{Board, CanBus, Line};
+use gyronet_host_tests::tester::segment;
+use gyronet_tools::client::bus::SlcanBus;
+use gyronet_tools::client::device::Device;
 use std::time::Duration;
 
-/// Board time that an answer may take: an erase of a record sector at the data sheet's maximum, and the line.
+const REQUEST: u16 = 0x7E0;
+const RESPONSE: u16 = 0x7E8;
+/// The frames of a request that the board grants at a time, and the time that they take and are granted in.
+const BLOCK: usize = 8;
+const BLOCK_TIME: Duration = Duration::from_millis(5);
+/// Board time that a response may take: an erase of a record sector at the data sheet's maximum.
 pub const ANSWER: Duration = Duration::from_millis(700);
-/// Board time that passes from byte to byte of an answer, at most.
-const BYTES: Duration = Duration::from_millis(2);
 
-/// Puts a request on the line, behind a zero that ends whatever came before.
-pub fn send(board: &mut Board, request: &Request) {
-    let _ = board.sent(SERVICE);
-    board.send(SERVICE, &[0]);
-    board.send(SERVICE, &emit(1, request).expect("it fits a frame"));
+/// A tester on the service line.
+pub fn on_line(board: &mut Board) -> Device<SlcanBus<Line<'_>>> {
+    Device::new(SlcanBus::new(board.line(SERVICE)), "the virtual board")
 }
 
-/// Waits for the answer to the request that was sent; `None` when none has begun within the limit.
-pub fn answer(board: &mut Board, limit: Duration) -> Option<Reply> {
-    let mut deframer = Deframer::new();
-    let mut limit = limit;
-    while board.run_until_sent(SERVICE, 1, limit) {
-        for byte in board.sent(SERVICE) {
-            match deframer.receive(byte) {
-                Some(Ok((_, reply))) => return Some(reply),
-                Some(Err(error)) => panic!("a damaged answer: {error}"),
-                None => {}
-            }
-        }
-        limit = BYTES;
-    }
-    None
+/// A tester on CAN, which takes the frames that the board sends meanwhile.
+pub fn on_bus(board: &mut Board) -> Device<CanBus<'_>> {
+    Device::new(board.bus(), "the virtual board")
 }
 
-/// Asks, and gives the answer or the refusal.
-pub fn ask(board: &mut Board, request: &Request) -> Result<Reply, Refusal> {
-    send(board, request);
-    match answer(board, ANSWER) {
-        Some(Reply::Refused(refusal)) => Err(refusal),
-        Some(reply) => Ok(reply),
-        None => panic!("no answer to {request:?}"),
-    }
-}
-
-/// The request to store a configuration.
-pub fn storing(configuration: Configuration) -> Request {
-    Request::SetConfiguration { version: Configuration::VERSION, configuration }
+/// The state that the board reports on the service line.
+pub fn info(board: &mut Board) -> Info {
+    on_line(board).info().expect("a response")
 }
 
 /// The configuration that the board was started with.
 pub fn configuration(board: &mut Board) -> Configuration {
-    match ask(board, &Request::GetConfiguration) {
-        Ok(Reply::Configuration { configuration, .. }) => configuration,
-        other => panic!("{other:?}"),
+    on_line(board).configuration().expect("a response")
+}
+
+/// The request that stores a configuration.
+pub fn storing(configuration: &Configuration) -> Vec<u8> {
+    let record = postcard::to_stdvec(configuration).expect("there is room");
+    [&[0x2E, 0x01, 0x00, Configuration::VERSION][..], &record].concat()
+}
+
+/// Puts a request on CAN. When this returns, its last frames are on their way: nothing has been done about it.
+pub fn send(board: &mut Board, request: &[u8]) {
+    let frames = segment(request);
+    let last = frames.len() - 1;
+    for (number, data) in frames.iter().enumerate() {
+        let id = StandardId::new(REQUEST).expect("11 bits");
+        board.can_send(&DataFrame::new(id, data).expect("eight bytes"));
+        // The board grants the frames behind the first one, and behind each block.
+        if number % BLOCK == 0 && number < last {
+            board.run(BLOCK_TIME);
+        }
     }
 }
 
-/// The state that the board reports.
-pub fn info(board: &mut Board) -> Info {
-    match ask(board, &Request::Info) {
-        Ok(Reply::Info(info)) => info,
-        other => panic!("{other:?}"),
+/// Waits for the response to the request that was sent, which must fit a frame; `None` when none comes within the limit.
+pub fn answer(board: &mut Board, limit: Duration) -> Option<Vec<u8>> {
+    let until = board.counts().time + limit;
+    while board.counts().time < until {
+        board.run(Duration::from_millis(1));
+        let own = Id::from(StandardId::new(RESPONSE).expect("11 bits"));
+        let frames = board.can_frames().into_iter().map(|(_, frame)| frame).filter(|frame| frame.id() == own);
+        let messages = frames.filter(|frame| frame.data()[0] < 8);
+        let mut messages = messages.map(|frame| frame.data()[1..=usize::from(frame.data()[0])].to_vec());
+        // "Response pending" is waited out.
+        if let Some(message) = messages.find(|message| !matches!(message[..], [0x7F, _, 0x78])) {
+            return Some(message);
+        }
     }
+    None
 }
 
-/// The slot that an upload goes to, once begun.
-pub fn begin_upload(board: &mut Board, length: usize) -> Slot {
-    send(board, &Request::WeightsBegin { length: length as u32 });
-    match answer(board, Duration::from_secs(4)) {
-        Some(Reply::Weights { slot, .. }) => slot,
-        other => panic!("{other:?}"),
-    }
+/// Sends a request over CAN and returns the response, which must fit a frame.
+pub fn ask(board: &mut Board, request: &[u8]) -> Vec<u8> {
+    send(board, request);
+    answer(board, ANSWER).unwrap_or_else(|| panic!("no response to {request:02x?}"))
+}
+
+/// Enters a session.
+pub fn enter(board: &mut Board, session: u8) {
+    assert_eq!(ask(board, &[0x10, session])[..2], [0x50, session]);
 }

@@ -1,19 +1,18 @@
-//! The board stores records over used sectors and weight files, through the service line and the flash
+//! The board stores records over used sectors and weight files, through diagnosis and the flash
 //! controller, and works on while it erases as far as the part lets it.
 
-use crate::common::{self, IMU, SERVICE, START};
-use crate::service::{self, ask, storing};
+use crate::common::{self, IMU, START};
+use crate::service::{self, ask, on_bus, storing};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::{Blob, weights};
 use gyronet::service::message::{FlashState, Origin, Refusal};
-use gyronet::service::{Reply, Request};
 use gyronet::store::layout::{FLASH_BASE, STORE};
 use gyronet::store::slots::WeightSource;
 use gyronet::store::{Configuration, Field, FieldError, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::other_weights;
-use gyronet_tools::client::device::Device;
+use gyronet_tools::client::device::error::DeviceError;
 use gyronet_tools::client::device::upload::{Uploaded, upload};
 use std::time::Duration;
 
@@ -37,7 +36,7 @@ fn timed<T>(board: &mut Board, work: impl FnOnce(&mut Board) -> T) -> (T, Durati
 }
 
 fn restart(board: &mut Board) {
-    assert_eq!(ask(board, &Request::Restart), Ok(Reply::Done));
+    on_bus(board).restart().expect("a response");
     board.run(START);
 }
 
@@ -67,8 +66,9 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
     while erased.len() < 4 {
         for _ in 0..STORES {
             stores += 1;
-            let (reply, took) = timed(&mut board, |board| ask(board, &storing(latitude(stores))));
-            assert_eq!(reply, Ok(Reply::Done), "store {stores}");
+            let (stored, took) =
+                timed(&mut board, |board| on_bus(board).set_configuration(&latitude(stores)));
+            stored.unwrap_or_else(|error| panic!("store {stores}: {error}"));
             let (sectors, causes) = erased_and_reset(&mut board);
             let least = ERASE * sectors.len() as u32;
             assert!(
@@ -96,15 +96,19 @@ fn invalid_configuration_is_refused_and_changes_nothing() {
         return;
     };
     board.run(START);
-    assert_eq!(ask(&mut board, &storing(latitude(7))), Ok(Reply::Done));
+    on_bus(&mut board).set_configuration(&latitude(7)).expect("it is stored");
     let records = |board: &mut Board| board.read(At::Address(FLASH_BASE + STORE.start), STORE.len());
     let before = records(&mut board);
     let wild = Configuration { latitude_deg: Some(91.0), ..latitude(8) };
     let range = FieldError::Range { field: Field::LatitudeDeg, value: 91.0, low: -90.0, high: 90.0 };
     let refusal = Refusal::Store(StoreError::Field(range));
-    assert_eq!(ask(&mut board, &storing(wild)), Err(refusal));
-    let other = Request::SetConfiguration { version: 1, configuration: latitude(8) };
-    assert!(matches!(ask(&mut board, &other), Err(Refusal::Version { found: 1, .. })));
+    match on_bus(&mut board).set_configuration(&wild) {
+        Err(DeviceError::Refused(found)) => assert_eq!(found, refusal),
+        other => panic!("{other:?}"),
+    }
+    let mut other = storing(&latitude(8));
+    other[3] = 1;
+    assert_eq!(ask(&mut board, &other), [0x7F, 0x2E, 0x31], "another layout");
     assert!(records(&mut board) == before, "the flash is as it was");
     restart(&mut board);
     assert_eq!(service::configuration(&mut board), latitude(7));
@@ -119,9 +123,9 @@ fn stale_error_flags_of_the_flash_controller_refuse_no_store() {
     };
     board.run(START);
     board.configure("FLASH.error_flags", ERRORS);
-    assert_eq!(ask(&mut board, &storing(latitude(3))), Ok(Reply::Done));
+    on_bus(&mut board).set_configuration(&latitude(3)).expect("it is stored");
     board.configure("FLASH.error_flags", ERRORS);
-    assert_eq!(ask(&mut board, &storing(latitude(4))), Ok(Reply::Done), "where no sector is erased");
+    on_bus(&mut board).set_configuration(&latitude(4)).expect("no sector is erased");
     restart(&mut board);
     assert_eq!(service::configuration(&mut board), latitude(4));
 }
@@ -133,8 +137,8 @@ fn board_time_goes_on_over_an_erase() {
     board.configure("GPIOA.watch", vec![LED]);
     board.run(START + 2 * BLINK);
     // The first store erases a sector, whatever is in it.
-    let (reply, took) = timed(&mut board, |board| ask(board, &storing(latitude(1))));
-    assert_eq!(reply, Ok(Reply::Done));
+    let (stored, took) = timed(&mut board, |board| on_bus(board).set_configuration(&latitude(1)));
+    stored.expect("it is stored");
     assert!(took > ERASE);
     board.run(3 * BLINK);
     let events = board.events();
@@ -161,11 +165,18 @@ fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
     board.configure("RCC.lsi_hz", 47_000);
     board.power_on();
     board.run(START);
-    let (slot, took) = timed(&mut board, |board| service::begin_upload(board, 64));
-    println!("{TEST}: slot {slot} erased in {took:?}");
+    service::enter(&mut board, 2);
+    let _ = erased_and_reset(&mut board);
+    let (response, took) = timed(&mut board, |board| {
+        service::send(board, &[0x34, 0, 0x11, 0, 64]);
+        service::answer(board, Duration::from_secs(4))
+    });
+    assert_eq!(response, Some(vec![0x74, 0x20, 1, 2]));
+    println!("{TEST}: a slot is erased in {took:?}");
     assert!(took >= Duration::from_secs(2));
     board.run(Duration::from_millis(500));
-    assert_eq!(erased_and_reset(&mut board), (vec![10], vec!["por".to_owned()]));
+    // The sensor's silence is stored behind it.
+    assert_eq!(erased_and_reset(&mut board), (vec![10, 1], Vec::new()));
     // Idle hangs.
     board.patch(At::Symbol("idle::Idle::turn"), &[0xFE, 0xE7]);
     let hung = board.counts().time;
@@ -183,9 +194,7 @@ fn uploaded_weights_run_from_their_slot() {
     board.run(START);
     let file = other_weights(1);
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
-    let (done, took) = timed(&mut board, |board| {
-        upload(&mut Device::new(board.line(SERVICE), "the virtual board"), &file, |_| {})
-    });
+    let (done, took) = timed(&mut board, |board| upload(&mut on_bus(board), &file, |_| {}));
     assert_eq!(done.expect("it is taken"), Uploaded { slot: Slot::A, crc });
     println!("{TEST}: {} bytes in {took:?}", file.len());
     assert_eq!(service::info(&mut board).weights, WeightSource::BuiltIn);

@@ -1,13 +1,11 @@
 //! The supply on the virtual board: low at the start, falling while the image runs, falling during an erase.
 
-use crate::common::{SERVICE, START, boot, info, resets, unpowered};
+use crate::common::{START, boot, info, resets, unpowered};
+use crate::service;
 use gyronet::service::crash::CrashKind;
 use gyronet::service::event::ClockFault;
-use gyronet::service::frame::emit;
-use gyronet::service::{Reply, Request};
-use gyronet::store::{Configuration, Mounting, Record};
+use gyronet::store::{Configuration, Mounting};
 use gyronet_host_tests::board::Board;
-use gyronet_tools::client::device::Device;
 use std::time::Duration;
 
 const SUPPLY: &str = "PWR.supply_mv";
@@ -56,31 +54,16 @@ fn falling_while_the_image_runs() {
     assert_eq!(identity.clock_fault, None);
 }
 
-/// The request that stores a configuration whose mounting holds a number.
-fn request(number: u16) -> Request {
+/// A configuration whose mounting holds a number.
+fn numbered(number: u16) -> Configuration {
     let [tens, units] = [number / 100, number % 100].map(f32::from);
     let mounting = Mounting { roll_deg: 0.0, pitch_deg: tens, yaw_deg: units };
-    let configuration = Configuration { mounting, ..Configuration::DEFAULT };
-    Request::SetConfiguration { version: Configuration::VERSION, configuration }
-}
-
-fn try_ask(board: &mut Board, request: &Request) -> Result<Reply, String> {
-    board.send(SERVICE, &[0]);
-    let mut device = Device::new(board.line(SERVICE), "the virtual board");
-    device.ask(request).map_err(|error| error.to_string())
-}
-
-fn ask(board: &mut Board, request: &Request) -> Reply {
-    try_ask(board, request).expect("an answer")
+    Configuration { mounting, ..Configuration::DEFAULT }
 }
 
 fn stored(board: &mut Board) -> u16 {
-    match ask(board, &Request::GetConfiguration) {
-        Reply::Configuration { configuration: Configuration { mounting, .. }, .. } => {
-            mounting.pitch_deg as u16 * 100 + mounting.yaw_deg as u16
-        }
-        other => panic!("{other:?}"),
-    }
+    let mounting = service::configuration(board).mounting;
+    mounting.pitch_deg as u16 * 100 + mounting.yaw_deg as u16
 }
 
 #[test]
@@ -89,10 +72,9 @@ fn falling_during_an_erase() {
     board.run(START);
     // Until a store has to erase a sector; the supply falls in the middle of that.
     let last = (1..1_000).find(|number| {
+        service::enter(&mut board, 3);
         let _ = board.events();
-        let frame = emit(1, &request(*number)).expect("it fits");
-        board.send(SERVICE, &[0]);
-        board.send(SERVICE, &frame);
+        service::send(&mut board, &service::storing(&numbered(*number)));
         board.run_until("flash_erase", Duration::from_millis(60)).is_some()
     });
     let last = last.expect("the records' sectors are full at some time");
@@ -103,13 +85,15 @@ fn falling_during_an_erase() {
     board.run(3 * SECOND);
     let identity = info(&mut board).identity;
     assert_eq!(identity.crash.map(|crash| crash.kind), Some(CrashKind::SupplyLow), "{identity:?}");
-    let refused = try_ask(&mut board, &request(last + 1)).expect_err("nothing is stored at a low supply");
+    // There is no CAN at a low supply.
+    let refused = service::on_line(&mut board).set_configuration(&numbered(last + 1));
+    let refused = refused.expect_err("nothing is stored at a low supply").to_string();
     assert!(refused.contains("flash"), "{refused}");
     board.configure(SUPPLY, GOOD);
     board.run(3 * SECOND);
     let found = stored(&mut board);
     assert!(found + 1 == last || found == last, "{found}, not {} or {last}", last - 1);
-    assert_eq!(ask(&mut board, &request(last + 1)), Reply::Done, "it stores again");
+    service::on_line(&mut board).set_configuration(&numbered(last + 1)).expect("it stores again");
     board.reset_pin();
     board.run(START);
     assert_eq!(stored(&mut board), last + 1);

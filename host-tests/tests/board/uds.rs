@@ -67,7 +67,8 @@ fn a_weight_file_comes_over_can_and_is_used() {
     for (number, bytes) in (1..=255u8).chain(0..=255).cycle().zip(file.chunks(256)) {
         assert_eq!(ask(&mut board, &[&[0x36, number], bytes].concat()), Some(vec![0x76, number]));
     }
-    assert_eq!(ask(&mut board, &[0x37]), Some(vec![0x77]));
+    let finished = [&[0x77, 0][..], &crc(&file)].concat();
+    assert_eq!(ask(&mut board, &[0x37]), Some(finished), "slot A, and the checksum");
     assert_eq!(ask(&mut board, &[0x31, 1, 0xFF, 1]), Some(vec![0x71, 1, 0xFF, 1]));
     assert_eq!(ask(&mut board, &[0x11, 1]), Some(vec![0x51, 1]));
     board.run(START);

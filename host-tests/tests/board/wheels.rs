@@ -1,13 +1,12 @@
 //! Wheel frames of another maker: from a DBC file to the record in the board's flash, and on the bus.
 
 use crate::common::{self, SAMPLE, START, drive, frames};
-use crate::service::ask;
+use crate::service;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::yaw::AngleMessage;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
-use gyronet::service::{Reply, Request};
-use gyronet::store::{Configuration, Record};
+use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_tools::wheels::{WheelFile, from_dbc};
 
@@ -60,8 +59,8 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
     const TEST: &str = "another_maker_s_frames_are_understood_without_a_new_image";
     let Some(mut board) = common::boot(TEST) else { return };
     board.run(START);
-    assert_eq!(ask(&mut board, &Request::SetWheels(settings())), Ok(Reply::Done));
-    assert_eq!(ask(&mut board, &Request::Restart), Ok(Reply::Done));
+    service::on_line(&mut board).set_wheels(&settings()).expect("they are stored");
+    service::on_line(&mut board).restart().expect("a response");
     board.run(START);
     let now = board.counts().time;
     common::send(&mut board, &drive(200), now);
@@ -117,9 +116,8 @@ fn wheel_frames_over_slcan_are_used_on_a_bench_alone() {
     };
     assert_eq!(refused(&mut board), 0);
     let bench = Configuration { slcan_inputs: true, ..Configuration::DEFAULT };
-    let set = Request::SetConfiguration { version: Configuration::VERSION, configuration: bench };
-    assert_eq!(ask(&mut board, &set), Ok(Reply::Done));
-    assert_eq!(ask(&mut board, &Request::Restart), Ok(Reply::Done));
+    service::on_line(&mut board).set_configuration(&bench).expect("it is stored");
+    service::on_line(&mut board).restart().expect("a response");
     board.run(START);
     assert_eq!(refused(&mut board), 3);
 }

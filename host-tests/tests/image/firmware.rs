@@ -8,7 +8,6 @@ use gyronet::can::encoder::CanEncoder;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
-use gyronet::service::{Reply, Request};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{image, qemu, replay};
@@ -165,9 +164,7 @@ fn a_full_queue_holds_the_line_and_is_counted() {
     board.send(1, &bytes, LIMIT);
     let lines = board.lines(2, b'\r', expected.len(), LIMIT);
     assert!(lines.starts_with(&expected), "the line was held, nothing was lost");
-    let Ok(Reply::Counters(counters)) = board.device(LIMIT).ask(&Request::Counters) else {
-        panic!("no counters")
-    };
+    let counters = board.device(LIMIT).counters().expect("a response");
     println!("{NAME}: {counters:?}");
     assert!(counters.lines.held > 0, "the board says that its queue was full: {counters:?}");
     assert_eq!((counters.inputs.imu_errors, counters.lines.line_errors), (0, 0));

@@ -1,16 +1,15 @@
-//! The image's service line in QEMU, asked by the tool's own code: what it says of itself, what
-//! it refuses without a flash controller (what is stored: `firmware_stored`), a flood of noise, a restart.
+//! The image's service line in QEMU, asked by the tool's own code: what it says of itself, what it
+//! refuses without a flash controller (what is stored: `firmware_stored`), a flood of noise, a restart.
 
 use gyronet::service::event::EventKind;
 use gyronet::service::message::{FlashState, Info, Origin, Refusal};
-use gyronet::service::{Reply, Request};
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
+use gyronet::store::{Configuration, Field, FieldError, StoreError};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::qemu::SERVICE;
 use gyronet_host_tests::{image, qemu, replay};
-use gyronet_tools::client::device::line::Line;
-use gyronet_tools::client::device::{Device, DeviceError};
+use gyronet_tools::client::device::error::DeviceError;
+use gyronet_tools::client::device::upload::upload;
 use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);
@@ -19,18 +18,15 @@ const SLCAN: usize = 2;
 /// Frames of one sample.
 const SET: usize = 6;
 
-fn boot(test: &str) -> Option<(qemu::Board, Device<Line>)> {
+fn boot(test: &str) -> Option<(qemu::Board, qemu::Tester)> {
     let elf = image::coprocessor(test, env!("CARGO_TARGET_TMPDIR"))?;
     let mut board = qemu::Board::boot(&elf, SERVICE, &[]);
     let device = board.device(LIMIT);
     Some((board, device))
 }
 
-fn info(device: &mut Device<Line>) -> Info {
-    match device.ask(&Request::Info) {
-        Ok(Reply::Info(info)) => info,
-        other => panic!("{other:?}"),
-    }
+fn info(device: &mut qemu::Tester) -> Info {
+    device.info().expect("a response")
 }
 
 #[test]
@@ -41,32 +37,24 @@ fn a_board_with_nothing_stored_reports_that() {
     assert_eq!(about.configuration, Origin::BuiltIn);
     assert_eq!(about.weights, WeightSource::BuiltIn);
     assert_eq!((about.identity.device_id, about.identity.crash), (None, None));
-    let configuration = match device.ask(&Request::GetConfiguration) {
-        Ok(Reply::Configuration { configuration, .. }) => configuration,
-        other => panic!("{other:?}"),
-    };
+    let configuration = device.configuration().expect("a response");
     assert_eq!(configuration, Configuration::DEFAULT);
-    let mut set = |configuration| {
-        let request = Request::SetConfiguration { version: Configuration::VERSION, configuration };
-        match device.ask(&request) {
-            Err(DeviceError::Refused(refusal)) => refusal,
-            other => panic!("{other:?}"),
-        }
+    let mut set = |configuration| match device.set_configuration(&configuration) {
+        Err(DeviceError::Refused(refusal)) => refusal,
+        other => panic!("{other:?}"),
     };
     assert_eq!(set(configuration), Refusal::Store(StoreError::NoFlash));
     let wild = Configuration { latitude_deg: Some(91.0), ..configuration };
     let range = FieldError::Range { field: Field::LatitudeDeg, value: 91.0, low: -90.0, high: 90.0 };
     assert_eq!(set(wild), Refusal::Store(StoreError::Field(range)));
-    match device.ask(&Request::WeightsBegin { length: 64 }) {
+    match upload(&mut device, &[0; 64], |_| {}) {
         Err(DeviceError::Refused(Refusal::Slot(SlotError::NoFlash))) => {}
         other => panic!("{other:?}"),
     }
-    match device.ask(&Request::Log { after: 0 }) {
-        Ok(Reply::Log(page)) => assert!(matches!(page.events[0].kind, EventKind::Started(_)), "{page:?}"),
-        other => panic!("{other:?}"),
-    }
+    let page = device.log(0).expect("a response");
+    assert!(matches!(page.events[0].kind, EventKind::Started(_)), "{page:?}");
     // It starts again and answers again.
-    assert_eq!(device.ask(&Request::Restart).expect("an answer"), Reply::Done);
+    device.restart().expect("a response");
     assert_eq!(info(&mut device), about);
 }
 
@@ -90,10 +78,10 @@ fn noise_on_the_service_line_changes_no_frame() {
     replay::assert_same(&lines, &expected);
     // The question stands behind what is left of the flood.
     let until = Instant::now() + 2 * LIMIT;
-    let answer = std::iter::repeat_with(|| device.ask(&Request::Counters))
-        .find(|answer| answer.is_ok() || Instant::now() > until);
+    let answer =
+        std::iter::repeat_with(|| device.counters()).find(|answer| answer.is_ok() || Instant::now() > until);
     match answer {
-        Some(Ok(Reply::Counters(counters))) => {
+        Some(Ok(counters)) => {
             println!("{NAME}: {} frames, {counters:?}", lines.len());
             assert!(counters.lines.service_errors > 40, "{counters:?}");
             assert_eq!(counters.pipeline.samples as usize, rounds * samples);

@@ -10,17 +10,16 @@ use gyronet::health::Status;
 use gyronet::model::{Blob, weights};
 use gyronet::service::event::{EventKind, SensorFault};
 use gyronet::service::message::{FlashState, Info, Origin, Refusal};
-use gyronet::service::{Reply, Request};
 use gyronet::store::layout::{SLOT_SIZE, SLOTS, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Mounting, Record, Slot, StoreError};
+use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Mounting, Slot, StoreError};
 use gyronet_host_tests::connected::{self, Step};
 use gyronet_host_tests::qemu::SERVICE;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::{Stored, other_weights};
 use gyronet_host_tests::{image, qemu, replay};
-use gyronet_tools::client::device::line::Line;
-use gyronet_tools::client::device::{Device, DeviceError};
+use gyronet_tools::client::device::error::DeviceError;
+use gyronet_tools::client::device::upload::upload;
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(120);
@@ -46,7 +45,7 @@ fn built_in() -> Blob<'static> {
 /// The frames of a board that has run for [`SAMPLES`], and its service line.
 struct Started {
     frames: Vec<DataFrame>,
-    device: Device<Line>,
+    device: qemu::Tester,
     /// The board itself, which must run as long as it is asked.
     _board: qemu::Board,
 }
@@ -98,24 +97,19 @@ impl Started {
     }
 
     fn info(&mut self) -> Info {
-        match self.device.ask(&Request::Info) {
-            Ok(Reply::Info(info)) => info,
-            other => panic!("{other:?}"),
-        }
+        self.device.info().expect("a response")
     }
 
     fn events(&mut self) -> Vec<EventKind> {
-        match self.device.ask(&Request::Log { after: 0 }) {
-            Ok(Reply::Log(page)) => page.events.iter().map(|event| event.kind).collect(),
-            other => panic!("{other:?}"),
-        }
+        let page = self.device.log(0).expect("a response");
+        page.events.iter().map(|event| event.kind).collect()
     }
+}
 
-    fn refusal(&mut self, request: &Request) -> Refusal {
-        match self.device.ask(request) {
-            Err(DeviceError::Refused(refusal)) => refusal,
-            other => panic!("{other:?}"),
-        }
+fn refusal<T: std::fmt::Debug>(result: Result<T, DeviceError>) -> Refusal {
+    match result {
+        Err(DeviceError::Refused(refusal)) => refusal,
+        other => panic!("{other:?}"),
     }
 }
 
@@ -137,10 +131,10 @@ fn stored_configuration_takes_effect() {
     let info = board.info();
     assert_eq!((info.flash, info.writable, info.configuration), (FlashState::Ready, false, Origin::Stored));
     // What is stored can be read without a controller, but not changed.
-    let set = Request::SetConfiguration { version: Configuration::VERSION, configuration };
-    assert_eq!(board.refusal(&set), Refusal::Store(StoreError::NoFlash));
-    let begin = Request::WeightsBegin { length: 64 };
-    assert_eq!(board.refusal(&begin), Refusal::Slot(SlotError::NoFlash));
+    let set = board.device.set_configuration(&configuration);
+    assert_eq!(refusal(set), Refusal::Store(StoreError::NoFlash));
+    let begun = upload(&mut board.device, &[0; 64], |_| {});
+    assert_eq!(refusal(begun), Refusal::Slot(SlotError::NoFlash));
 }
 
 #[test]

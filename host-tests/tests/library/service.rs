@@ -1,9 +1,8 @@
-//! The service line against the board's own code on a mock flash: every request and every refusal.
+//! The board's stored data on a mock flash: every request and every refusal, by themselves and over diagnosis.
 
 mod calibration;
 mod configuration;
 mod isotp;
-mod line;
 mod log;
 mod uds;
 mod weights;
@@ -12,9 +11,8 @@ use gyronet::model::weights::DEFAULT;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, ResetCause};
-use gyronet::service::frame::{Deframer, emit};
-use gyronet::service::message::{AllCounters, Identity};
-use gyronet::service::{Device, Reply, Request, SupportedHardware};
+use gyronet::service::message::{Identity, Info, Refusal};
+use gyronet::service::{Device, Request, SupportedHardware};
 use gyronet::store::layout::{self, RECORD_SECTOR};
 use gyronet::store::{Configuration, FogPart, ImuPart, Record};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
@@ -61,25 +59,18 @@ fn bare() -> Board {
     board
 }
 
-/// A request over the line; every byte of it and of the answer.
-fn ask(board: &mut Board, request: &Request) -> Reply {
-    let frame = emit(7, request).expect("it fits");
-    let answers: Vec<_> =
-        frame.iter().filter_map(|byte| board.receive(*byte, &AllCounters::default())).collect();
-    let [answer] = &answers[..] else { panic!("{} answers", answers.len()) };
-    let mut deframer = Deframer::new();
-    let mut replies = answer.iter().filter_map(|byte| deframer.receive::<Reply>(*byte));
-    let (number, reply) = replies.next().expect("a frame").expect("a reply");
-    assert_eq!((number, replies.next()), (7, None));
-    reply
+/// Executes a request.
+fn ask(board: &mut Board, request: &Request) -> Result<(), Refusal> {
+    let result = board.act(request);
+    assert_eq!(board.refusal(), result.err());
+    result
 }
 
-fn info(board: &mut Board) -> gyronet::service::message::Info {
-    let Reply::Info(info) = ask(board, &Request::Info) else { panic!("no info") };
-    info
+fn info(board: &mut Board) -> Info {
+    board.info()
 }
 
-fn set(configuration: Configuration) -> Request {
+fn set(configuration: Configuration) -> Request<'static> {
     Request::SetConfiguration { version: Configuration::VERSION, configuration }
 }
 

@@ -1,4 +1,5 @@
-//! Frames of testers, from the lines to the diagnostic server in idle and back.
+//! Frames of testers, from the lines to the diagnostic server in idle and back. The service line is SLCAN with nothing
+//! but these frames; its 115200 bit/s could not carry all messages of the board.
 //!
 //! A tester waits for a flow control after as many frames as a ring has places, so that none is lost however long idle
 //! is kept from its turn. Responses leave after the rates that wait.
@@ -7,20 +8,25 @@
 use crate::pause;
 use crate::regions::{Records, Slots};
 use crate::ring::Ring;
+use crate::serial;
 use crate::stm32f405::timer;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use embedded_io::Write;
 use gyronet::can::DataFrame;
+use gyronet::can::slcan::port::Port;
 use gyronet::service::Device;
 use gyronet::service::message::AllCounters;
 use gyronet::uds::Server;
+use gyronet::units::Micros;
 
 /// A line that testers use.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Line {
     Can,
     Slcan,
+    Service,
 }
 
 /// Requests on CAN.
@@ -81,50 +87,81 @@ pub fn is_silenced() -> bool {
     SILENCED.load(Ordering::Relaxed)
 }
 
-/// Serves one tester at a time, on either line.
+/// Serves one tester at a time, on any line.
 pub struct Diagnosis {
+    tester: Tester,
+    service: serial::Port,
+    /// The SLCAN port of the service line; one frame waits at most.
+    port: Port<2>,
+}
+
+/// The server, and the tester that it talks to.
+struct Tester {
     server: Server,
     /// The line of the conversation under way, or of the last one.
     line: Line,
 }
 
 impl Diagnosis {
-    pub const fn new() -> Self {
-        Self { server: Server::new(), line: Line::Can }
+    pub fn new(service: serial::Port, bits_per_second: u32) -> Self {
+        let tester = Tester { server: Server::new(), line: Line::Can };
+        Self { tester, service, port: Port::new(bits_per_second) }
+    }
+
+    /// Returns the number of lines of the service line that were refused.
+    pub fn refused(&self) -> u32 {
+        self.port.refused()
     }
 
     /// Takes the frames that have come, answers a request, and sends the frames that are due.
     #[inline(never)]
     pub fn turn(&mut self, device: &mut Device<Records, Slots>, counters: &AllCounters) {
         let now = timer::milliseconds();
+        let Self { tester, service, port } = self;
+        service.advance();
+        // A byte that the line lost is answered as a bad line, or missing in it.
+        let _ = port.service(service, |frame| {
+            if is_request(frame.id()) {
+                tester.receive(Line::Service, &frame, now);
+            }
+        });
         for (line, frames) in [(Line::Can, &FROM_CAN), (Line::Slcan, &FROM_SLCAN)] {
             while let Some(frame) = frames.pop() {
-                if self.server.is_idle() {
-                    self.line = line;
-                }
-                // A tester on the other line has to wait.
-                if self.line == line {
-                    self.receive(&frame, now);
-                } else {
-                    self.server.refuse();
-                }
+                tester.receive(line, &frame, now);
             }
         }
-        self.server.turn(device, counters, now);
-        SILENCED.store(self.server.is_silenced(), Ordering::Relaxed);
-        while !RESPONSES.is_full()
-            && let Some(data) = self.server.next_frame(now)
+        let Tester { server, line } = tester;
+        server.turn(device, counters, now);
+        SILENCED.store(server.is_silenced(), Ordering::Relaxed);
+        while match line {
+            Line::Service => port.outgoing().is_none(),
+            Line::Can | Line::Slcan => !RESPONSES.is_full(),
+        } && let Some(data) = server.next_frame(now)
         {
             let [.., response] = ids();
-            let frame = unpack(response).and_then(|id| DataFrame::new(id, &data));
-            frame.into_iter().for_each(|frame| _ = RESPONSES.push((self.line, frame)));
+            let Some(frame) = unpack(response).and_then(|id| DataFrame::new(id, &data)) else { continue };
+            match line {
+                Line::Service => port.enqueue(frame, Micros(1_000 * u64::from(now))),
+                Line::Can | Line::Slcan => _ = RESPONSES.push((*line, frame)),
+            }
         }
-        if self.server.restart_is_due() && RESPONSES.is_empty() {
+        if server.restart_is_due() && RESPONSES.is_empty() && port.outgoing().is_none() {
+            // Bounded; a response that does not get out does not hold up the restart.
+            let _ = service.flush();
             pause::announced(SCB::sys_reset);
         }
     }
+}
 
-    fn receive(&mut self, frame: &DataFrame, now: u32) {
+impl Tester {
+    fn receive(&mut self, line: Line, frame: &DataFrame, now: u32) {
+        if self.server.is_idle() {
+            self.line = line;
+        }
+        // A tester on another line has to wait.
+        if self.line != line {
+            return self.server.refuse();
+        }
         let [_, functional, _] = ids();
         if pack(frame.id()) == functional {
             self.server.receive_functional(frame.data(), now);

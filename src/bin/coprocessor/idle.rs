@@ -1,4 +1,4 @@
-//! The idle task runs the service line and diagnosis and checks the weights against their checksum.
+//! The idle task runs diagnosis and checks the weights against their checksum.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::diagnosis::Diagnosis;
@@ -6,19 +6,14 @@ use crate::fog_network::{FogNetwork, FogParts};
 use crate::imu::BringUp;
 use crate::regions::{Records, Slots};
 use crate::ring::Ring;
-use crate::serial;
 use crate::stm32f405::{clocks, timer};
-use embedded_io::{Write, WriteReady};
 use gyronet::health::{Faults, Status};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::{ImuSample, Standstill};
 use gyronet::service::Device;
 use gyronet::service::event::ClockFault;
-use gyronet::service::frame::Frame;
 use gyronet::service::message::AllCounters;
 
-/// Bytes of the service line that are looked at in one turn.
-const SERVICE_TURN: usize = 16;
 /// Interval at which a failed clock is tried again.
 const RETRY_MS: u32 = 1_000;
 /// The time that one pass over the weights takes.
@@ -43,16 +38,12 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
 pub struct Idle {
     device: &'static mut Device<Records, Slots>,
     check: Option<BackgroundCheck<'static>>,
-    service: serial::Port,
     diagnosis: Diagnosis,
     fog_network: FogNetwork,
     bring_up: Option<BringUp>,
     /// The reason why the internal oscillator runs, and the time of the last look whether that is over, ms.
     clock_fault: Option<ClockFault>,
     retried: u32,
-    /// An answer on its way out, and how much of it is.
-    answer: Frame,
-    sent: usize,
     milliseconds: u32,
 }
 
@@ -63,37 +54,25 @@ impl Idle {
     #[inline(never)]
     pub fn new(
         (device, check): Stored,
-        service: serial::Port,
+        diagnosis: Diagnosis,
         fog_network: Option<&'static mut FogParts>,
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
     ) -> Self {
         let fog_network = FogNetwork::new(fog_network);
-        Self {
-            device,
-            check,
-            service,
-            diagnosis: Diagnosis::new(),
-            fog_network,
-            bring_up,
-            clock_fault,
-            retried: 0,
-            answer: Frame::new(),
-            sent: 0,
-            milliseconds: 0,
-        }
+        Self { device, check, diagnosis, fog_network, bring_up, clock_fault, retried: 0, milliseconds: 0 }
     }
 
     /// Does a bounded piece of work, and returns whether the weights were found to be damaged.
     #[inline(never)]
-    pub fn turn(&mut self, counters: &AllCounters) -> bool {
+    pub fn turn(&mut self, counters: &mut AllCounters) -> bool {
         while let Some(Observation { sample, tick, status, faults, wheels }) = OBSERVATIONS.pop() {
             self.device.observe(sample.as_ref(), tick, (status, faults), wheels);
         }
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::turn) {
             self.device.sensor(result);
         }
-        self.answer(counters);
+        counters.lines.service_errors = self.diagnosis.refused();
         self.diagnosis.turn(self.device, counters);
         self.retry_clock();
         self.check()
@@ -132,32 +111,5 @@ impl Idle {
             self.check = None;
         }
         damaged
-    }
-
-    /// The service line's turn: the answer on its way, then the next question.
-    #[inline(never)]
-    fn answer(&mut self, counters: &AllCounters) {
-        self.service.advance();
-        if !self.answer.is_empty() {
-            while let Some(rest) = self.answer.get(self.sent..).filter(|rest| !rest.is_empty()) {
-                let Ok(true) = self.service.write_ready() else { return };
-                let Ok(len) = self.service.write(rest) else { return };
-                self.sent += len;
-            }
-            self.answer.clear();
-            self.sent = 0;
-            if self.device.restart_wanted() {
-                // Bounded; an answer that does not get out does not hold up the restart.
-                let _ = self.service.flush();
-                cortex_m::peripheral::SCB::sys_reset();
-            }
-        }
-        for _ in 0..SERVICE_TURN {
-            let Some(byte) = self.service.receive() else { return };
-            if let Some(answer) = self.device.receive(byte, counters) {
-                self.answer = answer;
-                return;
-            }
-        }
     }
 }

@@ -8,7 +8,7 @@
 //! | SPI1 | ICM-42688-P, where one is configured |
 //! | USART3 | KVH DSP-1760 |
 //! | USART2 | SLCAN |
-//! | USART6 | service line |
+//! | USART6 | service line: SLCAN with diagnosis alone |
 //! | CAN1 | 500 kbit/s: messages, wheels, diagnosis |
 //!
 //! # What runs when
@@ -19,7 +19,7 @@
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 2 | `output` | pended by these | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
-//! | 0 | `idle` | the rest | FoGNet in pieces, service line, diagnosis, weights against their checksum; else it sleeps |
+//! | 0 | `idle` | the rest | FoGNet in pieces, diagnosis, weights against their checksum; else it sleeps |
 //!
 //! The library's `Coprocessor` is shared by `output`, `window` and `idle`; the rest is handed over in queues of fixed
 //! length, and what does not fit is counted. An estimate is used two samples after its window, so the time at
@@ -98,6 +98,7 @@ static PRIORITIES: [[u8; 2]; 10] = {
 #[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
 #[rtic::app(device = crate::stm32f405::pac, peripherals = true)]
 mod app {
+    use crate::diagnosis::Diagnosis;
     use crate::idle::Idle;
     use crate::imu::BringUp;
     use crate::output::Output;
@@ -115,7 +116,7 @@ mod app {
     #[shared]
     struct Shared {
         coprocessor: &'static mut Coprocessor,
-        /// For idle, which answers the service line.
+        /// For idle, which answers testers.
         counters: AllCounters,
     }
 
@@ -145,11 +146,12 @@ mod app {
         coprocessor.configure(&config);
         let network = weights.and_then(|blob| GyroNet::with_state(blob, cx.local.network_state).ok());
         let service = board.service;
-        let bring_up = BringUp::new(output.part, board.spi);
+        let (bits_per_second, bring_up) = (output.bits_per_second, BringUp::new(output.part, board.spi));
         let ports = (board.imu, board.fog, board.slcan, board.can);
         let sender = start::place(cx.local.sender_place, || output.connect(ports));
         let rest = start::place(cx.local.rest_place, || {
-            Idle::new(device, service, fog_network, bring_up, board.clocks.fault)
+            let diagnosis = Diagnosis::new(service, bits_per_second);
+            Idle::new(device, diagnosis, fog_network, bring_up, board.clocks.fault)
         });
         let board::Handlers { imu, fog: fog_handler, slcan, service, receptions } = handlers;
         let shared = Shared { coprocessor, counters: AllCounters::default() };
@@ -237,8 +239,8 @@ mod app {
     #[idle(local = [rest], shared = [coprocessor, counters])]
     fn idle(mut cx: idle::Context) -> ! {
         loop {
-            let counters = cx.shared.counters.lock(|counters| *counters);
-            let damaged = cx.local.rest.turn(&counters);
+            let mut counters = cx.shared.counters.lock(|counters| *counters);
+            let damaged = cx.local.rest.turn(&mut counters);
             if damaged {
                 cx.shared.coprocessor.lock(|coprocessor| coprocessor.weights_damaged());
             }

@@ -27,6 +27,20 @@ pub enum ConnectError {
         /// The system's error.
         source: io::Error,
     },
+    /// The CAN interface cannot be opened.
+    #[error("can:{name}: {source}")]
+    Interface {
+        /// The name of the interface.
+        name: String,
+        /// The system's error.
+        source: io::Error,
+    },
+    /// This system has no CAN interfaces.
+    #[error("can:{name}: interfaces can be used on Linux alone")]
+    NoInterfaces {
+        /// The name as given.
+        name: String,
+    },
 }
 
 /// An open line. No read or write lasts longer than what it was opened with.

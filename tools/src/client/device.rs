@@ -1,130 +1,131 @@
-//! The client of the service line: it sends requests and reads replies over anything that carries bytes.
+//! A board at the other end of a bus, asked and configured over diagnosis (UDS on ISO-TP, see [`gyronet::uds`]).
 
 pub mod calibration;
-pub mod line;
+pub mod error;
+pub mod requests;
 pub mod settings;
 pub mod upload;
 
-use crate::client::connection::{ConnectError, is_silence};
-use gyronet::service::frame::{Deframer, FrameError, emit};
+use super::bus::Bus;
+use embedded_can::{Frame, Id};
+use error::{Code, DeviceError};
+use gyronet::can::DataFrame;
+use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::service::message::Refusal;
-use gyronet::service::{Reply, Request};
-use std::io::{ErrorKind, Read, Write};
-use std::time::{Duration, Instant};
+use gyronet::uds::Nrc;
+use gyronet::uds::isotp::{TIMEOUT_MS, Transport};
+use std::time::Duration;
 
-/// The longest time that an answer may take.
-const ANSWER: Duration = Duration::from_secs(2);
-/// The longest time that the board may take to erase a slot: twice the datasheet's worst case.
-const ERASURE: Duration = Duration::from_secs(8);
-/// Times that a question is put.
+/// The longest wait for a response: longer than the standard's 50 ms, for lines that are slow or shared.
+const RESPONSE: Duration = Duration::from_millis(TIMEOUT_MS as u64);
+/// The longest wait after "response pending": an erase of a slot at the datasheet's worst takes 4 s.
+const PENDING: Duration = Duration::from_secs(8);
+/// Times that a request is sent.
 const ATTEMPTS: u32 = 3;
+/// First byte of a negative response.
+const NEGATIVE: u8 = 0x7F;
+/// Added to a service's number in a positive response.
+const POSITIVE: u8 = 0x40;
+/// Data identifier of the reason why the last request was refused.
+const REFUSAL: [u8; 2] = [0x01, 0x0B];
 
-/// The error of a question without the expected answer.
-#[derive(Debug, thiserror::Error)]
-pub enum DeviceError {
-    /// The line cannot be opened.
-    #[error(transparent)]
-    Connect(#[from] ConnectError),
-    /// The line cannot be used.
-    #[error("{port}: {source}")]
-    Line {
-        /// Its name.
-        port: String,
-        /// The system's error.
-        source: std::io::Error,
-    },
-    /// No answer came.
-    #[error(
-        "{port}: no answer to {ATTEMPTS} attempts; is this the service line, and is the board \
-         running? ({strays} frames were no answers{})",
-        .last.map(|error| format!(", the last one: {error}")).unwrap_or_default()
-    )]
-    Silence {
-        /// The line.
-        port: String,
-        /// Frames that came and were no answer.
-        strays: u32,
-        /// The reason why the last of them was none.
-        last: Option<FrameError>,
-    },
-    /// The board said no.
-    #[error("the board refuses: {0}")]
-    Refused(Refusal),
-    /// The board answered something else than was asked.
-    #[error("the board gave an answer to another question")]
-    Mismatch,
-    /// A request that is longer than a frame.
-    #[error("the request does not fit a frame")]
-    TooLong,
+/// A board on a bus.
+pub struct Device<B> {
+    bus: B,
+    name: String,
+    request: Id,
+    response: Id,
 }
 
-/// A board at the other end of a line.
-pub struct Device<L> {
-    line: L,
-    port: String,
-    number: u8,
-}
-
-impl<L: Read + Write> Device<L> {
-    /// A board on an open line, whose reads return after a short while with what there is.
-    pub fn new(line: L, port: &str) -> Self {
-        Self { line, port: port.to_owned(), number: 0 }
+impl<B: Bus> Device<B> {
+    /// Addresses the board by these identifiers; `name` stands in errors.
+    ///
+    /// # Errors
+    /// [`DeviceError::Identifier`].
+    pub fn with_ids(bus: B, name: &str, ids: &DiagnosisIds) -> Result<Self, DeviceError> {
+        let [request, _, response] = ids.ids().map_err(DeviceError::Identifier)?;
+        Ok(Self { bus, name: name.to_owned(), request, response })
     }
 
-    /// Puts a question until it is answered.
+    /// Sends a request until there is a response, and returns it without its first byte.
     ///
     /// # Errors
     /// [`DeviceError`]; a refusal is one.
-    pub fn ask(&mut self, request: &Request) -> Result<Reply, DeviceError> {
-        let limit = if matches!(request, Request::WeightsBegin { .. }) { ERASURE } else { ANSWER };
-        let (mut strays, mut last) = (0, None);
-        for _ in 0..ATTEMPTS {
-            self.number = self.number.wrapping_add(1);
-            let frame = emit(self.number, request).ok_or(DeviceError::TooLong)?;
-            self.line.write_all(&frame).and_then(|()| self.line.flush()).map_err(|e| self.broken(e))?;
-            match self.answer(limit, &mut strays, &mut last)? {
-                Some(Reply::Refused(refusal)) => return Err(DeviceError::Refused(refusal)),
-                Some(reply) => return Ok(reply),
-                None => {}
-            }
+    pub fn ask(&mut self, request: &[u8]) -> Result<Vec<u8>, DeviceError> {
+        let service = request.first().copied().unwrap_or_default();
+        match self.exchange(request)? {
+            Ok(response) => Ok(response),
+            Err(code) => Err(match self.refusal()? {
+                Some(refusal) => DeviceError::Refused(refusal),
+                None => DeviceError::Negative { service, code: Code(code) },
+            }),
         }
-        Err(DeviceError::Silence { port: self.port.clone(), strays, last })
     }
 
-    /// The answer to the last question, if it comes in time.
-    fn answer(
-        &mut self,
-        limit: Duration,
-        strays: &mut u32,
-        last: &mut Option<FrameError>,
-    ) -> Result<Option<Reply>, DeviceError> {
-        let until = Instant::now() + limit;
-        let mut deframer = Deframer::new();
-        let mut bytes = [0; 512];
-        while Instant::now() < until {
-            let len = match self.line.read(&mut bytes) {
-                Ok(0) => return Err(self.broken(ErrorKind::UnexpectedEof.into())),
-                Ok(len) => len,
-                Err(error) if is_silence(&error) => continue,
-                Err(error) => return Err(self.broken(error)),
-            };
-            for byte in &bytes[..len] {
-                match deframer.receive(*byte) {
-                    Some(Ok((number, reply))) if number == self.number => return Ok(Some(reply)),
-                    // Late, to an earlier question.
-                    Some(Ok(_)) => *strays += 1,
-                    Some(Err(error)) => {
-                        *strays += 1;
-                        *last = Some(error);
-                    }
-                    None => {}
-                }
+    /// Returns the board's own words for the last refusal.
+    fn refusal(&mut self) -> Result<Option<Refusal>, DeviceError> {
+        let [high, low] = REFUSAL;
+        let Ok(response) = self.exchange(&[0x22, high, low])? else { return Ok(None) };
+        let record = response.get(2..).unwrap_or_default();
+        postcard::from_bytes(record).map_err(|_| DeviceError::Mismatch)
+    }
+
+    /// Returns the positive response or the code of the negative one.
+    fn exchange(&mut self, request: &[u8]) -> Result<Result<Vec<u8>, u8>, DeviceError> {
+        for _ in 0..ATTEMPTS {
+            if let Some(response) = self.attempt(request)? {
+                return Ok(response);
             }
         }
-        Ok(None)
+        Err(DeviceError::Silence { name: self.name.clone() })
+    }
+
+    /// Sends a request once; `None` where no response comes in time.
+    fn attempt(&mut self, request: &[u8]) -> Result<Option<Result<Vec<u8>, u8>>, DeviceError> {
+        let service = request.first().copied().unwrap_or_default();
+        let mut transport = Transport::new();
+        if !transport.send(request) {
+            return Err(DeviceError::TooLong);
+        }
+        let mut until = self.bus.now() + RESPONSE;
+        let mut response = None;
+        loop {
+            let now = self.bus.now();
+            // Wraps around as the transport expects.
+            let milliseconds = now.as_millis() as u32;
+            while let Some(data) = transport.next_frame(milliseconds) {
+                let frame = DataFrame::new(self.request, &data).ok_or(DeviceError::TooLong)?;
+                self.bus.send(&frame).map_err(|source| self.broken(source))?;
+                until = until.max(now + RESPONSE);
+            }
+            if response.is_some() || now > until {
+                return Ok(response);
+            }
+            for frame in self.bus.receive().map_err(|source| self.broken(source))? {
+                if frame.id() != self.response {
+                    continue;
+                }
+                transport.receive(frame.data(), milliseconds);
+                until = until.max(now + RESPONSE);
+                transport.answer(|message, _| match message {
+                    [NEGATIVE, of, code] if *of == service => {
+                        if *code == Nrc::RequestCorrectlyReceivedResponsePending as u8 {
+                            until = now + PENDING;
+                        } else {
+                            response = Some(Err(*code));
+                        }
+                    }
+                    [first, rest @ ..] if *first == service.wrapping_add(POSITIVE) => {
+                        response = Some(Ok(rest.to_vec()));
+                    }
+                    // Late, to an earlier request.
+                    _ => {}
+                });
+            }
+        }
     }
 
     fn broken(&self, source: std::io::Error) -> DeviceError {
-        DeviceError::Line { port: self.port.clone(), source }
+        DeviceError::Line { name: self.name.clone(), source }
     }
 }

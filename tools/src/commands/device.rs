@@ -1,34 +1,40 @@
-//! `gyronet device`: state and configuration of a board, over its service line.
+//! `gyronet device`: state and configuration of a board, over diagnosis.
 
 mod calibration;
 mod settings;
 
 use super::Common;
 use clap::Subcommand;
+use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::service::message::Info;
-use gyronet::service::{Reply, Request};
-use gyronet_tools::client::device::line::Line;
+use gyronet_tools::client::bus::{self, Bus};
+use gyronet_tools::client::device::Device;
 use gyronet_tools::client::device::settings::{flat, value as value_of};
 use gyronet_tools::client::device::upload::upload;
-use gyronet_tools::client::device::{Device, DeviceError};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Query and configure a board over its service line.
+/// Query and configure a board over diagnosis (UDS), on its service line, any SLCAN adapter, or CAN.
 ///
 /// A new configuration or new weights take effect after a restart (`device restart`).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet device --port /dev/ttyUSB1 info
-  gyronet device --port /dev/ttyUSB1 set latitude_deg=48.1 mounting.roll_deg=1.5
+  gyronet device --port can:can0 set latitude_deg=48.1 mounting.roll_deg=1.5
   gyronet device --port /dev/ttyUSB1 calibrate static --store
   gyronet device --port localhost:4000 weights gyronet.blob      # then: restart")]
 pub struct Args {
-    /// Serial port or host:port of the board (emulator, serial server); required.
-    #[arg(long, global = true, value_name = "PORT|HOST:PORT")]
+    /// Serial port or host:port with SLCAN, or can:INTERFACE of Linux; required.
+    #[arg(long, global = true, value_name = "PORT|HOST:PORT|can:INTERFACE")]
     port: Option<String>,
+    /// Bit rate of a serial port.
+    #[arg(long, global = true, default_value_t = 115_200)]
+    baud: u32,
+    /// Identifiers of requests and responses, where they are not 7E0,7E8; eight digits are 29 bits.
+    #[arg(long, global = true, value_name = "REQUEST,RESPONSE", value_parser = identifiers)]
+    ids: Option<DiagnosisIds>,
     #[command(subcommand)]
     action: Action,
 }
@@ -74,22 +80,37 @@ enum Action {
     Restart,
 }
 
-type Board = Device<Line>;
+type Board = Device<Box<dyn Bus>>;
+
+/// Reads two hexadecimal identifiers.
+fn identifiers(text: &str) -> Result<DiagnosisIds, String> {
+    let (request, response) = text.split_once(',').ok_or("not REQUEST,RESPONSE")?;
+    let number = |text: &str| u32::from_str_radix(text, 16).map_err(|error| format!("{text}: {error}"));
+    let ids = DiagnosisIds {
+        extended: request.len() > 3,
+        request: number(request)?,
+        // Nothing is sent to it.
+        functional: 0,
+        response: number(response)?,
+    };
+    ids.ids().map(|_| ids).map_err(|id| format!("{id:X} has too many bits, or is there twice"))
+}
 
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let Some(port) = args.port.as_deref() else {
-        let why = "which board? Name its service line: --port /dev/ttyUSB1, or --port host:port\n";
+        let why = "which board? Name its line: --port /dev/ttyUSB1, --port host:port, or --port can:can0\n";
         clap::Error::raw(clap::error::ErrorKind::MissingRequiredArgument, why).exit();
     };
-    let mut device = Device::new(Line::open(port)?, port);
+    let ids = args.ids.unwrap_or(DiagnosisIds::DEFAULT);
+    let mut device = Device::with_ids(bus::open(port, args.baud)?, port, &ids)?;
     let json = common.json;
     match &args.action {
         Action::Info => {
-            let Reply::Info(info) = device.ask(&Request::Info)? else { return mismatch() };
+            let info = device.info()?;
             if json { print_json(&info)? } else { print_info(&info)? }
         }
-        Action::Get => settings::print(&settings::get(&mut device)?, json)?,
+        Action::Get => settings::print(&device.configuration()?, json)?,
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
         Action::Wheels => settings::print_wheels(&mut device, json)?,
         Action::Calibrate { task, file, store } => {
@@ -97,20 +118,16 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         Action::Log => log(&mut device, json)?,
         Action::Counters => {
-            let Reply::Counters(counters) = device.ask(&Request::Counters)? else { return mismatch() };
+            let counters = device.counters()?;
             print_value(&counters, json)?;
         }
         Action::Weights { file } => weights(&mut device, file, json, common)?,
         Action::Restart => {
-            device.ask(&Request::Restart)?;
+            device.restart()?;
             done(json, "the board restarts")?;
         }
     }
     Ok(())
-}
-
-fn mismatch<T>() -> Result<T, Box<dyn std::error::Error>> {
-    Err(DeviceError::Mismatch.into())
 }
 
 fn done(json: bool, what: &str) -> io::Result<()> {
@@ -160,6 +177,7 @@ fn print_info(info: &Info) -> io::Result<()> {
     let writable = if info.writable { "" } else { ", no controller: nothing can be stored" };
     writeln!(out, "flash         {}{writable}", info.flash)?;
     writeln!(out, "configuration {}, layout {}", info.configuration, info.record_versions[0])?;
+    writeln!(out, "wheels        {}", info.wheels)?;
     writeln!(out, "calibration   {}, layout {}", info.calibration, info.record_versions[1])?;
     let crc = info.weights_crc.map(|crc| format!(", checksum {crc:08x}")).unwrap_or_default();
     writeln!(out, "weights       {}{crc}", info.weights)?;
@@ -174,7 +192,7 @@ fn print_info(info: &Info) -> io::Result<()> {
 fn log(device: &mut Board, json: bool) -> super::Result {
     let (mut after, mut events, mut lost) = (0, Vec::new(), 0);
     loop {
-        let Reply::Log(page) = device.ask(&Request::Log { after })? else { return mismatch() };
+        let page = device.log(after)?;
         lost += page.lost;
         // A page that brings nothing new is the end.
         let Some(last) = page.events.last().filter(|last| last.number > after) else { break };

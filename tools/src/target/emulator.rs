@@ -202,6 +202,8 @@ impl Board {
         std::thread::spawn(move || {
             let Ok((client, _)) = listener.accept() else { return };
             let Ok(mut from_client) = client.try_clone() else { return };
+            // Frames are short, and a tester waits for each.
+            let _ = client.set_nodelay(true);
             let _ = client.set_read_timeout(Some(HELLO));
             let _ = client.peek(&mut [0]);
             let _ = client.set_read_timeout(None);

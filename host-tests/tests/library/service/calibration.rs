@@ -4,11 +4,11 @@ use super::{Board, ask, sample, set, start};
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::GyroMap;
 use gyronet::sample::Standstill;
+use gyronet::service::Request;
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
-use gyronet::service::frame::{MAX_FRAME, emit};
-use gyronet::service::message::{Calibrate, Origin, Refusal};
-use gyronet::service::{Reply, Request};
-use gyronet::store::{Configuration, Mounting, UnitMap};
+use gyronet::service::message::{Calibrate, Refusal};
+use gyronet::store::{Calibration, Configuration, Level, Mounting, UnitMap};
+use gyronet::uds::isotp::LONGEST;
 use gyronet::units::{AngularRate, CentiCelsius};
 use gyronet_host_tests::flash::F405;
 use std::cell::RefCell;
@@ -16,7 +16,7 @@ use std::rc::Rc;
 
 /// Runs a calibration to its end.
 fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> State {
-    assert_eq!(ask(board, &Request::Calibrate(Calibrate::Start(task))), Reply::Done);
+    assert_eq!(ask(board, &Request::Calibrate(Calibrate::Start(task))), Ok(()));
     for k in 0..301u64 {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
         board.observe(
@@ -26,10 +26,7 @@ fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> Sta
             Standstill::Still,
         );
     }
-    match ask(board, &Request::GetCalibration) {
-        Reply::Calibration { state, .. } => state,
-        other => panic!("{other:?}"),
-    }
+    board.calibration_state()
 }
 
 #[test]
@@ -37,19 +34,19 @@ fn calibration_is_found_and_kept() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
     let store = Request::Calibrate(Calibrate::Store);
-    assert_eq!(ask(&mut board, &store), Reply::Refused(Refusal::NothingFound));
+    assert_eq!(ask(&mut board, &store), Err(Refusal::NothingFound));
     let level = [0.0, 0.0, 9.81];
     assert_eq!(
         calibrate(&mut board, Task::Static, level, 0.3),
         State::Failed(Task::Static, CalibrationFault::Moving(0))
     );
-    assert_eq!(ask(&mut board, &store), Reply::Refused(Refusal::NothingFound));
+    assert_eq!(ask(&mut board, &store), Err(Refusal::NothingFound));
     assert_eq!(calibrate(&mut board, Task::Static, level, 0.001), State::Found(Task::Static));
-    assert_eq!(ask(&mut board, &store), Reply::Done);
+    assert_eq!(ask(&mut board, &store), Ok(()));
     // Rolled by 30 deg: gravity shows on y.
     let tilted = [0.0, 9.81 * 0.5, 9.81 * 0.866_025_4];
     assert_eq!(calibrate(&mut board, Task::Mounting, tilted, 0.001), State::Found(Task::Mounting));
-    assert_eq!(ask(&mut board, &store), Reply::Done);
+    assert_eq!(ask(&mut board, &store), Ok(()));
     assert_eq!(
         calibrate(&mut board, Task::Mounting, [9.81, 0.0, 0.0], 0.001),
         State::Failed(Task::Mounting, CalibrationFault::Tilted(90.0))
@@ -66,14 +63,13 @@ fn calibration_is_found_and_kept() {
 fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
-    let Reply::Info(info) = ask(&mut board, &Request::Info) else { panic!("it has an identity") };
-    let runs = info.weights_crc.unwrap_or(0);
+    let runs = board.info().weights_crc.unwrap_or(0);
     let elements = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.006, 0.029, 1.001]];
     let gyro_map = GyroMap::from_elements(elements).expect("a unit's");
     let set = |weights| Request::Calibrate(Calibrate::SetUnit(Some(UnitMap { gyro_map, weights })));
     let refused = Refusal::OtherWeights { found: runs ^ 1, runs };
-    assert_eq!(ask(&mut board, &set(runs ^ 1)), Reply::Refused(refused));
-    assert_eq!(ask(&mut board, &set(runs)), Reply::Done);
+    assert_eq!(ask(&mut board, &set(runs ^ 1)), Err(refused));
+    assert_eq!(ask(&mut board, &set(runs)), Ok(()));
     let board = start(&flash);
     assert_eq!(board.calibration().gyro_map(runs), Some(gyro_map));
     let of = |weights| Configuration::DEFAULT.pipeline(board.calibration(), weights).gyro_map;
@@ -86,7 +82,7 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
 fn configured_rotation_comes_first() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mounting = Mounting { roll_deg: 180.0, pitch_deg: 0.0, yaw_deg: 90.0 };
-    ask(&mut start(&flash), &set(Configuration { mounting, ..Configuration::DEFAULT }));
+    assert_eq!(ask(&mut start(&flash), &set(Configuration { mounting, ..Configuration::DEFAULT })), Ok(()));
     let mut board = start(&flash);
     // Upside down and turned: gravity shows as -z, and the small force along the sensor's -x is
     // the vehicle's -y.
@@ -97,19 +93,13 @@ fn configured_rotation_comes_first() {
 }
 
 #[test]
-fn calibration_fits_its_frame() {
-    let flash = Rc::new(RefCell::new(F405::default()));
-    let mut board = start(&flash);
-    let mut calibration = gyronet::store::Calibration::default();
+fn the_longest_calibration_fits_a_response() {
+    let mut calibration = Calibration::default();
     for k in 0..8 {
         calibration.add_bias([AngularRate(-(1 << 27)); 3], Some(CentiCelsius(k * 1000 - 4000)));
     }
-    let reply = Reply::Calibration {
-        version: 1,
-        origin: Origin::Stored,
-        state: State::Failed(Task::Mounting, CalibrationFault::Tilted(90.0)),
-        calibration,
-    };
-    assert!(emit(255, &reply).is_some_and(|frame| frame.len() <= MAX_FRAME));
-    assert!(matches!(ask(&mut board, &Request::Counters), Reply::Counters(_)));
+    calibration.level = Some(Level { roll_deg: -1.5, pitch_deg: 1.5 });
+    calibration.unit = Some(UnitMap { gyro_map: GyroMap::IDENTITY, weights: u32::MAX });
+    let record = postcard::to_stdvec(&calibration).expect("there is room");
+    assert!(record.len() + 4 <= LONGEST, "{} bytes", record.len());
 }

@@ -7,9 +7,9 @@ use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::wheel::{WheelConfigError, WheelFrame, WheelSettings};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
+use gyronet::service::Request;
 use gyronet::service::event::EventKind;
 use gyronet::service::message::{Calibrate, FlashState, Origin, Refusal};
-use gyronet::service::{Reply, Request};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, FogPart, ImuPart, Mounting, StoreError};
@@ -24,22 +24,19 @@ fn configuration_is_kept_whole() {
     let mut board = start(&flash);
     assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut board, &set(wanted)), Reply::Done);
+    assert_eq!(ask(&mut board, &set(wanted)), Ok(()));
     let mut board = start(&flash);
-    assert_eq!(
-        ask(&mut board, &Request::GetConfiguration),
-        Reply::Configuration { version: 4, origin: Origin::Stored, configuration: wanted }
-    );
+    assert_eq!(info(&mut board).configuration, Origin::Stored);
     assert_eq!(*board.configuration(), wanted);
     // Refused, and named, and the old one stays.
     let wild = Configuration { mounting: Mounting { pitch_deg: 91.0, ..Mounting::default() }, ..wanted };
     match ask(&mut board, &set(wild)) {
-        Reply::Refused(Refusal::Store(StoreError::Field(FieldError::Range { field, value, .. }))) => {
+        Err(Refusal::Store(StoreError::Field(FieldError::Range { field, value, .. }))) => {
             assert_eq!((field, value), (Field::MountingPitchDeg, 91.0));
         }
         other => panic!("{other:?}"),
     }
-    let refused = |error| Reply::Refused(Refusal::Store(StoreError::Field(error)));
+    let refused = |error| Err(Refusal::Store(StoreError::Field(error)));
     let other_part = Configuration { imu: ImuPart::Adis16465, ..wanted };
     assert_eq!(ask(&mut board, &set(other_part)), refused(FieldError::PartNotInImage));
     let can = Settings { bits_per_second: 250_000, ..wanted.can };
@@ -53,7 +50,7 @@ fn configuration_is_kept_whole() {
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
     assert_eq!(ask(&mut board, &set(with_fog)), refused(FieldError::PartNotInImage));
     let request = Request::SetConfiguration { version: 9, configuration: wanted };
-    assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Version { found: 9, expected: 4 }));
+    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 4 }));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 
@@ -61,40 +58,39 @@ fn configuration_is_kept_whole() {
 fn wheel_frames_are_kept_and_none_may_be_the_board_s_own() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
-    let built_in = Reply::Wheels { origin: Origin::BuiltIn, wheels: WheelSettings::TOYOTA };
-    assert_eq!(ask(&mut board, &Request::GetWheels), built_in);
+    let known = |board: &mut Board| (info(board).wheels, *board.wheels());
+    let built_in = (Origin::BuiltIn, WheelSettings::TOYOTA);
+    assert_eq!(known(&mut board), built_in);
     let with_id = |id: u16| {
         let id = Id::Standard(StandardId::new(id).expect("11 bits"));
         let frame = WheelSettings::TOYOTA.frames[0].map(|frame| WheelFrame { id, ..frame });
         WheelSettings { frames: [frame, None, None, None], ..WheelSettings::TOYOTA }
     };
-    assert_eq!(ask(&mut board, &Request::SetWheels(with_id(0xAB))), Reply::Done);
+    assert_eq!(ask(&mut board, &Request::SetWheels(with_id(0xAB))), Ok(()));
     for own in [0x1A0, Configuration::DEFAULT.fog_ids[1]] {
         let error = FieldError::Wheels(WheelConfigError::Own(own.into()));
-        let refused = Reply::Refused(Refusal::Store(StoreError::Field(error)));
+        let refused = Err(Refusal::Store(StoreError::Field(error)));
         assert_eq!(ask(&mut board, &Request::SetWheels(with_id(own))), refused);
     }
-    assert_eq!(ask(&mut board, &Request::GetWheels), built_in, "from the next start on");
+    assert_eq!(known(&mut board), built_in, "from the next start on");
     let mut board = start(&flash);
-    let stored = Reply::Wheels { origin: Origin::Stored, wheels: with_id(0xAB) };
-    assert_eq!(ask(&mut board, &Request::GetWheels), stored);
-    assert_eq!(*board.wheels(), with_id(0xAB));
+    assert_eq!(known(&mut board), (Origin::Stored, with_id(0xAB)));
 }
 
 #[test]
 fn damaged_record_is_noted() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
-    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Reply::Done);
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Ok(()));
     flash.borrow_mut().damage(layout::STORE.start as usize + 20, 4);
     let mut board = start(&flash);
     assert_eq!(info(&mut board).flash, FlashState::Damaged);
     assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
     assert!(board.stored_damaged() && board.configuration_lost());
-    let Reply::Log(page) = ask(&mut board, &Request::Log { after: 0 }) else { panic!("no log") };
+    let page = board.events(0);
     assert!(page.events.iter().any(|event| event.kind == EventKind::RecordsDamaged));
     // Until it is stored again.
-    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Reply::Done);
+    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Ok(()));
     let board = start(&flash);
     assert!(!board.stored_damaged() && !board.configuration_lost());
 }
@@ -104,7 +100,7 @@ fn damaged_record_is_noted() {
 fn what_is_stored_is_read_without_a_controller() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut start(&flash), &set(wanted)), Reply::Done);
+    assert_eq!(ask(&mut start(&flash), &set(wanted)), Ok(()));
     let mut board = Board::new(&DRIVES);
     let records = Region::new(&flash, layout::STORE);
     board.begin(Some(records), Some(MappedRegion::new(&flash)), false, IDENTITY);
@@ -112,9 +108,9 @@ fn what_is_stored_is_read_without_a_controller() {
     let about = info(&mut board);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
     let before = flash.borrow().operations();
-    let no_flash = Reply::Refused(Refusal::Store(StoreError::NoFlash));
+    let no_flash = Err(Refusal::Store(StoreError::NoFlash));
     assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), no_flash);
-    let no_slot = Reply::Refused(Refusal::Slot(SlotError::NoFlash));
+    let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
     assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
     assert_eq!(flash.borrow().operations(), before);
 }
@@ -125,15 +121,12 @@ fn nothing_is_stored_without_flash() {
     let about = info(&mut board);
     assert_eq!((about.flash, about.weights), (FlashState::Absent, WeightSource::BuiltIn));
     assert_eq!(about.identity, IDENTITY);
-    let no_flash = Reply::Refused(Refusal::Store(StoreError::NoFlash));
+    let no_flash = Err(Refusal::Store(StoreError::NoFlash));
     assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), no_flash);
-    let no_slot = Reply::Refused(Refusal::Slot(SlotError::NoFlash));
+    let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
     assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
     assert_eq!(ask(&mut board, &Request::WeightsVerify), no_slot);
-    assert_eq!(
-        ask(&mut board, &Request::WeightsActivate),
-        Reply::Refused(Refusal::Slot(SlotError::NotBegun))
-    );
+    assert_eq!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(SlotError::NotBegun)));
 }
 
 #[test]
@@ -143,8 +136,8 @@ fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
         let diagnosis = DiagnosisIds { extended, request, functional, response };
         ask(&mut board, &set(Configuration { diagnosis, ..Configuration::DEFAULT }))
     };
-    assert_eq!(ask(false, [0x700, 0x7DF, 0x708]), Reply::Done);
-    assert_eq!(ask(true, [0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110]), Reply::Done);
+    assert_eq!(ask(false, [0x700, 0x7DF, 0x708]), Ok(()));
+    assert_eq!(ask(true, [0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110]), Ok(()));
     for (extended, ids, named) in [
         (false, [0x800, 0x7DF, 0x7E8], 0x800),
         (true, [0x18DA_10F1, 0x18DB_33F1, 1 << 29], 1 << 29),
@@ -153,7 +146,7 @@ fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
         // The rate's own.
         (false, [0x7E0, 0x7DF, 0x1A0], 0x7E0),
     ] {
-        let refused = Reply::Refused(Refusal::Store(StoreError::Field(FieldError::Diagnosis(named))));
+        let refused = Err(Refusal::Store(StoreError::Field(FieldError::Diagnosis(named))));
         assert_eq!(ask(extended, ids), refused, "{ids:x?}");
     }
 }
@@ -170,8 +163,8 @@ fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standst
         );
     }
     match ask(board, &set(Configuration::DEFAULT)) {
-        Reply::Done => true,
-        Reply::Refused(Refusal::Moving) => false,
+        Ok(()) => true,
+        Err(Refusal::Moving) => false,
         other => panic!("{other:?}"),
     }
 }
@@ -191,11 +184,11 @@ fn flash_is_written_at_standstill_alone() {
     board.observe(None, 701, (Status::Silent, Faults::NONE), Standstill::Moving);
     for request in [
         Request::WeightsBegin { length: 64 },
-        Request::WeightsBlock { offset: 0, bytes: heapless::Vec::new() },
+        Request::WeightsBlock { offset: 0, bytes: &[] },
         Request::WeightsActivate,
         Request::Calibrate(Calibrate::Store),
         Request::Restart,
     ] {
-        assert_eq!(ask(&mut board, &request), Reply::Refused(Refusal::Moving), "{request:?}");
+        assert_eq!(ask(&mut board, &request), Err(Refusal::Moving), "{request:?}");
     }
 }

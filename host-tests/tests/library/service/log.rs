@@ -1,10 +1,9 @@
 //! The log keeps the latest events and counts those that it has dropped.
 
-use super::{Board, IDENTITY, ask, bare, info, sample};
+use super::{IDENTITY, bare, info, sample};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
 use gyronet::service::event::{EventKind, ResetCause, SensorFault};
-use gyronet::service::{Reply, Request};
 
 #[test]
 fn sensor_that_does_not_answer_is_noted_once() {
@@ -14,7 +13,7 @@ fn sensor_that_does_not_answer_is_noted_once() {
         board.sensor(result);
         assert_eq!(info(&mut board).sensor, result.err());
     }
-    let Reply::Log(page) = ask(&mut board, &Request::Log { after: 2 }) else { panic!("no log") };
+    let page = board.events(2);
     let kinds: Vec<EventKind> = page.events.iter().map(|event| event.kind).collect();
     let failed = [Some(absent), Some(SensorFault::Reset), Some(absent), None, None];
     assert_eq!(kinds, failed.map(EventKind::Sensor));
@@ -23,11 +22,7 @@ fn sensor_that_does_not_answer_is_noted_once() {
 #[test]
 fn the_log_is_bounded_and_reports_what_is_lost() {
     let mut board = bare();
-    let page = |board: &mut Board, after| match ask(board, &Request::Log { after }) {
-        Reply::Log(page) => page,
-        other => panic!("{other:?}"),
-    };
-    let first = page(&mut board, 0);
+    let first = board.events(0);
     let kinds: Vec<EventKind> = first.events.iter().map(|event| event.kind).collect();
     let crash = IDENTITY.crash.expect("there is one");
     assert_eq!(kinds, [EventKind::Started(ResetCause::Software), EventKind::Crashed(crash)]);
@@ -42,7 +37,7 @@ fn the_log_is_bounded_and_reports_what_is_lost() {
     }
     let (mut after, mut events, mut lost) = (2, 0, 0);
     loop {
-        let page = page(&mut board, after);
+        let page = board.events(after);
         lost += page.lost;
         events += page.events.len() as u32;
         let Some(last) = page.events.last() else { break };

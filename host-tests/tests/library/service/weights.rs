@@ -2,8 +2,8 @@
 
 use super::{Board, ask, info, start};
 use gyronet::model::weights;
+use gyronet::service::Request;
 use gyronet::service::message::Refusal;
-use gyronet::service::{Reply, Request};
 use gyronet::store::Slot;
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
@@ -19,36 +19,35 @@ fn weights_are_replaced() {
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     for (round, slot) in [Slot::A, Slot::B, Slot::A].into_iter().enumerate() {
         let mut board = start(&flash);
-        let at = |written, checked| Reply::Weights { slot, written, checked };
-        assert_eq!(ask(&mut board, &Request::WeightsBegin { length: file.len() as u32 }), at(0, None));
+        assert_eq!(ask(&mut board, &Request::WeightsBegin { length: file.len() as u32 }), Ok(()));
         for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
-            let bytes = heapless::Vec::from_slice(block).expect("a block");
-            let request = Request::WeightsBlock { offset, bytes };
+            let request = Request::WeightsBlock { offset, bytes: block };
             let written = offset + block.len() as u32;
-            assert_eq!(ask(&mut board, &request), at(written, None));
+            assert_eq!(ask(&mut board, &request), Ok(()));
             // The answer was lost: the same again does no harm.
-            assert_eq!(ask(&mut board, &request), at(written, None));
+            assert_eq!(ask(&mut board, &request), Ok(()));
             if offset == 512 {
-                let gap = Request::WeightsBlock { offset: 4096, bytes: heapless::Vec::new() };
-                let expected = Reply::Refused(Refusal::Slot(SlotError::Offset { expected: written }));
+                let gap = Request::WeightsBlock { offset: 4096, bytes: &[] };
+                let expected = Err(Refusal::Slot(SlotError::Offset { expected: written }));
                 assert_eq!(ask(&mut board, &gap), expected);
-                let early = Reply::Refused(Refusal::Slot(SlotError::Incomplete { written }));
+                let early = Err(Refusal::Slot(SlotError::Incomplete { written }));
                 assert_eq!(ask(&mut board, &Request::WeightsVerify), early);
                 assert_eq!(ask(&mut board, &Request::WeightsActivate), early);
             }
         }
-        assert_eq!(ask(&mut board, &Request::WeightsVerify), at(file.len() as u32, Some(crc)));
-        assert_eq!(ask(&mut board, &Request::WeightsActivate), Reply::Done);
+        assert_eq!(board.uploaded(), None);
+        assert_eq!(ask(&mut board, &Request::WeightsVerify), Ok(()));
+        assert_eq!(board.uploaded(), Some((slot, crc)));
+        assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
         let about = info(&mut start(&flash));
         assert_eq!((about.weights, about.weights_crc), (WeightSource::Slot(slot), Some(crc)), "{round}");
     }
     // A bad file is not accepted, and what ran before runs on.
     let mut board = start(&flash);
-    ask(&mut board, &Request::WeightsBegin { length: 256 });
-    let bytes = heapless::Vec::from_slice(&[0x55; 256]).expect("a block");
-    ask(&mut board, &Request::WeightsBlock { offset: 0, bytes });
-    assert!(matches!(ask(&mut board, &Request::WeightsVerify), Reply::Refused(Refusal::Slot(_))));
-    assert!(matches!(ask(&mut board, &Request::WeightsActivate), Reply::Refused(Refusal::Slot(_))));
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 256 }), Ok(()));
+    assert_eq!(ask(&mut board, &Request::WeightsBlock { offset: 0, bytes: &[0x55; 256] }), Ok(()));
+    assert!(matches!(ask(&mut board, &Request::WeightsVerify), Err(Refusal::Slot(_))));
+    assert!(matches!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(_))));
     assert_eq!(info(&mut start(&flash)).weights, WeightSource::Slot(Slot::A));
     // Both slots damaged: the built-in weights, and both are named.
     for slot in [Slot::A, Slot::B] {
@@ -60,15 +59,13 @@ fn weights_are_replaced() {
     assert!(about.refused_slots.iter().all(Option::is_some), "{:?}", about.refused_slots);
 }
 
-/// Uploads a file over the line and has it checked.
+/// Uploads a file and has it checked.
 fn upload(board: &mut Board, file: &[u8]) {
-    ask(board, &Request::WeightsBegin { length: file.len() as u32 });
+    assert_eq!(ask(board, &Request::WeightsBegin { length: file.len() as u32 }), Ok(()));
     for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
-        let bytes = heapless::Vec::from_slice(block).expect("a block");
-        ask(board, &Request::WeightsBlock { offset, bytes });
+        assert_eq!(ask(board, &Request::WeightsBlock { offset, bytes: block }), Ok(()));
     }
-    let checked = ask(board, &Request::WeightsVerify);
-    assert!(matches!(checked, Reply::Weights { checked: Some(_), .. }), "{checked:?}");
+    assert_eq!(ask(board, &Request::WeightsVerify), Ok(()));
 }
 
 /// The upload itself touches the unused slot alone (`store_power_cut`); here the board changes over to it.
@@ -77,7 +74,7 @@ fn a_power_cut_during_activation_leaves_the_old_or_the_new_weights() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
     upload(&mut board, &other_weights(1));
-    assert_eq!(ask(&mut board, &Request::WeightsActivate), Reply::Done);
+    assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
     let before = flash.borrow().clone();
     let mut cuts = 0;
     let changed_over = loop {
@@ -89,11 +86,11 @@ fn a_power_cut_during_activation_leaves_the_old_or_the_new_weights() {
         if !flash.borrow_mut().restore() {
             break answer;
         }
-        assert!(matches!(answer, Reply::Refused(_)), "cut {cuts}: {answer:?}");
+        assert!(answer.is_err(), "cut {cuts}: {answer:?}");
         let weights = info(&mut start(&flash)).weights;
         assert!(matches!(weights, WeightSource::Slot(_)), "cut {cuts}: the board runs on weights {weights}");
         cuts += 1;
     };
-    assert_eq!(changed_over, Reply::Done);
+    assert_eq!(changed_over, Ok(()));
     assert!(cuts > 3, "{cuts} operations to cut");
 }

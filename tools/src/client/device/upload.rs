@@ -1,10 +1,10 @@
 //! The upload of a weight file into the board's unused slot.
 
 use super::{Device, DeviceError};
-use gyronet::service::message::{BLOCK, Refusal};
-use gyronet::service::{Reply, Request};
-use gyronet::store::slots::{Slot, SlotError};
-use std::io::{Read, Write};
+use crate::client::bus::Bus;
+use gyronet::service::message::BLOCK;
+use gyronet::store::Slot;
+use gyronet::uds::Session;
 
 /// A file that the board has accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,39 +15,29 @@ pub struct Uploaded {
     pub crc: u32,
 }
 
-/// Uploads a file, has the board check it, and has it used from the next start on. `progress`
-/// hears how many bytes are there.
+/// Downloads a file into the board, has the board check it, and has it used from the next start on. `progress` is called
+/// with the bytes that are there.
 ///
 /// # Errors
 /// [`DeviceError`]; the weights in use have not been touched then.
-pub fn upload<L: Read + Write>(
-    device: &mut Device<L>,
+pub fn upload<B: Bus>(
+    device: &mut Device<B>,
     file: &[u8],
     mut progress: impl FnMut(usize),
 ) -> Result<Uploaded, DeviceError> {
     let length = u32::try_from(file.len()).map_err(|_| DeviceError::TooLong)?;
-    device.ask(&Request::WeightsBegin { length })?;
-    let mut at = 0;
-    while let Some(rest) = file.get(at..).filter(|rest| !rest.is_empty()) {
-        let block = rest.get(..BLOCK).unwrap_or(rest);
-        let bytes = block.try_into().map_err(|_| DeviceError::TooLong)?;
-        let written = match device.ask(&Request::WeightsBlock { offset: at as u32, bytes }) {
-            Ok(Reply::Weights { written, .. }) => written,
-            // An answer was lost: the board knows where to go on.
-            Err(DeviceError::Refused(Refusal::Slot(SlotError::Offset { expected }))) => expected,
-            Ok(_) => return Err(DeviceError::Mismatch),
-            Err(error) => return Err(error),
-        } as usize;
-        // Forward, or this would never end.
-        if written <= at {
-            return Err(DeviceError::Mismatch);
-        }
-        at = written;
-        progress(at);
+    device.enter(Session::Programming)?;
+    // Four bytes of address, zero, and four of length.
+    device.ask(&[&[0x34, 0, 0x44, 0, 0, 0, 0][..], &length.to_be_bytes()].concat())?;
+    let mut number = 0u8;
+    for (block, end) in file.chunks(BLOCK).zip((BLOCK..).step_by(BLOCK)) {
+        number = number.wrapping_add(1);
+        device.ask(&[&[0x36, number], block].concat())?;
+        progress(end.min(file.len()));
     }
-    let Reply::Weights { slot, checked: Some(crc), .. } = device.ask(&Request::WeightsVerify)? else {
-        return Err(DeviceError::Mismatch);
-    };
-    device.ask(&Request::WeightsActivate)?;
-    Ok(Uploaded { slot, crc })
+    let response = device.ask(&[0x37])?;
+    let [slot, crc @ ..] = <[u8; 5]>::try_from(response).map_err(|_| DeviceError::Mismatch)?;
+    let slot = Slot::ALL.into_iter().find(|known| *known as u8 == slot).ok_or(DeviceError::Mismatch)?;
+    device.ask(&[0x31, 1, 0xFF, 0x01])?;
+    Ok(Uploaded { slot, crc: u32::from_be_bytes(crc) })
 }

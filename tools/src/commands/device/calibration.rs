@@ -1,10 +1,8 @@
 //! The calibration of a board that stands still.
 
-use super::{Board, mismatch, print_value};
+use super::{Board, print_value};
 use clap::ValueEnum;
 use gyronet::service::calibrate::{State, Task};
-use gyronet::service::message::Calibrate;
-use gyronet::service::{Reply, Request};
 use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::client::device::calibration::to_value;
 use std::path::Path;
@@ -41,32 +39,29 @@ pub fn run(
         What::Show => None,
         What::Unit => {
             let path = file.ok_or("give the file of `gyronet calibrate` with --file")?;
-            device.ask(&Request::Calibrate(Calibrate::SetUnit(Some(unit_file::read(path)?))))?;
+            device.set_unit(Some(unit_file::read(path)?))?;
             None
         }
         What::NoUnit => {
-            device.ask(&Request::Calibrate(Calibrate::SetUnit(None)))?;
+            device.set_unit(None)?;
             None
         }
         What::Cancel => {
-            device.ask(&Request::Calibrate(Calibrate::Cancel))?;
+            device.cancel_calibration()?;
             None
         }
         What::Static => Some(Task::Static),
         What::Mounting => Some(Task::Mounting),
     };
     if let Some(task) = task {
-        device.ask(&Request::Calibrate(Calibrate::Start(task)))?;
+        device.start_calibration(task)?;
     }
     let until = Instant::now() + LIMIT;
     loop {
-        let Reply::Calibration { state, calibration, .. } = device.ask(&Request::GetCalibration)? else {
-            return mismatch();
-        };
-        match state {
+        match device.calibration_state()? {
             State::Running(_) if task.is_some() => {
                 if Instant::now() > until {
-                    device.ask(&Request::Calibrate(Calibrate::Cancel))?;
+                    device.cancel_calibration()?;
                     return Err("no three seconds of samples have come from the sensor".into());
                 }
                 std::thread::sleep(POLL);
@@ -76,9 +71,9 @@ pub fn run(
             }
             _ => {
                 if store {
-                    device.ask(&Request::Calibrate(Calibrate::Store))?;
+                    device.store_calibration()?;
                 }
-                return print_value(&to_value(&calibration)?, json);
+                return print_value(&to_value(&device.calibration()?)?, json);
             }
         }
     }

@@ -1,25 +1,12 @@
 //! The configuration of a board, read and changed.
 
-use super::{Board, done, mismatch};
-use gyronet::service::{Reply, Request};
+use super::{Board, done};
 use gyronet::store::{Configuration, Record};
 use gyronet_tools::client::device::settings::{assign, from_value, to_value};
 use gyronet_tools::wheels::WheelFile;
 use std::path::Path;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
-
-pub fn get(device: &mut Board) -> Result<Configuration> {
-    let Reply::Configuration { version, configuration, .. } = device.ask(&Request::GetConfiguration)? else {
-        return mismatch();
-    };
-    if version != Configuration::VERSION {
-        return Err(
-            format!("configuration layout {version}; this tool knows {}", Configuration::VERSION).into()
-        );
-    }
-    Ok(configuration)
-}
 
 pub fn print(configuration: &Configuration, json: bool) -> Result<()> {
     super::print_value(&to_value(configuration)?, json)
@@ -37,7 +24,7 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| format!("{name}: {e}"))?;
         let wheels = WheelFile::parse(&name, &text)?.settings(&name)?;
-        device.ask(&Request::SetWheels(wheels))?;
+        device.set_wheels(&wheels)?;
         return Ok(done(json, "stored; it takes effect after a restart")?);
     }
     let mut wanted = match file {
@@ -45,21 +32,20 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
             let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
             serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?
         }
-        None => to_value(&get(device)?)?,
+        None => to_value(&device.configuration()?)?,
     };
     for setting in settings {
         assign(&mut wanted, setting)?;
     }
     let configuration = from_value(wanted)?;
     configuration.check()?;
-    device.ask(&Request::SetConfiguration { version: Configuration::VERSION, configuration })?;
+    device.set_configuration(&configuration)?;
     Ok(done(json, "stored; it takes effect after a restart")?)
 }
 
 /// Prints the wheel frames as the file that sets them.
 pub fn print_wheels(device: &mut Board, json: bool) -> Result<()> {
-    let Reply::Wheels { wheels, .. } = device.ask(&Request::GetWheels)? else { return mismatch() };
-    let file = WheelFile::of(&wheels);
+    let file = WheelFile::of(&device.wheels()?);
     if json {
         return super::print_json(&file);
     }

@@ -1,12 +1,14 @@
 //! This module feeds the emulated image while it is counted.
 
+use crate::client::bus::SlcanBus;
+use crate::client::connection::Connection;
+use crate::client::device::Device;
+use crate::client::device::error::DeviceError;
+use crate::client::device::requests::{FOG_COUNTERS, TICK};
 use crate::simulate::{Config, Sample, Simulation};
 use crate::target::emulator::{Board, EmulatorError};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::xsens::MtData2;
-use gyronet::service::frame::{Deframer, emit};
-use gyronet::service::message::AllCounters;
-use gyronet::service::{Reply, Request};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -14,7 +16,6 @@ use std::time::{Duration, Instant};
 const SAMPLES: usize = 500;
 /// A sample may take at most this long.
 const TURN: Duration = Duration::from_secs(10);
-const ASK: Duration = Duration::from_millis(20);
 /// At least this many windows of the network must have run for its cost to be known.
 const WINDOWS: u32 = 20;
 /// An instruction takes 8 ns: the board's clock and its instructions keep the ratio of about 125 million instructions a
@@ -31,9 +32,11 @@ const SERVICE: usize = 6;
 /// Sends everything, one sample after the other, and ends the emulator; returns the plugin's output.
 pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
     let mut board = Board::boot(image, SERVICE, &["-icount", ICOUNT, "-plugin", plugin])?;
-    let [info, configuration, log] = [Request::Info, Request::GetConfiguration, Request::Log { after: 0 }]
-        .map(|request| emit(1, &request).unwrap_or_default());
-    let mut answers = Answers::default();
+    // The end of a line, once the image listens.
+    board.send(SERVICE, b"\r", TURN)?;
+    let address = board.serve(SERVICE)?.to_string();
+    let line = SlcanBus::open(&address, 0).map_err(|error| board.failed(error.to_string()))?;
+    let mut tester = Tester { device: Device::new(line, &address) };
     for (k, sample) in Simulation::new(&Config::DEFAULT).take(SAMPLES).enumerate() {
         // Toyota's frame says that the vehicle stands; from time to time a host sends a request.
         board.send(SLCAN, b"t0AA81A6F1A6F1A6F1A6F\r", TURN)?;
@@ -45,73 +48,48 @@ pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
         // The gyro's messages of ten milliseconds come first, then the sample: the schedule adds up the activations
         // that process them.
         board.send(GYRO, &messages, TURN)?;
-        answers.wait(&mut board, "the gyro's messages", |answers| {
-            answers.messages as usize >= GYRO_MESSAGES * (k + 1)
-        })?;
+        // The first counter of the gyro's lane.
+        tester.wait(&mut board, FOG_COUNTERS, GYRO_MESSAGES * (k + 1))?;
         board.send(IMU, &message(k, &sample).emit(), TURN)?;
-        ask(&mut board, [&info, &configuration, &log][k % 3])?;
-        answers.wait(&mut board, "the sample", |answers| answers.samples as usize > k)?;
+        tester.ask(k).map_err(|error| board.failed(error.to_string()))?;
+        tester.wait(&mut board, TICK, k)?;
     }
-    if answers.windows < WINDOWS {
-        return Err(board.failed(format!("only {} windows were used", answers.windows)));
+    let counters = tester.device.counters().map_err(|error| board.failed(error.to_string()))?;
+    let windows = counters.pipeline.windows;
+    if windows < WINDOWS {
+        return Err(board.failed(format!("only {windows} windows were used")));
     }
     board.quit()
 }
 
-/// Sends a request byte by byte, so that some bytes come while an answer goes out, as on a slow line.
-fn ask(board: &mut Board, question: &[u8]) -> Result<(), EmulatorError> {
-    question.iter().try_for_each(|byte| board.send(SERVICE, &[*byte], TURN))
+/// Asks the image on the service line.
+struct Tester {
+    device: Device<SlcanBus<Connection>>,
 }
 
-/// Holds the image's answers about its pipeline.
-#[derive(Default)]
-struct Answers {
-    deframer: Deframer,
-    /// Bytes of the service line that have been read.
-    read: usize,
-    samples: u32,
-    windows: u32,
-    /// Messages of the fibre-optic gyro.
-    messages: u32,
-}
-
-impl Answers {
-    /// Asks until the image has got so far, however slow the host is.
-    fn wait(
-        &mut self,
-        board: &mut Board,
-        what: &str,
-        is_done: impl Fn(&Self) -> bool,
-    ) -> Result<(), EmulatorError> {
-        let counters = emit(1, &Request::Counters).unwrap_or_default();
-        let until = Instant::now() + TURN;
-        while !is_done(self) {
-            if Instant::now() > until {
-                let Self { samples, messages, .. } = self;
-                let so_far = format!("{samples} samples and {messages} messages of the gyro were");
-                return Err(board.failed(format!("{what} was not processed; {so_far}")));
-            }
-            ask(board, &counters)?;
-            // Without an answer in time, the request is repeated.
-            let _ = board.await_sent(SERVICE, ASK, |bytes| {
-                self.read(bytes);
-                is_done(self)
-            });
+impl Tester {
+    /// Has one of the longer responses sent.
+    fn ask(&mut self, number: usize) -> Result<(), DeviceError> {
+        match number % 3 {
+            0 => self.device.info().map(drop),
+            1 => self.device.configuration().map(drop),
+            _ => self.device.log(0).map(drop),
         }
-        Ok(())
     }
 
-    /// Reads the newest of all answers.
-    fn read(&mut self, bytes: &[u8]) {
-        for byte in bytes.get(self.read..).unwrap_or_default() {
-            if let Some(Ok((_, Reply::Counters(AllCounters { pipeline, fog, .. })))) =
-                self.deframer.receive(*byte)
-            {
-                (self.samples, self.windows, self.messages) =
-                    (pipeline.samples, pipeline.windows, fog.samples);
+    /// Reads the first word of a data identifier until it has got so far, however slow the host is.
+    fn wait(&mut self, board: &mut Board, id: u16, least: usize) -> Result<(), EmulatorError> {
+        let until = Instant::now() + TURN;
+        loop {
+            let value = self.device.read(id).map_err(|error| board.failed(error.to_string()))?;
+            let word = value.first_chunk().map_or(0, |word| u32::from_be_bytes(*word));
+            if word as usize >= least {
+                return Ok(());
+            }
+            if Instant::now() > until {
+                return Err(board.failed(format!("data {id:#06x} stay at {word} of {least}")));
             }
         }
-        self.read = bytes.len();
     }
 }
 

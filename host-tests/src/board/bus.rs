@@ -1,0 +1,30 @@
+//! The virtual board's CAN bus for a tester: waiting lets board time pass.
+
+use super::Board;
+use gyronet::can::DataFrame;
+use gyronet_tools::client::bus::Bus;
+use std::io::Result;
+use std::time::Duration;
+
+/// Board time that passes with each look for frames.
+const TURN: Duration = Duration::from_millis(1);
+
+/// The bus of a board. Frames that the board sends are taken from it.
+#[derive(Debug)]
+pub struct CanBus<'a>(pub(super) &'a mut Board);
+
+impl Bus for CanBus<'_> {
+    fn send(&mut self, frame: &DataFrame) -> Result<()> {
+        self.0.can_send(frame);
+        Ok(())
+    }
+
+    fn receive(&mut self) -> Result<Vec<DataFrame>> {
+        self.0.run(TURN);
+        Ok(self.0.can_frames().into_iter().map(|(_, frame)| frame).collect())
+    }
+
+    fn now(&mut self) -> Duration {
+        self.0.counts().time
+    }
+}

@@ -1,0 +1,63 @@
+//! A bus carries CAN frames between this computer and a board: an SLCAN line, or an interface of Linux.
+
+mod slcan;
+#[cfg(target_os = "linux")]
+mod socketcan;
+
+use super::connection::ConnectError;
+use gyronet::can::DataFrame;
+use std::io::Result;
+use std::time::Duration;
+
+pub use slcan::{Line, SlcanBus};
+
+/// The longest time for which [`Bus::receive`] waits for a frame.
+pub const WAIT: Duration = Duration::from_millis(20);
+/// This prefix names an interface of Linux.
+const INTERFACE: &str = "can:";
+
+/// Carries CAN frames.
+pub trait Bus {
+    /// Sends a frame.
+    ///
+    /// # Errors
+    /// The system's.
+    fn send(&mut self, frame: &DataFrame) -> Result<()>;
+
+    /// Returns the frames that have come; waits for [`WAIT`] at most where there are none.
+    ///
+    /// # Errors
+    /// The system's.
+    fn receive(&mut self) -> Result<Vec<DataFrame>>;
+
+    /// Returns the time since any moment.
+    fn now(&mut self) -> Duration;
+}
+
+impl<B: Bus + ?Sized> Bus for Box<B> {
+    fn send(&mut self, frame: &DataFrame) -> Result<()> {
+        (**self).send(frame)
+    }
+
+    fn receive(&mut self) -> Result<Vec<DataFrame>> {
+        (**self).receive()
+    }
+
+    fn now(&mut self) -> Duration {
+        (**self).now()
+    }
+}
+
+/// Opens `can:can0`, an interface of Linux; or an SLCAN line: `host:port`, or a serial port at `baud`.
+///
+/// # Errors
+/// [`ConnectError`].
+pub fn open(name: &str, baud: u32) -> std::result::Result<Box<dyn Bus>, ConnectError> {
+    match name.strip_prefix(INTERFACE) {
+        #[cfg(target_os = "linux")]
+        Some(interface) => Ok(Box::new(socketcan::Interface::open(interface)?)),
+        #[cfg(not(target_os = "linux"))]
+        Some(interface) => Err(ConnectError::NoInterfaces { name: interface.to_owned() }),
+        None => Ok(Box::new(SlcanBus::open(name, baud)?)),
+    }
+}

@@ -1,0 +1,63 @@
+//! A CAN interface of Linux (SocketCAN), which the kernel shares among programs.
+
+use super::{Bus, WAIT};
+use crate::client::connection::ConnectError;
+use embedded_can::Frame;
+use gyronet::can::DataFrame;
+use socketcan::{CanFrame, CanSocket, Socket, SocketOptions};
+use std::io::{ErrorKind, Result};
+use std::time::{Duration, Instant};
+
+/// An open interface.
+pub struct Interface {
+    socket: CanSocket,
+    opened: Instant,
+}
+
+impl Interface {
+    /// Opens an interface that is up, by its name.
+    ///
+    /// # Errors
+    /// [`ConnectError::Interface`].
+    pub fn open(name: &str) -> std::result::Result<Self, ConnectError> {
+        let open = || {
+            let socket = CanSocket::open(name)?;
+            socket.set_read_timeout(WAIT)?;
+            socket.set_error_filter_drop_all()?;
+            Ok(Self { socket, opened: Instant::now() })
+        };
+        open().map_err(|source| ConnectError::Interface { name: name.to_owned(), source })
+    }
+}
+
+impl Bus for Interface {
+    fn send(&mut self, frame: &DataFrame) -> Result<()> {
+        let frame = CanFrame::new(frame.id(), frame.data()).ok_or(ErrorKind::InvalidInput)?;
+        self.socket.write_frame(&frame)
+    }
+
+    fn receive(&mut self) -> Result<Vec<DataFrame>> {
+        match self.socket.read_frame() {
+            Ok(frame) => Ok(DataFrame::new(frame.id(), frame.data()).into_iter().collect()),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                Ok(Vec::new())
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn now(&mut self) -> Duration {
+        self.opened.elapsed()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interface_that_does_not_exist_is_named() {
+        let Err(error) = Interface::open("nosuch0") else { panic!("there is no such interface") };
+        assert!(error.to_string().starts_with("can:nosuch0: "), "{error}");
+    }
+}

@@ -1,0 +1,292 @@
+//! The requests that a person has, each in diagnostic services and data identifiers (tables in [`gyronet::uds`]).
+
+use super::{Device, DeviceError};
+use crate::client::bus::Bus;
+use gyronet::can::diagnosis::DiagnosisIds;
+use gyronet::can::wheel::WheelSettings;
+use gyronet::fog::FogCounters;
+use gyronet::health::{Counters, InputCounters, MonitorCounters};
+use gyronet::service::calibrate::{State, Task};
+use gyronet::service::event::LogPage;
+use gyronet::service::message::{AllCounters, Info, LineCounters, PROTOCOL};
+use gyronet::store::{Calibration, Configuration, Record, UnitMap};
+use gyronet::uds::Session;
+use serde::de::value::{Error, SeqAccessDeserializer};
+use serde::de::{DeserializeOwned, DeserializeSeed, IntoDeserializer, SeqAccess};
+
+/// Data identifiers.
+const CONFIGURATION: u16 = 0x0100;
+const WHEELS: u16 = 0x0101;
+const CALIBRATION: u16 = 0x0102;
+/// Grid steps of the sensor's time since the start.
+pub const TICK: u16 = 0x0108;
+const PIPELINE_COUNTERS: u16 = 0x0105;
+const INPUT_COUNTERS: u16 = 0x0106;
+/// The first one is the number of messages.
+pub const FOG_COUNTERS: u16 = 0x0109;
+const INFO: u16 = 0x010A;
+const CALIBRATION_STATE: u16 = 0x010C;
+const UNIT: u16 = 0x010D;
+/// The request for all counters.
+pub const COUNTERS: [u8; 7] = {
+    let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
+    let [c, d] = INPUT_COUNTERS.to_be_bytes();
+    let [e, f] = FOG_COUNTERS.to_be_bytes();
+    [0x22, a, b, c, d, e, f]
+};
+/// Routines.
+const STATIC: u16 = 0x0200;
+const MOUNTING: u16 = 0x0201;
+const STORE_CALIBRATION: u16 = 0x0202;
+const LOG: u16 = 0x0203;
+/// What is done with a routine.
+const START: u8 = 1;
+const STOP: u8 = 2;
+
+type Result<T> = std::result::Result<T, DeviceError>;
+
+impl<B: Bus> Device<B> {
+    /// Addresses the board by the default identifiers; `name` stands in errors.
+    pub fn new(bus: B, name: &str) -> Self {
+        Self::with_ids(bus, name, &DiagnosisIds::DEFAULT).expect("three of 11 bits")
+    }
+
+    /// Returns the identity and state.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn info(&mut self) -> Result<Info> {
+        let record = self.read(INFO)?;
+        if record.first() != Some(&PROTOCOL) {
+            return Err(DeviceError::Mismatch);
+        }
+        decode(&record)
+    }
+
+    /// Returns the configuration that the board was started with.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn configuration(&mut self) -> Result<Configuration> {
+        versioned::<Configuration>(&self.read(CONFIGURATION)?)
+    }
+
+    /// Stores a configuration, which is used from the next start on.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn set_configuration(&mut self, configuration: &Configuration) -> Result<()> {
+        self.write(CONFIGURATION, &[Configuration::VERSION], configuration)
+    }
+
+    /// Returns the wheel frames that the board receives.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn wheels(&mut self) -> Result<WheelSettings> {
+        decode(&self.read(WHEELS)?)
+    }
+
+    /// Stores wheel frames, which are received from the next start on.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<()> {
+        self.write(WHEELS, &[], wheels)
+    }
+
+    /// Returns the calibration.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn calibration(&mut self) -> Result<Calibration> {
+        versioned::<Calibration>(&self.read(CALIBRATION)?)
+    }
+
+    /// Stores the map of this unit's gyro, or none, which is used from the next start on.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<()> {
+        self.write(UNIT, &[], &unit)
+    }
+
+    /// Starts a calibration.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn start_calibration(&mut self, task: Task) -> Result<()> {
+        self.routine(START, routine(task))
+    }
+
+    /// Stops a calibration without a result.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn cancel_calibration(&mut self) -> Result<()> {
+        self.routine(STOP, STATIC)
+    }
+
+    /// Returns how a calibration goes.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn calibration_state(&mut self) -> Result<State> {
+        decode(&self.read(CALIBRATION_STATE)?)
+    }
+
+    /// Stores what a calibration has found.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn store_calibration(&mut self) -> Result<()> {
+        self.routine(START, STORE_CALIBRATION)
+    }
+
+    /// Returns the events after a number, a page at most.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn log(&mut self, after: u32) -> Result<LogPage> {
+        let [high, low] = LOG.to_be_bytes();
+        let request = [&[0x31, START, high, low][..], &after.to_be_bytes()].concat();
+        decode(self.ask(&request)?.get(3..).unwrap_or_default())
+    }
+
+    /// Returns all counters.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn counters(&mut self) -> Result<AllCounters> {
+        counters(&self.ask(&COUNTERS)?)
+    }
+
+    /// Restarts the board.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn restart(&mut self) -> Result<()> {
+        self.ask(&[0x11, 1]).map(drop)
+    }
+
+    /// Enters a session; the board leaves it after five seconds of silence.
+    pub(super) fn enter(&mut self, session: Session) -> Result<()> {
+        self.ask(&[0x10, session as u8]).map(drop)
+    }
+
+    /// Returns the value of a data identifier.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn read(&mut self, id: u16) -> Result<Vec<u8>> {
+        let id = id.to_be_bytes();
+        let response = self.ask(&[0x22, id[0], id[1]])?;
+        response.strip_prefix(&id).map(<[u8]>::to_vec).ok_or(DeviceError::Mismatch)
+    }
+
+    fn write(&mut self, id: u16, head: &[u8], record: &impl serde::Serialize) -> Result<()> {
+        self.enter(Session::Extended)?;
+        let record = postcard::to_stdvec(record).map_err(|_| DeviceError::TooLong)?;
+        self.ask(&[&[0x2E][..], &id.to_be_bytes(), head, &record].concat()).map(drop)
+    }
+
+    fn routine(&mut self, control: u8, id: u16) -> Result<()> {
+        self.enter(Session::Extended)?;
+        let [high, low] = id.to_be_bytes();
+        self.ask(&[0x31, control, high, low]).map(drop)
+    }
+}
+
+const fn routine(task: Task) -> u16 {
+    match task {
+        Task::Static => STATIC,
+        Task::Mounting => MOUNTING,
+    }
+}
+
+fn decode<T: DeserializeOwned>(record: &[u8]) -> Result<T> {
+    postcard::from_bytes(record).map_err(|_| DeviceError::Mismatch)
+}
+
+/// Decodes a record behind the version of its layout.
+fn versioned<R: Record>(bytes: &[u8]) -> Result<R> {
+    match bytes.split_first() {
+        Some((version, record)) if *version == R::VERSION => decode(record),
+        _ => Err(DeviceError::Mismatch),
+    }
+}
+
+/// Reads all counters in a response to [`COUNTERS`] without its first byte.
+///
+/// # Errors
+/// [`DeviceError::Mismatch`].
+pub fn counters(response: &[u8]) -> Result<AllCounters> {
+    let mut words = Words(response);
+    words.identifier(PIPELINE_COUNTERS)?;
+    let pipeline: Counters = words.fields()?;
+    words.identifier(INPUT_COUNTERS)?;
+    let (watch, inputs, lines): (MonitorCounters, InputCounters, LineCounters) =
+        (words.fields()?, words.fields()?, words.fields()?);
+    words.identifier(FOG_COUNTERS)?;
+    let fog: FogCounters = words.fields()?;
+    if words.0.is_empty() {
+        Ok(AllCounters { pipeline, watch, lines, fog, inputs })
+    } else {
+        Err(DeviceError::Mismatch)
+    }
+}
+
+/// The words that are left of a response.
+struct Words<'a>(&'a [u8]);
+
+impl Words<'_> {
+    fn identifier(&mut self, id: u16) -> Result<()> {
+        self.0 = self.0.strip_prefix(&id.to_be_bytes()).ok_or(DeviceError::Mismatch)?;
+        Ok(())
+    }
+
+    /// Takes as many words as a type has fields, in the order in which it declares them.
+    fn fields<T: DeserializeOwned>(&mut self) -> Result<T> {
+        T::deserialize(SeqAccessDeserializer::new(self)).map_err(|_| DeviceError::Mismatch)
+    }
+}
+
+impl<'de> SeqAccess<'de> for &mut Words<'_> {
+    type Error = Error;
+
+    fn next_element_seed<T: DeserializeSeed<'de>>(
+        &mut self,
+        seed: T,
+    ) -> std::result::Result<Option<T::Value>, Error> {
+        let Some((word, rest)) = self.0.split_first_chunk() else { return Ok(None) };
+        self.0 = rest;
+        seed.deserialize(u32::from_be_bytes(*word).into_deserializer()).map(Some)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counters_stand_in_the_order_of_their_types() {
+        let words =
+            |from: u32, count: u32| (from..from + count).flat_map(u32::to_be_bytes).collect::<Vec<u8>>();
+        let response = [
+            &PIPELINE_COUNTERS.to_be_bytes()[..],
+            &words(0, 12),
+            &INPUT_COUNTERS.to_be_bytes(),
+            &words(100, 20),
+            &FOG_COUNTERS.to_be_bytes(),
+            &words(200, 12),
+        ]
+        .concat();
+        let all = counters(&response).expect("whole");
+        assert_eq!((all.pipeline.samples, all.pipeline.contradicted), (0, 11));
+        assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 114));
+        assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.dropped), (119, 200, 211));
+        for length in 0..response.len() {
+            assert!(counters(&response[..length]).is_err(), "{length}");
+        }
+    }
+}
