@@ -25,6 +25,7 @@ pub mod isotp;
 mod response;
 mod server;
 mod services;
+pub mod settings;
 mod troubles;
 
 pub use response::Nrc;

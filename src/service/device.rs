@@ -46,6 +46,8 @@ pub struct Device<R: NorFlash, W> {
     refused: bool,
     configuration: Configuration,
     configuration_origin: Origin,
+    /// The configuration that the next start will use.
+    next_configuration: Configuration,
     wheels: WheelSettings,
     wheels_origin: Origin,
     calibration: Calibration,
@@ -83,6 +85,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             refused: false,
             configuration: Configuration::DEFAULT,
             configuration_origin: Origin::BuiltIn,
+            next_configuration: Configuration::DEFAULT,
             wheels: WheelSettings::TOYOTA,
             wheels_origin: Origin::BuiltIn,
             calibration: Calibration::NONE,
@@ -109,6 +112,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[must_use]
     pub fn configuration(&self) -> &Configuration {
         &self.configuration
+    }
+
+    /// Returns the configuration that the next start will use.
+    #[must_use]
+    pub fn next_configuration(&self) -> &Configuration {
+        &self.next_configuration
     }
 
     /// Returns the wheel frames that the image receives.

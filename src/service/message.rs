@@ -23,7 +23,7 @@ pub enum Request<'a> {
         /// The version of its layout.
         version: u8,
         /// Whole.
-        configuration: Configuration,
+        configuration: &'a Configuration,
     },
     /// Other wheel frames.
     SetWheels(WheelSettings),

@@ -19,11 +19,13 @@
 //! | 010B | postcard | the reason why the last request was refused, where it was: [`crate::service::message::Refusal`] | |
 //! | 010C | postcard | how a calibration goes: [`crate::service::calibrate::State`] | |
 //! | 010D | postcard | gain and mounting of this unit's gyro, or none: [`crate::store::UnitMap`] (read in 0102) | extended |
+//! | 0201 to 021C | | [settings](super::settings), each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
 
 use super::isotp::TransportErrors;
-use super::response::{Nrc, Response, put};
+use super::response::{Nrc, Response, nrc, put};
+use super::settings;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
 use crate::service::message::{AllCounters, Calibrate, LineCounters, Request};
@@ -32,6 +34,7 @@ use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// Lists the fields of a type in this order; one that is left out does not compile.
 macro_rules! words {
@@ -120,33 +123,52 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         0x010A => put_record(out, &device.info()),
         0x010B => put_record(out, &device.refusal()),
         0x010C => put_record(out, &device.calibration_state()),
-        _ => Err(Nrc::RequestOutOfRange),
+        _ => settings::read(id, device, out),
     }
 }
 
-/// Returns the request that writes these bytes under an identifier.
-pub(super) fn write(id: u16, bytes: &[u8]) -> Result<Request<'static>, Nrc> {
-    let length = Nrc::IncorrectMessageLengthOrInvalidFormat;
+/// Writes these bytes under an identifier. Each record has a function of its own, so that only one is on the stack.
+pub(super) fn write<R: NorFlash, W: MappedSlots>(
+    id: u16,
+    bytes: &[u8],
+    device: &mut Device<R, W>,
+) -> Result<(), Nrc> {
     match id {
-        0x0100 => {
-            let (version, record) = bytes.split_first().ok_or(length)?;
-            if *version != Configuration::VERSION {
-                return Err(Nrc::RequestOutOfRange);
-            }
-            match postcard::take_from_bytes(record) {
-                Ok((configuration, [])) => Ok(Request::SetConfiguration { version: *version, configuration }),
-                Ok(_) | Err(_) => Err(length),
-            }
-        }
-        0x0101 => match postcard::take_from_bytes(bytes) {
-            Ok((wheels, [])) => Ok(Request::SetWheels(wheels)),
-            Ok(_) | Err(_) => Err(length),
-        },
-        0x010D => match postcard::take_from_bytes(bytes) {
-            Ok((unit, [])) => Ok(Request::Calibrate(Calibrate::SetUnit(unit))),
-            Ok(_) | Err(_) => Err(length),
-        },
-        _ => Err(Nrc::RequestOutOfRange),
+        0x0100 => write_configuration(bytes, device),
+        0x0101 => write_wheels(bytes, device),
+        0x010D => write_unit(bytes, device),
+        _ => settings::write(id, bytes, device),
+    }
+}
+
+#[inline(never)]
+fn write_configuration<R: NorFlash, W: MappedSlots>(
+    bytes: &[u8],
+    device: &mut Device<R, W>,
+) -> Result<(), Nrc> {
+    let (&version, record) = bytes.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+    if version != Configuration::VERSION {
+        return Err(Nrc::RequestOutOfRange);
+    }
+    let configuration = decode(record)?;
+    device.act(&Request::SetConfiguration { version, configuration: &configuration }).map_err(nrc)
+}
+
+#[inline(never)]
+fn write_wheels<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R, W>) -> Result<(), Nrc> {
+    device.act(&Request::SetWheels(decode(bytes)?)).map_err(nrc)
+}
+
+#[inline(never)]
+fn write_unit<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R, W>) -> Result<(), Nrc> {
+    device.act(&Request::Calibrate(Calibrate::SetUnit(decode(bytes)?))).map_err(nrc)
+}
+
+/// Decodes a value in postcard's encoding; no byte may be left.
+pub(super) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Nrc> {
+    match postcard::take_from_bytes(bytes) {
+        Ok((value, [])) => Ok(value),
+        Ok(_) | Err(_) => Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
     }
 }
 

@@ -251,8 +251,7 @@ impl Services {
                 let [high, low, bytes @ ..] = rest else {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 };
-                let request = data::write(u16::from_be_bytes([*high, *low]), bytes)?;
-                device.act(&request).map_err(nrc)?;
+                data::write(u16::from_be_bytes([*high, *low]), bytes, device)?;
                 put(out, &[*high, *low])?;
                 Ok(true)
             }

@@ -70,7 +70,7 @@ fn info(board: &mut Board) -> Info {
     board.info()
 }
 
-fn set(configuration: Configuration) -> Request<'static> {
+fn set(configuration: &Configuration) -> Request<'_> {
     Request::SetConfiguration { version: Configuration::VERSION, configuration }
 }
 

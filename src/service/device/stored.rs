@@ -59,6 +59,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let (configuration, origin) = self.take(found, EventKind::ConfigurationRefused);
         (self.configuration, self.configuration_origin) =
             (configuration.unwrap_or(Configuration::DEFAULT), origin);
+        self.next_configuration = self.configuration;
         let (wheels, origin) = self.take(store.get(), EventKind::WheelsRefused);
         (self.wheels, self.wheels_origin) = (wheels.unwrap_or(WheelSettings::TOYOTA), origin);
         let (calibration, origin) = self.take(store.get(), EventKind::CalibrationRefused);
@@ -119,6 +120,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         configuration.check().map_err(StoreError::from)?;
         self.drivable(configuration)?;
         self.store()?.set(configuration)?;
+        self.next_configuration = *configuration;
         self.note(EventKind::ConfigurationStored);
         Ok(())
     }

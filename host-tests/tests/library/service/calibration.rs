@@ -82,7 +82,7 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
 fn configured_rotation_comes_first() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mounting = Mounting { roll_deg: 180.0, pitch_deg: 0.0, yaw_deg: 90.0 };
-    assert_eq!(ask(&mut start(&flash), &set(Configuration { mounting, ..Configuration::DEFAULT })), Ok(()));
+    assert_eq!(ask(&mut start(&flash), &set(&Configuration { mounting, ..Configuration::DEFAULT })), Ok(()));
     let mut board = start(&flash);
     // Upside down and turned: gravity shows as -z, and the small force along the sensor's -x is
     // the vehicle's -y.

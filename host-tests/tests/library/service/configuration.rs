@@ -24,13 +24,13 @@ fn configuration_is_kept_whole() {
     let mut board = start(&flash);
     assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut board, &set(wanted)), Ok(()));
+    assert_eq!(ask(&mut board, &set(&wanted)), Ok(()));
     let mut board = start(&flash);
     assert_eq!(info(&mut board).configuration, Origin::Stored);
     assert_eq!(*board.configuration(), wanted);
     // Refused, and named, and the old one stays.
     let wild = Configuration { mounting: Mounting { pitch_deg: 91.0, ..Mounting::default() }, ..wanted };
-    match ask(&mut board, &set(wild)) {
+    match ask(&mut board, &set(&wild)) {
         Err(Refusal::Store(StoreError::Field(FieldError::Range { field, value, .. }))) => {
             assert_eq!((field, value), (Field::MountingPitchDeg, 91.0));
         }
@@ -38,18 +38,18 @@ fn configuration_is_kept_whole() {
     }
     let refused = |error| Err(Refusal::Store(StoreError::Field(error)));
     let other_part = Configuration { imu: ImuPart::Adis16465, ..wanted };
-    assert_eq!(ask(&mut board, &set(other_part)), refused(FieldError::PartNotInImage));
+    assert_eq!(ask(&mut board, &set(&other_part)), refused(FieldError::PartNotInImage));
     let can = Settings { bits_per_second: 250_000, ..wanted.can };
     assert_eq!(
-        ask(&mut board, &set(Configuration { can, ..wanted })),
+        ask(&mut board, &set(&Configuration { can, ..wanted })),
         refused(FieldError::BitRateNotInImage(250_000))
     );
     let twice = Configuration { fog_ids: [0x1A0, 0x1A5, 0x1A6], ..wanted };
     let duplicate = FieldError::Can(ConfigError::DuplicateIdentifier(0x1A0));
-    assert_eq!(ask(&mut board, &set(twice)), refused(duplicate));
+    assert_eq!(ask(&mut board, &set(&twice)), refused(duplicate));
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
-    assert_eq!(ask(&mut board, &set(with_fog)), refused(FieldError::PartNotInImage));
-    let request = Request::SetConfiguration { version: 9, configuration: wanted };
+    assert_eq!(ask(&mut board, &set(&with_fog)), refused(FieldError::PartNotInImage));
+    let request = Request::SetConfiguration { version: 9, configuration: &wanted };
     assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 4 }));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
@@ -81,7 +81,7 @@ fn wheel_frames_are_kept_and_none_may_be_the_board_s_own() {
 fn damaged_record_is_noted() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
-    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Ok(()));
+    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), Ok(()));
     flash.borrow_mut().damage(layout::STORE.start as usize + 20, 4);
     let mut board = start(&flash);
     assert_eq!(info(&mut board).flash, FlashState::Damaged);
@@ -90,7 +90,7 @@ fn damaged_record_is_noted() {
     let page = board.events(0);
     assert!(page.events.iter().any(|event| event.kind == EventKind::RecordsDamaged));
     // Until it is stored again.
-    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), Ok(()));
+    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), Ok(()));
     let board = start(&flash);
     assert!(!board.stored_damaged() && !board.configuration_lost());
 }
@@ -100,7 +100,7 @@ fn damaged_record_is_noted() {
 fn what_is_stored_is_read_without_a_controller() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut start(&flash), &set(wanted)), Ok(()));
+    assert_eq!(ask(&mut start(&flash), &set(&wanted)), Ok(()));
     let mut board = Board::new(&DRIVES);
     let records = Region::new(&flash, layout::STORE);
     board.begin(Some(records), Some(MappedRegion::new(&flash)), false, IDENTITY);
@@ -109,7 +109,7 @@ fn what_is_stored_is_read_without_a_controller() {
     assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
     let before = flash.borrow().operations();
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
-    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), no_flash);
+    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
     assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
     assert_eq!(flash.borrow().operations(), before);
@@ -122,7 +122,7 @@ fn nothing_is_stored_without_flash() {
     assert_eq!((about.flash, about.weights), (FlashState::Absent, WeightSource::BuiltIn));
     assert_eq!(about.identity, IDENTITY);
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
-    assert_eq!(ask(&mut board, &set(Configuration::DEFAULT)), no_flash);
+    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
     assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
     assert_eq!(ask(&mut board, &Request::WeightsVerify), no_slot);
@@ -134,7 +134,7 @@ fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
     let mut board = start(&Rc::new(RefCell::new(F405::default())));
     let mut ask = |extended, [request, functional, response]: [u32; 3]| {
         let diagnosis = DiagnosisIds { extended, request, functional, response };
-        ask(&mut board, &set(Configuration { diagnosis, ..Configuration::DEFAULT }))
+        ask(&mut board, &set(&Configuration { diagnosis, ..Configuration::DEFAULT }))
     };
     assert_eq!(ask(false, [0x700, 0x7DF, 0x708]), Ok(()));
     assert_eq!(ask(true, [0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110]), Ok(()));
@@ -162,7 +162,7 @@ fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standst
             wheels,
         );
     }
-    match ask(board, &set(Configuration::DEFAULT)) {
+    match ask(board, &set(&Configuration::DEFAULT)) {
         Ok(()) => true,
         Err(Refusal::Moving) => false,
         other => panic!("{other:?}"),

@@ -198,7 +198,7 @@ fn a_trouble_is_kept_when_its_cause_is_over_and_until_it_is_cleared() {
 fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     let (flash, mut bench) = bench();
     // Something has been stored before: there is room without an erase.
-    assert_eq!(super::ask(&mut bench.board, &super::set(Configuration::DEFAULT)), Ok(()));
+    assert_eq!(super::ask(&mut bench.board, &super::set(&Configuration::DEFAULT)), Ok(()));
     bench.board.observe(None, 1_234, (Status::Silent, Faults::GAP), Standstill::Unknown);
     let operations = flash.borrow().operations();
     bench.server.turn(&mut bench.board, &AllCounters::default(), 0);
@@ -365,4 +365,75 @@ fn a_damaged_file_is_not_used() {
 
 fn crc(file: &[u8]) -> [u8; 4] {
     u32::from_le_bytes(*file.last_chunk().expect("a checksum")).to_be_bytes()
+}
+
+/// Single settings are written into the stored configuration one after the other, and read as the next start will use
+/// them.
+#[test]
+fn settings_are_read_and_written_one_by_one() {
+    let (flash, mut bench) = bench();
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    let real = |id: u8, value: f32| [&[0x2E, 2, id][..], &value.to_be_bytes()].concat();
+    bench.expect(&real(0x04, -33.5), &[0x6E, 2, 0x04]);
+    bench.expect(&real(0x0C, 90.0), &[0x6E, 2, 0x0C]);
+    bench.expect(&[0x2E, 2, 0x19, 2, 0xB0, 2, 0xB1, 2, 0xB2], &[0x6E, 2, 0x19]);
+    bench.expect(&[0x22, 2, 0x0C], &[&[0x62, 2, 0x0C][..], &90f32.to_be_bytes()].concat());
+    let ids = [0, 0, 0, 7, 0, 0, 0, 7, 0xDF, 0, 0, 7, 8];
+    bench.expect(&[&[0x2E, 2, 0x09][..], &ids].concat(), &[0x6E, 2, 0x09]);
+    bench.expect(&real(0x14, 0.05), &[0x6E, 2, 0x14]);
+    let stored = *start(&flash).configuration();
+    assert_eq!((stored.latitude_deg, stored.mounting.yaw_deg), (Some(-33.5), 90.0));
+    assert_eq!(stored.can.yaw.map(|yaw| yaw.ids), Some([0x2B0, 0x2B1, 0x2B2]));
+    assert_eq!((stored.diagnosis.request, stored.diagnosis.response), (0x700, 0x708));
+    assert!((stored.compensate.max_mean.rad_per_sec() - 0.05).abs() < 1e-8);
+    let rest = Configuration {
+        latitude_deg: None,
+        mounting: Configuration::DEFAULT.mounting,
+        can: Configuration::DEFAULT.can,
+        diagnosis: Configuration::DEFAULT.diagnosis,
+        compensate: Configuration::DEFAULT.compensate,
+        ..stored
+    };
+    assert_eq!(rest, Configuration::DEFAULT, "nothing else has changed");
+    bench.expect(&real(0x04, f32::NAN), &[0x6E, 2, 0x04]);
+    assert_eq!(start(&flash).configuration().latitude_deg, None);
+    // Out of range, of another length, of no meaning; and nothing that is written is lost.
+    bench.expect(&real(0x04, 91.0), &[0x7F, 0x2E, 0x31]);
+    bench.expect(&[0x2E, 2, 0x04, 0, 0], &[0x7F, 0x2E, 0x13]);
+    bench.expect(&[0x2E, 2, 0x01, 9], &[0x7F, 0x2E, 0x13]);
+    bench.expect(&[0x2E, 2, 0x00, 0], &[0x7F, 0x2E, 0x31]);
+    bench.expect(&[0x2E, 2, 0x1D, 0], &[0x7F, 0x2E, 0x31]);
+    assert_eq!(start(&flash).configuration().mounting.yaw_deg, 90.0);
+}
+
+/// Every setting that can be read can be written as it was read, and is in the table of settings and in the description.
+#[test]
+fn every_setting_has_a_data_identifier() {
+    let (flash, mut bench) = bench();
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    let read = |name: &str| std::fs::read_to_string(workspace().join(name)).expect("it is there");
+    let (description, table) = (read("tools/gyronet_uds.yaml"), read("tools/README.md"));
+    for id in 0x01..=0x1C {
+        let value = bench.ask(&[0x22, 2, id]).expect("a response");
+        assert_eq!(value[..3], [0x62, 2, id]);
+        bench.expect(&[&[0x2E, 2, id][..], &value[3..]].concat(), &[0x6E, 2, id]);
+        let line = description.lines().find(|line| line.starts_with(&format!("  0x02{id:02X}: {{name: ")));
+        let name = line.expect("it is described").split([' ', ',']).nth(4).expect("a name");
+        assert!(table.contains(&format!("| `{name}")), "{name}");
+        bench.stand();
+    }
+    assert_eq!(*start(&flash).configuration(), Configuration::DEFAULT);
+    let known: Vec<&str> = description
+        .lines()
+        .filter_map(|line| line.strip_prefix("  0x02")?.split([' ', ',']).nth(2))
+        .collect();
+    let rows = table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+    let settings: Vec<&str> =
+        rows.skip_while(|name| *name != "imu").take_while(|name| *name != "can.vdc2").collect();
+    assert!(settings.len() > 30, "{settings:?}");
+    for setting in settings {
+        assert!(known.iter().any(|known| setting.starts_with(known)), "{setting}");
+    }
 }

@@ -18,11 +18,9 @@ use serde::de::{DeserializeOwned, DeserializeSeed, IntoDeserializer, SeqAccess};
 const CONFIGURATION: u16 = 0x0100;
 const WHEELS: u16 = 0x0101;
 const CALIBRATION: u16 = 0x0102;
-/// Grid steps of the sensor's time since the start.
-pub const TICK: u16 = 0x0108;
 const PIPELINE_COUNTERS: u16 = 0x0105;
 const INPUT_COUNTERS: u16 = 0x0106;
-/// The first one is the number of messages.
+/// The first one counts messages.
 pub const FOG_COUNTERS: u16 = 0x0109;
 const INFO: u16 = 0x010A;
 const CALIBRATION_STATE: u16 = 0x010C;
