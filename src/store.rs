@@ -10,6 +10,7 @@
 //! checked against its range when it is stored and when it is read. A weight file is used only after all checks of
 //! [`crate::model::Blob::new_checked`]. [`layout`] gives the places in flash.
 
+pub mod access;
 pub mod calibration;
 pub mod configuration;
 mod error;
@@ -21,6 +22,7 @@ pub mod slots;
 mod troubles;
 mod wheels;
 
+pub use access::Access;
 pub use calibration::{BiasPoint, Calibration, Level, UnitMap};
 pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};
 pub use error::{Field, FieldError, FlashFault, StoreError};

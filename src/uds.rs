@@ -10,6 +10,7 @@
 //! | 0x11 | any | restart (1, 3), at standstill |
 //! | 0x14, 0x19 | any | troubles: clear; count (01), list (02, 0A), state when it came (04), occurrences (06) |
 //! | 0x22 | any | [data by identifier](data) |
+//! | 0x27 | 2, 3 | [access](security) by challenge (1) and response (2), where a key is stored |
 //! | 0x28 | 2, 3 | stop (1) and continue (0) the messages of the board, at standstill |
 //! | 0x2E | 2, 3 | the same, where they can be written, at standstill |
 //! | 0x31 | any | 0203 reads the log: events after a number (4 bytes) |
@@ -23,9 +24,11 @@ mod download;
 pub mod dtc;
 pub mod isotp;
 mod response;
+pub mod security;
 mod server;
 mod services;
 pub mod settings;
+pub mod signature;
 mod troubles;
 
 pub use response::Nrc;

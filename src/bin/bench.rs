@@ -45,6 +45,7 @@ mod firmware {
     use gyronet::nn::dense::Dense;
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
     use gyronet::sample::{ImuSample, PERIOD_US, Validity};
+    use gyronet::uds::signature::{self, Hasher};
     use gyronet::units::{AngularRate, Micros, SpecificForce};
     use gyronet::{Config, Coprocessor};
     use panic_semihosting as _;
@@ -71,6 +72,7 @@ mod firmware {
         coprocessor(meter);
         kernels(meter);
         crate::parsers::run(meter);
+        signature(meter);
         hprintln!("gyronet/state bytes={}", size_of::<GyroNetState>());
         hprintln!("gyronet/weights bytes={}", weights::DEFAULT.0.len());
     }
@@ -189,6 +191,19 @@ mod firmware {
         // Past static initialisation and the first windows.
         (0..80).for_each(|n| five_samples(5 * n));
         meter.run("coprocessor/five_samples", || five_samples(400));
+    }
+
+    /// A signature that is right (RFC 8032 7.1, test 1), and the digest of a block of a download.
+    fn signature(meter: &mut Meter) {
+        const PUBLIC: [u8; 32] = *b"\xd7\x5a\x98\x01\x82\xb1\x0a\xb7\xd5\x4b\xfe\xd3\xc9\x64\x07\x3a\x0e\xe1\x72\xf3\xda\xa6\x23\x25\xaf\x02\x1a\x68\xf7\x07\x51\x1a";
+        const SIGNATURE: [u8; 64] = *b"\xe5\x56\x43\x00\xc3\x60\xac\x72\x90\x86\xe2\xcc\x80\x6e\x82\x8a\x84\x87\x7f\x1e\xb8\xe5\xd9\x74\xd8\x73\xe0\x65\x22\x49\x01\x55\x5f\xb8\x82\x15\x90\xa3\x3b\xac\xc6\x1e\x39\x70\x1c\xf9\xb4\x6b\xd2\x5b\xf5\xf0\x59\x5b\xbe\x24\x65\x51\x41\x43\x8e\x7a\x10\x0b";
+        let mut is_valid = false;
+        meter.run("signature/verify", || is_valid = signature::is_valid(&PUBLIC, &[], &SIGNATURE));
+        if !is_valid {
+            hprintln!("signature/verify: refused");
+        }
+        let mut hasher = Hasher::new();
+        meter.run("signature/block", || hasher.update(black_box(&[0x55; 256])));
     }
 
     fn kernels(meter: &mut Meter) {

@@ -17,7 +17,9 @@ use crate::can::wheel::WheelSettings;
 use crate::health::{Faults, Status};
 use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
-use crate::store::{Accepted, Calibration, Configuration, FogPart, ImuPart, Record, Slot, Store, Troubles};
+use crate::store::{
+    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Record, Slot, Store, Troubles,
+};
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
 
@@ -56,6 +58,8 @@ pub struct Device<R: NorFlash, W> {
     calibration_state: State,
     accepted: Accepted,
     troubles: Troubles,
+    /// `None` where it could not be read: then nobody may write.
+    access: Option<Access>,
     weights: WeightSource,
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
@@ -94,6 +98,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             calibration_state: State::Idle,
             accepted: Accepted::NONE,
             troubles: Troubles::NONE,
+            access: Some(Access::OPEN),
             weights: WeightSource::None,
             weights_crc: None,
             refused_slots: [None; 2],
@@ -202,6 +207,24 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[must_use]
     pub fn refusal(&self) -> Option<Refusal> {
         self.refusal
+    }
+
+    /// Notes why a request is refused, and returns that.
+    pub(crate) fn refuse_request(&mut self, refusal: Refusal) -> Refusal {
+        self.refusal = Some(refusal);
+        refusal
+    }
+
+    /// Returns the serial number of the board.
+    #[must_use]
+    pub fn serial(&self) -> &[u8; 12] {
+        &self.identity.serial
+    }
+
+    /// Returns the key of those who may write, and what was stored with it; `None` where it could not be read.
+    #[must_use]
+    pub fn access(&self) -> Option<Access> {
+        self.access
     }
 
     /// Forgets why the last request was refused.

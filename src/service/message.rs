@@ -108,6 +108,20 @@ pub enum Refusal {
         /// The checksum of the board's.
         runs: u32,
     },
+    /// A key is needed, and this session has not proven to have it.
+    #[error("the board has a key, and this session has no access: give its private part with --key")]
+    Locked,
+    /// The signature is none of the board's key, or is for another identifier, content or board.
+    #[error("the signature is not one of the board's key for this content, identifier and board")]
+    Signature,
+    /// The signature has been used, or a newer one has.
+    #[error("the signature's counter is {found}, and one of {newest} was accepted: sign with a greater one")]
+    Counter {
+        /// The counter of the signature.
+        found: u32,
+        /// The newest one.
+        newest: u32,
+    },
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
     #[error("the vehicle is not proven to stand still")]
     Moving,
@@ -145,6 +159,8 @@ pub struct Identity {
     pub device_id: Option<u32>,
     /// The frequency of the processor, Hz.
     pub clock_hz: u32,
+    /// The unique number of the chip; zeros in the emulator.
+    pub serial: [u8; 12],
     /// The reason why the clock is not the crystal's; `None` where it is.
     pub clock_fault: Option<ClockFault>,
     /// The reason why frames go out as SLCAN alone; `None` where they go out on CAN too.
@@ -160,6 +176,7 @@ impl Identity {
     pub const UNKNOWN: Self = Self {
         firmware: [0; 3],
         device_id: None,
+        serial: [0; 12],
         clock_hz: 0,
         clock_fault: None,
         can_fault: None,

@@ -4,6 +4,7 @@
 //! |---|---|---|---|
 //! | F186 | 1 | session: 1 default, 2 programming, 3 extended | |
 //! | F189 | 1, 1, 1 | version of the firmware | |
+//! | F18C | text | serial number of the chip, 24 hexadecimal digits | |
 //! | F197 | text | name of the system, "gyronet" | |
 //! | 0100 | 1, then the record | layout of the configuration, the configuration as it is stored (postcard) | extended |
 //! | 0101 | the record | wheel frames that are received, as they are stored (postcard) | extended |
@@ -19,12 +20,15 @@
 //! | 010B | postcard | the reason why the last request was refused, where it was: [`crate::service::message::Refusal`] | |
 //! | 010C | postcard | how a calibration goes: [`crate::service::calibrate::State`] | |
 //! | 010D | postcard | gain and mounting of this unit's gyro, or none: [`crate::store::UnitMap`] (read in 0102) | extended |
+//! | 0110 | 32 | public key of those who may write, zeros for none: see [`super::security`] | extended |
+//! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest counter; wrong answers; begin of the key | |
 //! | 0201 to 021C | | [settings](super::settings), each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
 
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, nrc, put};
+use super::security::{self, Security};
 use super::settings;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
@@ -50,6 +54,7 @@ pub(super) struct Sources<'a, R: NorFlash, W> {
     pub counters: &'a AllCounters,
     /// Number of the session.
     pub session: u8,
+    pub security: &'a Security,
     pub errors: TransportErrors,
 }
 
@@ -59,9 +64,10 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
     from: &Sources<'_, R, W>,
     out: &mut Response,
 ) -> Result<(), Nrc> {
-    let Sources { device, counters, session, errors } = from;
+    let Sources { device, counters, session, security, errors } = from;
     match id {
         0xF186 => put(out, &[*session]),
+        0xF18C => device.serial().iter().try_for_each(|byte| put(out, &hex(*byte))),
         0xF189 => put(out, &device.info().identity.firmware),
         0xF197 => put(out, b"gyronet"),
         0x0100 => {
@@ -123,6 +129,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         0x010A => put_record(out, &device.info()),
         0x010B => put_record(out, &device.refusal()),
         0x010C => put_record(out, &device.calibration_state()),
+        0x0111 => security::state(security, device, out),
         _ => settings::read(id, device, out),
     }
 }
@@ -181,6 +188,11 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
         postcard::to_slice(record, out.get_mut(start..).unwrap_or_default()).map(|bytes| bytes.len());
     out.truncate(start + written.as_ref().map_or(0, |len| *len));
     written.map(|_| ()).map_err(|_| Nrc::ResponseTooLong)
+}
+
+fn hex(byte: u8) -> [u8; 2] {
+    let digit = |value: u8| if value < 10 { b'0' + value } else { b'A' - 10 + value };
+    [digit(byte >> 4), digit(byte & 0xF)]
 }
 
 fn put_words(out: &mut Response, words: &[u32]) -> Result<(), Nrc> {

@@ -4,6 +4,7 @@
 //! the old one in use.
 
 use super::response::{Nrc, Response, nrc, put};
+use super::signature::{Digest, Hasher};
 use crate::service::message::{BLOCK, Request};
 use crate::service::{Device, MappedSlots};
 use embedded_storage::nor_flash::NorFlash;
@@ -15,6 +16,10 @@ pub(super) struct Download {
     offset: u32,
     /// Number of the next block; it starts at 1 and wraps around through 0.
     next: u8,
+    /// Hashes the file, for its signature.
+    hasher: Hasher,
+    /// The digest of the whole file, once it was checked.
+    digest: Option<Digest>,
 }
 
 impl Download {
@@ -43,7 +48,7 @@ impl Download {
         device.act(&Request::WeightsBegin { length }).map_err(nrc)?;
         let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
         put(out, &[0x20, high, low])?;
-        Ok(Self { length, offset: 0, next: 1 })
+        Ok(Self { length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
     }
 
     /// Takes a block. The last one again is answered again: its response may have been lost.
@@ -58,6 +63,9 @@ impl Download {
         if number == self.next.wrapping_sub(1) && self.offset > 0 {
             return Ok(());
         }
+        if self.digest.is_some() {
+            return Err(Nrc::RequestSequenceError);
+        }
         if number != self.next {
             return Err(Nrc::WrongBlockSequenceCounter);
         }
@@ -67,6 +75,7 @@ impl Download {
             return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
         }
         device.act(&Request::WeightsBlock { offset: self.offset, bytes }).map_err(nrc)?;
+        self.hasher.update(bytes);
         self.offset += expected as u32;
         self.next = self.next.wrapping_add(1);
         Ok(())
@@ -84,6 +93,13 @@ impl Download {
         device.act(&Request::WeightsVerify).map_err(nrc)?;
         let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
         put(out, &[slot as u8])?;
-        put(out, &crc.to_be_bytes())
+        put(out, &crc.to_be_bytes())?;
+        self.digest = Some(self.hasher.finish());
+        Ok(())
+    }
+
+    /// Returns the digest of a file that was checked.
+    pub fn digest(&self) -> Option<&Digest> {
+        self.digest.as_ref()
     }
 }

@@ -28,6 +28,9 @@ pub(super) fn nrc(refusal: Refusal) -> Nrc {
         Refusal::Store(StoreError::Field(_) | StoreError::Version { .. } | StoreError::Encoding) => {
             Nrc::RequestOutOfRange
         }
+        Refusal::Locked => Nrc::SecurityAccessDenied,
+        Refusal::Signature => Nrc::InvalidKey,
+        Refusal::Counter { .. } => Nrc::RequestOutOfRange,
         Refusal::Store(StoreError::NoFlash) | Refusal::Slot(SlotError::NoFlash) => Nrc::ConditionsNotCorrect,
         Refusal::Store(StoreError::Flash(_) | StoreError::Full) | Refusal::Slot(SlotError::Flash(_)) => {
             Nrc::GeneralProgrammingFailure

@@ -5,7 +5,8 @@
 
 use super::isotp::{Bytes, Transport};
 use super::response::Nrc;
-use super::services::{NEGATIVE, Services};
+use super::security::Seed;
+use super::services::{NEGATIVE, Services, Surroundings};
 use crate::service::message::AllCounters;
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::UdsCommand;
@@ -80,12 +81,14 @@ impl Server {
         self.services.is_restarting && self.is_idle()
     }
 
-    /// Notes present faults, ends what has timed out, and answers a request.
+    /// Notes present faults, ends what has timed out, and answers a request. `entropy` gives a challenge of random
+    /// numbers, or none.
     pub fn turn<R: NorFlash, W: MappedSlots>(
         &mut self,
         device: &mut Device<R, W>,
         counters: &AllCounters,
         now: u32,
+        entropy: impl FnOnce() -> Option<Seed>,
     ) {
         self.transport.expire(now);
         let services = &mut self.services;
@@ -103,7 +106,8 @@ impl Server {
         }
         let (is_pending, errors) = (self.is_pending, self.transport.errors());
         let answered = self.transport.answer(|request, out| {
-            services.answer(request, device, counters, errors, is_pending, out);
+            let surroundings = Surroundings { counters, errors, is_pending, now, entropy };
+            services.answer(request, device, surroundings, out);
         });
         if answered {
             self.is_pending = false;

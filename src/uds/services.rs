@@ -1,6 +1,6 @@
 //! These are the services (ISO 14229-1) and the state between two requests.
 //!
-//! They translate requests to those that the device knows, so that both lines refuse the same. A request that writes or
+//! They translate requests to those that the device knows, so that all lines refuse the same. A request that writes or
 //! silences the output needs a session other than the default one, and a vehicle that is proven to stand.
 
 use super::data::{self, Sources};
@@ -8,6 +8,7 @@ use super::download::Download;
 use super::dtc::Memory;
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, exactly, nrc, put};
+use super::security::{self, Security, Seed};
 use super::troubles;
 use crate::service::calibrate::{State, Task};
 use crate::service::message::{AllCounters, Calibrate, Request};
@@ -20,6 +21,8 @@ const SESSION_MS: u32 = 5_000;
 /// Longest time to a response, ms, and to one after "response pending", 10 ms (P2, P2*).
 const P2_MS: u16 = 50;
 const P2_STAR_10_MS: u16 = 500;
+/// The routine that has a download used.
+const USE_DOWNLOAD: u16 = 0xFF01;
 /// This bit of a sub-function suppresses the positive response.
 const SUPPRESS: u8 = 0x80;
 
@@ -56,6 +59,19 @@ pub(super) struct Services {
     /// A tester has asked for a restart.
     pub is_restarting: bool,
     download: Option<Download>,
+    security: Security,
+}
+
+/// What a request is answered from beside the device.
+pub(super) struct Surroundings<'a, E> {
+    pub counters: &'a AllCounters,
+    pub errors: TransportErrors,
+    /// "Response pending" has been sent.
+    pub is_pending: bool,
+    /// The time, ms.
+    pub now: u32,
+    /// Gives a challenge that nobody can know before; `None` where there are no random numbers.
+    pub entropy: E,
 }
 
 impl Services {
@@ -70,6 +86,7 @@ impl Services {
             is_silenced: false,
             is_restarting: false,
             download: None,
+            security: Security::new(),
         }
     }
 
@@ -87,6 +104,7 @@ impl Services {
     }
 
     /// Notes present faults, and stores those that are new.
+    #[inline(never)]
     pub fn remember<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) {
         if !core::mem::replace(&mut self.is_restored, true) {
             self.memory.restore(device.troubles());
@@ -101,6 +119,7 @@ impl Services {
     fn enter(&mut self, session: Session) {
         self.session = session;
         self.download = None;
+        self.security.end();
         if session == Session::Default {
             self.memory.is_enabled = true;
             self.is_silenced = false;
@@ -110,7 +129,10 @@ impl Services {
     /// Returns whether a request may erase the flash.
     pub fn takes_long(&self, request: &[u8]) -> bool {
         self.session != Session::Default
-            && matches!(request, [0x2E | 0x34, ..] | [0x31, 1, 0x02, 0x02] | [0x31, 1, 0xFF, 0x01])
+            && matches!(
+                request,
+                [0x2E | 0x34, ..] | [0x27, 2, ..] | [0x31, 1, 0x02, 0x02] | [0x31, 1, 0xFF, 0x01, ..]
+            )
     }
 
     /// Writes the response to a request; nothing where none is wanted.
@@ -118,15 +140,14 @@ impl Services {
         &mut self,
         request: &[u8],
         device: &mut Device<R, W>,
-        counters: &AllCounters,
-        errors: TransportErrors,
-        is_pending: bool,
+        surroundings: Surroundings<'_, impl FnOnce() -> Option<Seed>>,
         out: &mut Response,
     ) {
         let Some((&service, rest)) = request.split_first() else { return };
+        let is_pending = surroundings.is_pending;
         // Room for a byte.
         let _ = out.push(service.wrapping_add(POSITIVE));
-        match self.serve(service, rest, device, counters, errors, out) {
+        match self.serve(service, rest, device, surroundings, out) {
             Ok(true) => {}
             // A tester that has read "response pending" waits for the response.
             Ok(false) if is_pending => {}
@@ -156,14 +177,14 @@ impl Services {
         service: u8,
         rest: &[u8],
         device: &mut Device<R, W>,
-        counters: &AllCounters,
-        errors: TransportErrors,
+        surroundings: Surroundings<'_, impl FnOnce() -> Option<Seed>>,
         out: &mut Response,
     ) -> Result<bool, Nrc> {
         let command = UdsCommand::from_repr(service).ok_or(Nrc::ServiceNotSupported)?;
         if command != UdsCommand::ReadDataByIdentifier {
             device.forget_refusal();
         }
+        let Surroundings { counters, errors, now, entropy, .. } = surroundings;
         match command {
             UdsCommand::DiagnosticSessionControl => {
                 let [sub] = exactly(rest)?;
@@ -184,6 +205,7 @@ impl Services {
                 if !matches!(reset, Some(ResetType::HardReset | ResetType::SoftReset)) {
                     return Err(Nrc::SubFunctionNotSupported);
                 }
+                self.security.check(device)?;
                 device.act(&Request::Restart).map_err(nrc)?;
                 self.is_restarting = true;
                 put(out, &[sub & !SUPPRESS])?;
@@ -209,6 +231,7 @@ impl Services {
                 if !matches!(what, 1 | 3) {
                     return Err(Nrc::RequestOutOfRange);
                 }
+                self.security.check(device)?;
                 if is_silenced && !device.may_interrupt() {
                     return Err(Nrc::ConditionsNotCorrect);
                 }
@@ -219,6 +242,7 @@ impl Services {
             UdsCommand::ControlDTCSetting => {
                 self.needs(Session::Extended)?;
                 let sub = *rest.first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+                self.security.check(device)?;
                 self.memory.is_enabled = match sub & !SUPPRESS {
                     1 => true,
                     2 => false,
@@ -229,6 +253,7 @@ impl Services {
             }
             UdsCommand::ClearDiagnosticInformation => {
                 let [a, b, c] = exactly(rest)?;
+                self.security.check(device)?;
                 let is_known = self.memory.clear(u32::from_be_bytes([0, a, b, c]));
                 if is_known { Ok(true) } else { Err(Nrc::RequestOutOfRange) }
             }
@@ -238,7 +263,8 @@ impl Services {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 }
                 let session = self.session as u8;
-                let sources = Sources { device: &*device, counters, session, errors };
+                let security = &self.security;
+                let sources = Sources { device: &*device, counters, session, security, errors };
                 for id in rest.chunks_exact(2) {
                     put(out, id)?;
                     let id = id.try_into().map_or(0, u16::from_be_bytes);
@@ -251,8 +277,18 @@ impl Services {
                 let [high, low, bytes @ ..] = rest else {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 };
-                data::write(u16::from_be_bytes([*high, *low]), bytes, device)?;
+                let id = u16::from_be_bytes([*high, *low]);
+                let content = security::signed(id, bytes, device)?;
+                match id {
+                    0x0110 => self.security.write_key(content, device)?,
+                    _ => data::write(id, content, device)?,
+                }
                 put(out, &[*high, *low])?;
+                Ok(true)
+            }
+            UdsCommand::SecurityAccess => {
+                self.needs(Session::Extended)?;
+                self.security.access(rest, device, now, entropy, out)?;
                 Ok(true)
             }
             UdsCommand::RoutineControl => self.routine(rest, device, out),
@@ -275,7 +311,6 @@ impl Services {
                 }
                 let download = self.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
                 download.finish(device, out)?;
-                self.download = None;
                 Ok(true)
             }
             _ => Err(Nrc::ServiceNotSupported),
@@ -302,7 +337,10 @@ impl Services {
             return Ok(true);
         }
         self.needs(Session::Extended)?;
-        let [sub, high, low] = exactly(rest)?;
+        let (sub, high, low, option) = match *rest {
+            [sub, high, low, ref option @ ..] => (sub, high, low, option),
+            _ => return Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
+        };
         let id = u16::from_be_bytes([high, low]);
         let control = RoutineControlType::from_repr(sub & !SUPPRESS).ok_or(Nrc::SubFunctionNotSupported)?;
         let task = match id {
@@ -311,6 +349,16 @@ impl Services {
             _ => None,
         };
         put(out, &[sub & !SUPPRESS, high, low])?;
+        if id == USE_DOWNLOAD && control == RoutineControlType::StartRoutine {
+            self.needs(Session::Programming)?;
+            self.accept_download(option, device)?;
+            device.act(&Request::WeightsActivate).map_err(nrc)?;
+            return Ok(sub & SUPPRESS == 0);
+        }
+        let [] = exactly(option)?;
+        if control != RoutineControlType::RequestRoutineResult {
+            self.security.check(device)?;
+        }
         match (id, task, control) {
             (_, Some(task), RoutineControlType::StartRoutine) => {
                 device.act(&Request::Calibrate(Calibrate::Start(task))).map_err(nrc)?;
@@ -330,13 +378,23 @@ impl Services {
             (0x0202, None, RoutineControlType::StartRoutine) => {
                 device.act(&Request::Calibrate(Calibrate::Store)).map_err(nrc)?;
             }
-            (0xFF01, None, RoutineControlType::StartRoutine) => {
-                self.needs(Session::Programming)?;
-                device.act(&Request::WeightsActivate).map_err(nrc)?;
-            }
-            (0x0202 | 0xFF01, None, _) => return Err(Nrc::SubFunctionNotSupported),
+            (0x0202 | USE_DOWNLOAD, None, _) => return Err(Nrc::SubFunctionNotSupported),
             _ => return Err(Nrc::RequestOutOfRange),
         }
         Ok(sub & SUPPRESS == 0)
+    }
+
+    /// Checks the signature of a download, where a key asks for one.
+    fn accept_download<R: NorFlash, W: MappedSlots>(
+        &self,
+        trailer: &[u8],
+        device: &mut Device<R, W>,
+    ) -> Result<(), Nrc> {
+        if device.access().is_some_and(|access| access.key.is_none()) {
+            return exactly(trailer).map(|[]: [u8; 0]| ());
+        }
+        let trailer = trailer.try_into().map_err(|_| Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        let digest = self.download.as_ref().and_then(Download::digest).ok_or(Nrc::RequestSequenceError)?;
+        security::accept(USE_DOWNLOAD, digest, trailer, device)
     }
 }

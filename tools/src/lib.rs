@@ -28,6 +28,7 @@ pub mod paper;
 pub mod parts;
 pub mod plot;
 mod random;
+pub mod signing;
 pub mod simulate;
 pub mod target;
 pub mod wheels;

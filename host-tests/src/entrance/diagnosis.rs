@@ -32,7 +32,7 @@ struct Bench {
 impl Bench {
     /// Runs a turn; returns the frames that are sent in it.
     fn turn(&mut self) -> Vec<[u8; 8]> {
-        self.server.turn(&mut self.board, &AllCounters::default(), self.now);
+        self.server.turn(&mut self.board, &AllCounters::default(), self.now, || None);
         std::iter::from_fn(|| self.server.next_frame(self.now)).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! The images as they are flashed, on the virtual board: hardware that QEMU does not have, and its faults.
 
+mod access;
 mod bringup;
 mod can;
 mod clock;

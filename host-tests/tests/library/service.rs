@@ -1,5 +1,6 @@
 //! The board's stored data on a mock flash: every request and every refusal, by themselves and over diagnosis.
 
+mod access;
 mod calibration;
 mod configuration;
 mod isotp;
@@ -26,6 +27,7 @@ const DRIVES: SupportedHardware =
 const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
     device_id: Some(0x413),
+    serial: *b"a test board",
     clock_hz: 16_000_000,
     clock_fault: None,
     can_fault: None,

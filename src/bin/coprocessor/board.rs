@@ -11,7 +11,7 @@ use crate::stm32f405::clocks::Clocks;
 use crate::stm32f405::pins::{self, Speed};
 use crate::stm32f405::spi::{self, Spi};
 use crate::stm32f405::usart::Usart;
-use crate::stm32f405::{Chip, pac, supply, timer};
+use crate::stm32f405::{Chip, pac, serial_number, supply, timer};
 use crate::{crash, serial};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use gyronet::health::supervisor::Supervisor;
@@ -58,6 +58,8 @@ impl Board {
         let identity = Identity {
             firmware: version(),
             device_id,
+            // The emulator has no such memory.
+            serial: device_id.map(|_| serial_number::read()).unwrap_or_default(),
             clock_hz: clocks.core_hz,
             clock_fault: clocks.fault,
             can_fault: can.as_ref().err().copied(),

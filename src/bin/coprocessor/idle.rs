@@ -66,9 +66,7 @@ impl Idle {
     /// Does a bounded piece of work, and returns whether the weights were found to be damaged.
     #[inline(never)]
     pub fn turn(&mut self, counters: &mut AllCounters) -> bool {
-        while let Some(Observation { sample, tick, status, faults, wheels }) = OBSERVATIONS.pop() {
-            self.device.observe(sample.as_ref(), tick, (status, faults), wheels);
-        }
+        self.observe();
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::turn) {
             self.device.sensor(result);
         }
@@ -76,6 +74,13 @@ impl Idle {
         self.diagnosis.turn(self.device, counters);
         self.retry_clock();
         self.check()
+    }
+
+    #[inline(never)]
+    fn observe(&mut self) {
+        while let Some(Observation { sample, tick, status, faults, wheels }) = OBSERVATIONS.pop() {
+            self.device.observe(sample.as_ref(), tick, (status, faults), wheels);
+        }
     }
 
     /// Returns whether there is more to do before the next interrupt.

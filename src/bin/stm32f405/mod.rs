@@ -11,6 +11,8 @@ pub mod dma;
 pub mod flash;
 pub mod pins;
 pub mod reset;
+pub mod rng;
+pub mod serial_number;
 pub mod spi;
 pub mod supply;
 pub mod timer;

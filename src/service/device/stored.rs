@@ -5,7 +5,7 @@ use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{
-    Accepted, Calibration, Configuration, FieldError, Record, Store, StoreError, Troubles, UnitMap,
+    Accepted, Access, Calibration, Configuration, FieldError, Record, Store, StoreError, Troubles, UnitMap,
 };
 use embedded_storage::nor_flash::NorFlash;
 
@@ -24,7 +24,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if let Some(records) = records {
             match Store::open(records, 0, !writable) {
                 Ok(store) => self.load(store),
-                Err(error) => self.flash = FlashState::Failed(error),
+                Err(error) => (self.flash, self.access) = (FlashState::Failed(error), None),
             }
         }
         if self.records_damaged() {
@@ -70,6 +70,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Ok(troubles) => self.troubles = troubles.unwrap_or(Troubles::NONE),
             Err(error) => self.note(EventKind::TroublesRefused(error)),
         }
+        self.access = store.get().map(|access| access.unwrap_or(Access::OPEN)).ok();
         self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
         self.store = self.writable.then_some(store);
     }
@@ -155,6 +156,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         store.set(&self.calibration)?;
         self.calibration_origin = Origin::Stored;
         self.note(EventKind::CalibrationStored);
+        Ok(())
+    }
+
+    pub(crate) fn store_access(&mut self, access: Access) -> Result<(), Refusal> {
+        self.store()?.set(&access)?;
+        self.access = Some(access);
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! A board at the other end of a bus, asked and configured over diagnosis (UDS on ISO-TP, see [`gyronet::uds`]).
 
+mod access;
 pub mod calibration;
 pub mod error;
 pub mod requests;
@@ -7,6 +8,7 @@ pub mod settings;
 pub mod upload;
 
 use super::bus::Bus;
+use crate::signing::PrivateKey;
 use embedded_can::{Frame, Id};
 use error::{Code, DeviceError};
 use gyronet::can::DataFrame;
@@ -14,6 +16,7 @@ use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::service::message::Refusal;
 use gyronet::uds::Nrc;
 use gyronet::uds::isotp::{TIMEOUT_MS, Transport};
+use gyronet::uds::signature::TRAILER;
 use std::time::Duration;
 
 /// The longest wait for a response: longer than the standard's 50 ms, for lines that are slow or shared.
@@ -35,6 +38,19 @@ pub struct Device<B> {
     name: String,
     request: Id,
     response: Id,
+    authority: Authority,
+}
+
+/// What a board with a key accepts a writer by.
+#[derive(Default)]
+pub enum Authority {
+    /// Nothing: such a board refuses.
+    #[default]
+    None,
+    /// The private key.
+    Key(PrivateKey),
+    /// A signature of the one thing that is written.
+    Signature([u8; TRAILER]),
 }
 
 impl<B: Bus> Device<B> {
@@ -44,7 +60,12 @@ impl<B: Bus> Device<B> {
     /// [`DeviceError::Identifier`].
     pub fn with_ids(bus: B, name: &str, ids: &DiagnosisIds) -> Result<Self, DeviceError> {
         let [request, _, response] = ids.ids().map_err(DeviceError::Identifier)?;
-        Ok(Self { bus, name: name.to_owned(), request, response })
+        Ok(Self { bus, name: name.to_owned(), request, response, authority: Authority::None })
+    }
+
+    /// Writes by this authority from now on.
+    pub fn authorise(&mut self, authority: Authority) {
+        self.authority = authority;
     }
 
     /// Sends a request until there is a response, and returns it without its first byte.

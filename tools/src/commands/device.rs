@@ -8,9 +8,10 @@ use clap::Subcommand;
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::service::message::Info;
 use gyronet_tools::client::bus::{self, Bus};
-use gyronet_tools::client::device::Device;
 use gyronet_tools::client::device::settings::{flat, value as value_of};
 use gyronet_tools::client::device::upload::upload;
+use gyronet_tools::client::device::{Authority, Device};
+use gyronet_tools::signing::{self, PrivateKey};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -35,6 +36,12 @@ pub struct Args {
     /// Identifiers of requests and responses, where they are not 7E0,7E8; eight digits are 29 bits.
     #[arg(long, global = true, value_name = "REQUEST,RESPONSE", value_parser = identifiers)]
     ids: Option<DiagnosisIds>,
+    /// Private key of those who may write, for a board that has its public part.
+    #[arg(long, global = true, value_name = "NAME.key", conflicts_with = "signature")]
+    key: Option<PathBuf>,
+    /// Signature of what is written (`gyronet sign`), for a board with a key.
+    #[arg(long, global = true, value_name = "FILE.sig")]
+    signature: Option<PathBuf>,
     #[command(subcommand)]
     action: Action,
 }
@@ -76,6 +83,13 @@ enum Action {
         /// Weight file, as `gyronet quantize` writes it.
         file: PathBuf,
     },
+    /// Print who may write: whether a key is stored, the newest counter, and the serial number.
+    Access,
+    /// Store the public key of those who may write from now on, or `none` to remove it.
+    SetKey {
+        /// `NAME.pub` of `gyronet keys`, or `none`.
+        key: PathBuf,
+    },
     /// Restart the board.
     Restart,
 }
@@ -104,11 +118,20 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     };
     let ids = args.ids.unwrap_or(DiagnosisIds::DEFAULT);
     let mut device = Device::with_ids(bus::open(port, args.baud)?, port, &ids)?;
+    device.authorise(match (&args.key, &args.signature) {
+        (Some(path), _) => Authority::Key(PrivateKey::read(path)?),
+        (None, Some(path)) => {
+            let bytes = std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+            let trailer = bytes.try_into().map_err(|_| format!("{}: not a signature", path.display()))?;
+            Authority::Signature(trailer)
+        }
+        (None, None) => Authority::None,
+    });
     let json = common.json;
     match &args.action {
         Action::Info => {
             let info = device.info()?;
-            if json { print_json(&info)? } else { print_info(&info)? }
+            if json { print_json(&info)? } else { print_info(&info, device.access()?.state)? }
         }
         Action::Get => settings::print(&device.configuration()?, json)?,
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
@@ -122,6 +145,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             print_value(&counters, json)?;
         }
         Action::Weights { file } => weights(&mut device, file, json, common)?,
+        Action::Access => print_value(&device.access()?, json)?,
+        Action::SetKey { key } => {
+            let public = if key.as_os_str() == "none" { [0; 32] } else { signing::read_public(key)? };
+            device.set_key(&public)?;
+            done(json, "stored; it holds from now on")?;
+        }
         Action::Restart => {
             device.restart()?;
             done(json, "the board restarts")?;
@@ -151,7 +180,7 @@ fn print_value(value: &impl Serialize, json: bool) -> super::Result {
     Ok(())
 }
 
-fn print_info(info: &Info) -> io::Result<()> {
+fn print_info(info: &Info, access: &str) -> io::Result<()> {
     let out = &mut io::stdout().lock();
     let identity = &info.identity;
     let [major, minor, patch] = identity.firmware;
@@ -176,6 +205,8 @@ fn print_info(info: &Info) -> io::Result<()> {
     }
     let writable = if info.writable { "" } else { ", no controller: nothing can be stored" };
     writeln!(out, "flash         {}{writable}", info.flash)?;
+    let open = if access == "open" { ": no key is stored, anyone may write at standstill" } else { "" };
+    writeln!(out, "access        {access}{open}")?;
     writeln!(out, "configuration {}, layout {}", info.configuration, info.record_versions[0])?;
     writeln!(out, "wheels        {}", info.wheels)?;
     writeln!(out, "calibration   {}, layout {}", info.calibration, info.record_versions[1])?;

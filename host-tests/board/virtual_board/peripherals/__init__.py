@@ -12,6 +12,7 @@ from .icm42688 import Icm42688
 from .iwdg import Iwdg
 from .pwr import Pwr
 from .rcc import Rcc
+from .rng import Rng
 from .spi import spis
 from .syscfg import Syscfg
 from .timer import timers
@@ -30,4 +31,4 @@ def create(board):
     return [Rcc(board), Pwr(board), Flash(board), Exti(board), Syscfg(board), *ports, Dbgmcu(board), Signature(board),
             Iwdg(board), *usarts(board), *timers(board), BxCan(board), *serial,
             Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rtc(board), BackupSram(board), Wwdg(board),
-            CrcUnit(board)]
+            CrcUnit(board), Rng(board)]

@@ -137,16 +137,17 @@ class Rcc(Peripheral):
 
     # -- frequencies -------------------------------------------------------------------------------------------------
 
-    def _pll_hz(self):
-        """The PLL's output in hertz from its nominal input (section 7.3.2)."""
+    def pll_hz(self, output="p"):
+        """An output of the PLL in hertz from its nominal input: P for the system, Q for PLL48CLK (section 7.3.2)."""
         source = self.crystal_hz if self.pllcfgr & PLLSRC_HSE else HSI_NOMINAL
-        m, n, p = self.pllcfgr & 0x3F, (self.pllcfgr >> 6) & 0x1FF, 2 * ((self.pllcfgr >> 16 & 3) + 1)
-        return (source or 0) * n // (m * p)
+        m, n = self.pllcfgr & 0x3F, (self.pllcfgr >> 6) & 0x1FF
+        divider = 2 * ((self.pllcfgr >> 16 & 3) + 1) if output == "p" else self.pllcfgr >> 24 & 15
+        return (source or 0) * n // (m * divider)
 
     def _compute(self):
         """All clocks follow from the source and the prescalers; the limits are held against nominal frequencies."""
         if self.source == "PLL":
-            nominal, of_hsi = self._pll_hz(), not self.pllcfgr & PLLSRC_HSE
+            nominal, of_hsi = self.pll_hz(), not self.pllcfgr & PLLSRC_HSE
         elif self.source == "HSE":
             nominal, of_hsi = self.crystal_hz or 0, False
         else:

@@ -17,35 +17,43 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 /// A board with its server, and the time in milliseconds.
-struct Bench {
+pub struct Bench {
     server: Server,
-    board: Board,
-    now: u32,
+    pub board: Board,
+    pub now: u32,
     tester: Tester,
+    /// The challenges that come next; none, where there are no random numbers.
+    pub seeds: Vec<[u8; 32]>,
 }
 
 impl Bench {
-    fn new(flash: &Rc<RefCell<F405>>) -> Self {
-        Self { server: Server::new(), board: start(flash), now: 0, tester: Tester::default() }
+    pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
+        Self {
+            server: Server::new(),
+            board: start(flash),
+            now: 0,
+            tester: Tester::default(),
+            seeds: Vec::new(),
+        }
     }
 
     /// Asks over frames, a millisecond each turn.
-    fn ask(&mut self, request: &[u8]) -> Option<Vec<u8>> {
-        let Self { server, board, now, tester } = self;
+    pub fn ask(&mut self, request: &[u8]) -> Option<Vec<u8>> {
+        let Self { server, board, now, tester, seeds } = self;
         tester.ask(request, 400, |frames| {
             frames.iter().for_each(|data| server.receive(data, *now));
-            server.turn(board, &AllCounters::default(), *now);
+            server.turn(board, &AllCounters::default(), *now, || seeds.pop());
             *now += 1;
             std::iter::from_fn(|| server.next_frame(*now)).collect()
         })
     }
 
-    fn expect(&mut self, request: &[u8], response: &[u8]) {
+    pub fn expect(&mut self, request: &[u8], response: &[u8]) {
         assert_eq!(self.ask(request).as_deref(), Some(response), "{request:02x?}");
     }
 
     /// Lets a vehicle stand long enough to prove it.
-    fn stand(&mut self) {
+    pub fn stand(&mut self) {
         for k in 0..400 {
             let at_rest = sample(k, [0.0, 0.0, 9.81], 0.0);
             let good = (Status::Ready, Faults::NONE);
@@ -55,11 +63,11 @@ impl Bench {
 
     fn fail(&mut self, status: Status, faults: Faults) {
         self.board.observe(None, 0, (status, faults), Standstill::Unknown);
-        self.server.turn(&mut self.board, &AllCounters::default(), self.now);
+        self.server.turn(&mut self.board, &AllCounters::default(), self.now, || None);
     }
 }
 
-fn bench() -> (Rc<RefCell<F405>>, Bench) {
+pub fn bench() -> (Rc<RefCell<F405>>, Bench) {
     let flash = Rc::new(RefCell::new(F405::default()));
     let bench = Bench::new(&flash);
     (flash, bench)
@@ -138,7 +146,7 @@ fn requests_to_all_servers_are_refused_in_silence() {
     let mut functional = |request: &[u8]| {
         let Bench { server, board, now, .. } = &mut bench;
         server.receive_functional(&frame(&[request.len() as u8], request), *now);
-        server.turn(board, &AllCounters::default(), *now);
+        server.turn(board, &AllCounters::default(), *now, || None);
         server.next_frame(*now).map(|data| data[1..=usize::from(data[0])].to_vec())
     };
     assert_eq!(functional(&[0x3E, 0]), Some(vec![0x7E, 0]));
@@ -201,7 +209,7 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     assert_eq!(super::ask(&mut bench.board, &super::set(&Configuration::DEFAULT)), Ok(()));
     bench.board.observe(None, 1_234, (Status::Silent, Faults::GAP), Standstill::Unknown);
     let operations = flash.borrow().operations();
-    bench.server.turn(&mut bench.board, &AllCounters::default(), 0);
+    bench.server.turn(&mut bench.board, &AllCounters::default(), 0, || None);
     assert!(flash.borrow().operations() > operations);
     // It is stored once, whatever it does afterwards.
     let operations = flash.borrow().operations();

@@ -14,9 +14,10 @@ use gyronet::uds::Session;
 use serde::de::value::{Error, SeqAccessDeserializer};
 use serde::de::{DeserializeOwned, DeserializeSeed, IntoDeserializer, SeqAccess};
 
-/// Data identifiers.
-const CONFIGURATION: u16 = 0x0100;
-const WHEELS: u16 = 0x0101;
+/// The configuration behind the version of its layout.
+pub const CONFIGURATION: u16 = 0x0100;
+/// The wheel frames.
+pub const WHEELS: u16 = 0x0101;
 const CALIBRATION: u16 = 0x0102;
 const PIPELINE_COUNTERS: u16 = 0x0105;
 const INPUT_COUNTERS: u16 = 0x0106;
@@ -24,7 +25,12 @@ const INPUT_COUNTERS: u16 = 0x0106;
 pub const FOG_COUNTERS: u16 = 0x0109;
 const INFO: u16 = 0x010A;
 const CALIBRATION_STATE: u16 = 0x010C;
-const UNIT: u16 = 0x010D;
+/// The map of the unit's gyro.
+pub const UNIT: u16 = 0x010D;
+/// The public key of those who may write.
+pub const KEY: u16 = 0x0110;
+/// Who may write.
+pub const ACCESS: u16 = 0x0111;
 /// The request for all counters.
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
@@ -32,7 +38,9 @@ pub const COUNTERS: [u8; 7] = {
     let [e, f] = FOG_COUNTERS.to_be_bytes();
     [0x22, a, b, c, d, e, f]
 };
-/// Routines.
+/// The routine that has a download used.
+pub const USE_DOWNLOAD: u16 = 0xFF01;
+/// Other routines.
 const STATIC: u16 = 0x0200;
 const MOUNTING: u16 = 0x0201;
 const STORE_CALIBRATION: u16 = 0x0202;
@@ -74,7 +82,7 @@ impl<B: Bus> Device<B> {
     /// # Errors
     /// [`DeviceError`].
     pub fn set_configuration(&mut self, configuration: &Configuration) -> Result<()> {
-        self.write(CONFIGURATION, &[Configuration::VERSION], configuration)
+        self.write(CONFIGURATION, &configuration_content(configuration)?)
     }
 
     /// Returns the wheel frames that the board receives.
@@ -90,7 +98,7 @@ impl<B: Bus> Device<B> {
     /// # Errors
     /// [`DeviceError`].
     pub fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<()> {
-        self.write(WHEELS, &[], wheels)
+        self.write(WHEELS, &content(wheels)?)
     }
 
     /// Returns the calibration.
@@ -106,7 +114,7 @@ impl<B: Bus> Device<B> {
     /// # Errors
     /// [`DeviceError`].
     pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<()> {
-        self.write(UNIT, &[], &unit)
+        self.write(UNIT, &content(&unit)?)
     }
 
     /// Starts a calibration.
@@ -164,12 +172,8 @@ impl<B: Bus> Device<B> {
     /// # Errors
     /// [`DeviceError`].
     pub fn restart(&mut self) -> Result<()> {
+        self.enter(Session::Extended)?;
         self.ask(&[0x11, 1]).map(drop)
-    }
-
-    /// Enters a session; the board leaves it after five seconds of silence.
-    pub(super) fn enter(&mut self, session: Session) -> Result<()> {
-        self.ask(&[0x10, session as u8]).map(drop)
     }
 
     /// Returns the value of a data identifier.
@@ -182,10 +186,11 @@ impl<B: Bus> Device<B> {
         response.strip_prefix(&id).map(<[u8]>::to_vec).ok_or(DeviceError::Mismatch)
     }
 
-    fn write(&mut self, id: u16, head: &[u8], record: &impl serde::Serialize) -> Result<()> {
+    /// Writes a data identifier, signed where the board has a key.
+    pub(super) fn write(&mut self, id: u16, content: &[u8]) -> Result<()> {
         self.enter(Session::Extended)?;
-        let record = postcard::to_stdvec(record).map_err(|_| DeviceError::TooLong)?;
-        self.ask(&[&[0x2E][..], &id.to_be_bytes(), head, &record].concat()).map(drop)
+        let trailer = self.trailer(id, content)?;
+        self.ask(&[&[0x2E][..], &id.to_be_bytes(), content, &trailer].concat()).map(drop)
     }
 
     fn routine(&mut self, control: u8, id: u16) -> Result<()> {
@@ -193,6 +198,22 @@ impl<B: Bus> Device<B> {
         let [high, low] = id.to_be_bytes();
         self.ask(&[0x31, control, high, low]).map(drop)
     }
+}
+
+/// Returns a record as it is written, and signed.
+///
+/// # Errors
+/// [`DeviceError::TooLong`].
+pub fn content(record: &impl serde::Serialize) -> Result<Vec<u8>> {
+    postcard::to_stdvec(record).map_err(|_| DeviceError::TooLong)
+}
+
+/// Returns a configuration as it is written, and signed: behind the version of its layout.
+///
+/// # Errors
+/// [`DeviceError::TooLong`].
+pub fn configuration_content(configuration: &Configuration) -> Result<Vec<u8>> {
+    Ok([&[Configuration::VERSION][..], &content(configuration)?].concat())
 }
 
 const fn routine(task: Task) -> u16 {

@@ -1,5 +1,6 @@
 //! The upload of a weight file into the board's unused slot.
 
+use super::requests::USE_DOWNLOAD;
 use super::{Device, DeviceError};
 use crate::client::bus::Bus;
 use gyronet::service::message::BLOCK;
@@ -38,6 +39,7 @@ pub fn upload<B: Bus>(
     let response = device.ask(&[0x37])?;
     let [slot, crc @ ..] = <[u8; 5]>::try_from(response).map_err(|_| DeviceError::Mismatch)?;
     let slot = Slot::ALL.into_iter().find(|known| *known as u8 == slot).ok_or(DeviceError::Mismatch)?;
-    device.ask(&[0x31, 1, 0xFF, 0x01])?;
+    let trailer = device.trailer(USE_DOWNLOAD, file)?;
+    device.ask(&[&[0x31, 1][..], &USE_DOWNLOAD.to_be_bytes(), &trailer].concat())?;
     Ok(Uploaded { slot, crc: u32::from_be_bytes(crc) })
 }

@@ -36,11 +36,26 @@ impl Code {
             let (name, address) = (symbol.name().map_err(format)?, symbol.address() as u32);
             if name.starts_with("$t") || name.starts_with("$d") {
                 mapping.insert(address, name.starts_with("$d"));
-            } else if symbol.kind() == SymbolKind::Text && symbol.size() > 0 {
+            } else if symbol.kind() == SymbolKind::Text && (symbol.size() > 0 || symbol.is_global()) {
                 let name = format!("{:#}", rustc_demangle::demangle(name));
-                ranges.entry(address & !1).or_insert((symbol.size() as u32, name));
+                let range = (symbol.size() as u32, name);
+                let known = ranges.entry(address & !1).or_insert_with(|| range.clone());
+                // Of two names for one place the one with a size counts.
+                if known.0 == 0 {
+                    *known = range;
+                }
             }
         }
+        // An assembler's function without a size ends where the next one begins.
+        let begins: Vec<u32> = ranges.keys().copied().collect();
+        for pair in begins.windows(2) {
+            if let [address, next] = *pair
+                && let Some(range) = ranges.get_mut(&address).filter(|range| range.0 == 0)
+            {
+                range.0 = next - address;
+            }
+        }
+        ranges.retain(|_, (size, _)| *size > 0);
         let mut code = Self::default();
         let is_data = |at: u32| mapping.range(..=at).next_back().is_some_and(|(_, data)| *data);
         for section in file.sections() {

@@ -1,0 +1,108 @@
+"""Random number generator (RM0090 section 24): a number of 32 bits every 40 periods of the 48 MHz clock of the PLL.
+
+Settings: `seed` of the noise, `seed_error` (the noise is a constant: SECS), `stuck` (a number that comes again and again, or
+None). The noise goes on through resets, as an analogue source does.
+"""
+
+from random import Random
+
+from ..peripheral import Peripheral
+from . import registers
+
+IE, RNGEN = 1 << 3, 1 << 2
+SEIS, CEIS, SECS, CECS, DRDY = 1 << 6, 1 << 5, 1 << 2, 1 << 1, 1 << 0
+PLLRDY = 1 << 25
+PERIODS = 40
+HASH_RNG = 80
+
+
+class Rng(Peripheral):
+    """CR, SR and DR of section 24.4. What DR holds while no number is ready is not said; here it is what was read last."""
+
+    name, base, clock = "RNG", 0x5006_0800, "RNG"
+
+    def __init__(self, board):
+        super().__init__(board)
+        self.random = Random(24)
+        self.seed_error, self.stuck = False, None
+        self.cr, self.flags, self.data, self.ready, self.pending = 0, 0, 0, False, None
+
+    def reset(self, cause):
+        self.cr, self.flags, self.data, self.ready = 0, 0, 0, False
+        self._stop()
+
+    def _stop(self):
+        if self.pending:
+            self.pending.cancel()
+        self.pending = None
+
+    def _clock_hz(self):
+        """PLL48CLK: the PLL's VCO divided by Q (section 7.3.2); 0 while the PLL is not ready."""
+        rcc = self.board.rcc
+        if not rcc.cr & PLLRDY:
+            return 0
+        return rcc.pll_hz("q")
+
+    def _clock_error(self):
+        return self._clock_hz() < self.board.rcc.clock_hz("HCLK") / 16
+
+    def _start(self):
+        if self.cr & RNGEN and not self.pending and not self._errors():
+            self.pending = self.board.schedule(PERIODS * 10**12 // self._clock_hz(), self._generated)
+
+    def _errors(self):
+        """Errors that last, which also set their flags (section 24.3.2)."""
+        if not self.cr & RNGEN:
+            return 0
+        current = (SECS if self.seed_error else 0) | (CECS if self._clock_error() else 0)
+        self.flags |= (SEIS if current & SECS else 0) | (CEIS if current & CECS else 0)
+        return current
+
+    def _generated(self):
+        self.pending = None
+        if not self._errors():
+            self.data = self.random.getrandbits(32) if self.stuck is None else self.stuck
+            self.ready = True
+        self._interrupt()
+
+    def _interrupt(self):
+        self.board.irq(HASH_RNG, bool(self.cr & IE and (self.ready or self.flags)))
+
+    def read(self, offset, size):
+        registers.check(self, offset, size, registers.WORD)
+        if offset == 0x00:
+            return self.cr
+        if offset == 0x04:
+            return self._errors() | self.flags | (DRDY if self.ready else 0)
+        if offset == 0x08:
+            self.ready = False
+            self._start()
+            self._interrupt()
+            return self.data
+        raise registers.unmodelled(self, offset, "read")
+
+    def write(self, offset, value, size):
+        registers.check(self, offset, size, registers.WORD)
+        if offset == 0x00:
+            self.cr = value & (IE | RNGEN)
+            if not self.cr & RNGEN:
+                self._stop()
+                self.ready = False
+            self._start()
+        elif offset == 0x04:
+            # Cleared by writing 0; the other bits are read-only.
+            self.flags &= value
+            self._start()
+        else:
+            raise registers.unmodelled(self, offset, "write")
+        self._interrupt()
+
+    def configure(self, key, value):
+        if key == "seed":
+            self.random = Random(value)
+        elif key == "seed_error":
+            self.seed_error = value
+        elif key == "stuck":
+            self.stuck = value
+        else:
+            super().configure(key, value)

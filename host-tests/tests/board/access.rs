@@ -1,0 +1,134 @@
+//! Who may write, on the image as flashed: keys, signatures, and challenges of the chip's random numbers.
+
+use crate::common::{self, START};
+use crate::service::{self, on_bus};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::service::message::Refusal;
+use gyronet::store::Configuration;
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::stored::other_weights;
+use gyronet_tools::client::device::Authority;
+use gyronet_tools::client::device::error::DeviceError;
+use gyronet_tools::client::device::upload::upload;
+use gyronet_tools::signing::PrivateKey;
+use std::time::Duration;
+
+/// A board with a key.
+fn locked(test: &str) -> Option<(Board, PrivateKey)> {
+    let mut board = common::boot(test)?;
+    board.run(START);
+    let key = PrivateKey::generate().expect("random numbers");
+    assert_eq!(on_bus(&mut board).access().expect("a response").state, "open");
+    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    Some((board, key))
+}
+
+fn again(key: &PrivateKey) -> Authority {
+    Authority::Key(key.clone())
+}
+
+#[test]
+fn signed_weights_run_after_a_restart_and_unsigned_ones_do_not() {
+    const TEST: &str = "signed_weights_run_after_a_restart_and_unsigned_ones_do_not";
+    let Some((mut board, key)) = locked(TEST) else { return };
+    let file = other_weights(1);
+    let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
+    match upload(&mut on_bus(&mut board), &file, |_| {}) {
+        Err(DeviceError::Negative { service: 0x31, code }) => assert_eq!(code.0, 0x13),
+        other => panic!("{other:?}"),
+    }
+    let begin = board.counts().time;
+    let mut device = on_bus(&mut board);
+    device.authorise(again(&key));
+    upload(&mut device, &file, |_| {}).expect("it is signed");
+    device.restart().expect("access is proven");
+    board.run(START);
+    let took = board.counts().time - begin;
+    println!("{TEST}: {} bytes, signed, running after {:.1} s of board time", file.len(), took.as_secs_f64());
+    assert!(took < Duration::from_secs(60), "{took:?}");
+    assert_eq!(service::info(&mut board).weights_crc, Some(crc));
+    let access = on_bus(&mut board).access().expect("a response");
+    assert_eq!((access.state, access.counter), ("locked", 1));
+    assert_eq!(access.serial, "31002A000F4759524F4E4554", "the model's unique number");
+    match on_bus(&mut board).set_configuration(&Configuration::DEFAULT) {
+        Err(
+            DeviceError::Negative { service: 0x2E, .. }
+            | DeviceError::Refused(Refusal::Signature | Refusal::Counter { .. }),
+        ) => {}
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A response to a challenge: the generator's numbers differ from board start to board start.
+#[test]
+fn challenges_never_repeat_and_fail_with_the_generator() {
+    const TEST: &str = "challenges_never_repeat_and_fail_with_the_generator";
+    let Some((mut board, key)) = locked(TEST) else { return };
+    on_bus(&mut board).ask(&[0x11, 1]).expect("this session has stored the key");
+    board.run(START);
+    let challenge = |board: &mut Board| {
+        let mut device = on_bus(board);
+        device.ask(&[0x10, 3]).expect("a session");
+        device.ask(&[0x27, 1])
+    };
+    let mut seen = Vec::new();
+    for _ in 0..3 {
+        let seed = challenge(&mut board).expect("a challenge");
+        assert_eq!(seed.len(), 33);
+        assert!(!seen.contains(&seed) && seed[1..] != [0; 32], "{seed:02x?}");
+        seen.push(seed);
+        board.reset_pin();
+        board.run(START);
+    }
+    for (setting, value, good) in
+        [("RNG.seed_error", true.into(), false.into()), ("RNG.stuck", 0x55.into(), serde_json::Value::Null)]
+    {
+        let value: serde_json::Value = value;
+        let good: serde_json::Value = good;
+        board.configure(setting, value);
+        match challenge(&mut board) {
+            Err(DeviceError::Negative { service: 0x27, code }) => assert_eq!(code.0, 0x22, "{setting}"),
+            other => panic!("{setting}: {other:?}"),
+        }
+        board.configure(setting, good);
+        challenge(&mut board).expect("it works again");
+    }
+    let mut device = on_bus(&mut board);
+    device.authorise(again(&key));
+    device.restart().expect("access is proven");
+}
+
+/// The check of a signature takes board time, while the rates go out.
+#[test]
+fn a_signature_is_checked_while_the_rates_go_out() {
+    const TEST: &str = "a_signature_is_checked_while_the_rates_go_out";
+    let Some((mut board, key)) = locked(TEST) else { return };
+    let configuration = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
+    // Standing for long enough.
+    let now = board.counts().time;
+    common::send(&mut board, &common::drive(700), now);
+    board.run(Duration::from_secs(4));
+    let mut device = on_bus(&mut board);
+    device.authorise(again(&key));
+    device.set_configuration(&configuration).expect("the records' sector is erased here");
+    board.run(Duration::from_millis(500));
+    let begin = board.counts().time;
+    let _ = board.can_frames();
+    let mut device = service::on_line(&mut board);
+    device.authorise(again(&key));
+    device.set_configuration(&configuration).expect("it is signed");
+    let took = board.counts().time - begin;
+    let frames = board.can_frames().into_iter();
+    let rates: Vec<Duration> =
+        frames.filter(|(_, frame)| frame.id() == id(0x1A0)).map(|(time, _)| time).collect();
+    let gap = rates.windows(2).map(|pair| pair[1] - pair[0]).max().expect("rates");
+    println!(
+        "{TEST}: two signatures are checked and stored in {took:?} of board time; longest gap between rates {gap:?}"
+    );
+    assert!(took < Duration::from_secs(1), "{took:?}");
+    assert!(gap < Duration::from_millis(15), "{gap:?}");
+}
+
+fn id(raw: u16) -> Id {
+    Id::Standard(StandardId::new(raw).expect("11 bits"))
+}

@@ -1,0 +1,317 @@
+//! Who may write: a board with a key takes what is signed with its private part, once, and nothing else.
+
+use super::uds::{Bench, bench};
+use gyronet::model::weights;
+use gyronet::service::message::Refusal;
+use gyronet::store::{Access, Configuration, Record};
+use gyronet::uds::signature;
+use gyronet_host_tests::flash::{Cut, F405};
+use gyronet_host_tests::stored::other_weights;
+use gyronet_tools::signing::{PrivateKey, unhex};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+const SERIAL: [u8; 12] = *b"a test board";
+const CONFIGURATION: u16 = 0x0100;
+
+/// A board with a key, in an extended session at standstill.
+fn locked() -> (Rc<RefCell<F405>>, Bench, PrivateKey) {
+    let (flash, mut bench) = bench();
+    let key = PrivateKey::generate().expect("random numbers");
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    bench.expect(&[&[0x2E, 1, 0x10][..], &key.public()].concat(), &[0x6E, 1, 0x10]);
+    let mut bench = Bench::new(&flash);
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    (flash, bench, key)
+}
+
+fn configuration(k: u8) -> Configuration {
+    Configuration { latitude_deg: Some(f32::from(k)), ..Configuration::DEFAULT }
+}
+
+/// The content of a request that writes a configuration.
+fn content(k: u8) -> Vec<u8> {
+    [&[Configuration::VERSION][..], &postcard::to_stdvec(&configuration(k)).expect("there is room")].concat()
+}
+
+fn write(content: &[u8], trailer: &[u8]) -> Vec<u8> {
+    [&[0x2E][..], &CONFIGURATION.to_be_bytes(), content, trailer].concat()
+}
+
+fn refusal(bench: &mut Bench) -> Option<Refusal> {
+    let read = bench.ask(&[0x22, 1, 0x0B]).expect("the reason");
+    postcard::from_bytes(&read[3..]).expect("as it is documented")
+}
+
+/// The state of access: 0 open, 1 locked, 2 unlocked; the counter; wrong answers.
+fn access(bench: &mut Bench) -> (u8, u32, u8) {
+    let read = bench.ask(&[0x22, 1, 0x11]).expect("a response");
+    (read[3], u32::from_be_bytes([read[4], read[5], read[6], read[7]]), read[8])
+}
+
+/// RFC 8032, section 7.1, tests 1 to 3, and each with a bit flipped.
+#[test]
+fn signatures_are_those_of_rfc_8032() {
+    for (public, message, signature) in [
+        (
+            "d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a",
+            &[][..],
+            "e5564300c360ac729086e2cc806e828a84877f1eb8e5d974d873e065224901555fb8821590a33bacc61e39701cf9b46bd25bf5f0595bbe24655141438e7a100b",
+        ),
+        (
+            "3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c",
+            &[0x72],
+            "92a009a9f0d4cab8720e820b5f642540a2b27b5416503f8fb3762223ebdb69da085ac1e43e15996e458f3613d0f11d8c387b2eaeb4302aeeb00d291612bb0c00",
+        ),
+        (
+            "fc51cd8e6218a1a38da47ed00230f0580816ed13ba3303ac5deb911548908025",
+            &[0xAF, 0x82],
+            "6291d657deec24024827e69c3abe01a30ce548a284743a445e3680d7db5ac3ac18ff9b538d16f290ae67f760984dc6594a7c15e9716ed28dc027beceea1ec40a",
+        ),
+    ] {
+        let public: [u8; 32] = unhex(public).expect("a key");
+        let signature: [u8; 64] = unhex(signature).expect("a signature");
+        assert!(signature::is_valid(&public, message, &signature));
+        for bit in (0..512).step_by(37) {
+            let mut other = signature;
+            other[bit / 8] ^= 1 << (bit % 8);
+            assert!(!signature::is_valid(&public, message, &other), "bit {bit}");
+        }
+        assert!(!signature::is_valid(&public, &[message, b"x"].concat(), &signature));
+    }
+}
+
+#[test]
+fn a_board_without_a_key_is_open_and_reports_it() {
+    let (_, mut bench) = bench();
+    assert_eq!(access(&mut bench), (0, 0, 0));
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.expect(&[0x27, 1], &[&[0x67, 1][..], &[0; 32]].concat());
+    bench.stand();
+    bench.expect(&write(&content(1), &[]), &[0x6E, 1, 0]);
+    let serial = bench.ask(&[0x22, 0xF1, 0x8C]).expect("a serial number");
+    assert_eq!(unhex(std::str::from_utf8(&serial[3..]).expect("text")), Some(SERIAL));
+}
+
+#[test]
+fn what_is_signed_is_accepted_once() {
+    let (flash, mut bench, key) = locked();
+    assert_eq!(access(&mut bench), (1, 0, 0));
+    let signed =
+        |k: u8, counter| write(&content(k), &key.trailer(CONFIGURATION, Some(SERIAL), counter, &content(k)));
+    bench.expect(&signed(1, 5), &[0x6E, 1, 0]);
+    assert_eq!(start(&flash).latitude_deg, Some(1.0));
+    // Again, and an older one; then one for any board.
+    bench.expect(&signed(1, 5), &[0x7F, 0x2E, 0x31]);
+    assert_eq!(refusal(&mut bench), Some(Refusal::Counter { found: 5, newest: 5 }));
+    bench.expect(&signed(2, 4), &[0x7F, 0x2E, 0x31]);
+    bench.expect(&write(&content(3), &key.trailer(CONFIGURATION, None, 6, &content(3))), &[0x6E, 1, 0]);
+    // Also after a restart.
+    let mut bench = Bench::new(&flash);
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    bench.expect(&signed(2, 6), &[0x7F, 0x2E, 0x31]);
+    assert_eq!(start(&flash).latitude_deg, Some(3.0));
+}
+
+fn start(flash: &Rc<RefCell<F405>>) -> Configuration {
+    *super::start(flash).configuration()
+}
+
+#[test]
+fn what_is_unsigned_cut_foreign_or_changed_is_refused() {
+    let (flash, mut bench, key) = locked();
+    let other = PrivateKey::generate().expect("random numbers");
+    let good = key.trailer(CONFIGURATION, Some(SERIAL), 9, &content(1));
+    let mut elsewhere = SERIAL;
+    elsewhere[3] ^= 1;
+    let mut changed = content(1);
+    changed[3] ^= 1;
+    let mut newer = good;
+    newer[4] = 10;
+    let mut any = good;
+    any[0] = 1;
+    for (what, request, code, reason) in [
+        ("unsigned", write(&content(1)[..40], &[]), 0x13, None),
+        ("cut", write(&content(1), &good[..68]), 0x35, Some(Refusal::Signature)),
+        (
+            "of another key",
+            write(&content(1), &other.trailer(CONFIGURATION, Some(SERIAL), 9, &content(1))),
+            0x35,
+            Some(Refusal::Signature),
+        ),
+        (
+            "for wheels",
+            write(&content(1), &key.trailer(0x0101, Some(SERIAL), 9, &content(1))),
+            0x35,
+            Some(Refusal::Signature),
+        ),
+        (
+            "for another board",
+            write(&content(1), &key.trailer(CONFIGURATION, Some(elsewhere), 9, &content(1))),
+            0x35,
+            Some(Refusal::Signature),
+        ),
+        ("another content", write(&changed, &good), 0x35, Some(Refusal::Signature)),
+        ("another counter", write(&content(1), &newer), 0x35, Some(Refusal::Signature)),
+        ("another scope", write(&content(1), &any), 0x35, Some(Refusal::Signature)),
+    ] {
+        let response = bench.ask(&request);
+        // A cut trailer takes a byte of the content for its own first one.
+        let is_cut = what == "cut" && response == Some(vec![0x7F, 0x2E, 0x13]);
+        assert!(is_cut || response == Some(vec![0x7F, 0x2E, code]), "{what}: {response:02x?}");
+        if reason.is_some() && !is_cut {
+            assert_eq!(refusal(&mut bench), reason, "{what}");
+        }
+    }
+    // All the rest that writes or silences wants access.
+    for request in [
+        &[0x11, 1][..],
+        &[0x14, 255, 255, 255],
+        &[0x28, 1, 1],
+        &[0x31, 1, 2, 0],
+        &[0x31, 1, 2, 2],
+        &[0x85, 2],
+    ] {
+        bench.expect(request, &[0x7F, request[0], 0x33]);
+    }
+    assert_eq!(refusal(&mut bench), Some(Refusal::Locked));
+    assert_eq!((start(&flash), access(&mut bench)), (Configuration::DEFAULT, (1, 0, 0)));
+    // And reading does not.
+    assert!(bench.ask(&[0x31, 1, 2, 3, 0, 0, 0, 0]).is_some_and(|response| response[0] == 0x71));
+    bench.expect(&write(&content(1), &good), &[0x6E, 1, 0]);
+}
+
+#[test]
+fn access_is_proven_for_one_session() {
+    let (_, mut bench, key) = locked();
+    bench.expect(&[0x27, 2], &[0x7F, 0x27, 0x13]);
+    bench.expect(&[&[0x27, 2][..], &[0; 64]].concat(), &[0x7F, 0x27, 0x24]);
+    bench.expect(&[0x27, 1], &[0x7F, 0x27, 0x22]);
+    let seed = [7; 32];
+    bench.seeds = vec![seed];
+    bench.expect(&[0x27, 1], &[&[0x67, 1][..], &seed].concat());
+    bench.expect(&[&[0x27, 2][..], &key.answer(&SERIAL, &seed)].concat(), &[0x67, 2]);
+    assert_eq!(access(&mut bench).0, 2);
+    bench.expect(&[0x27, 1], &[&[0x67, 1][..], &[0; 32]].concat());
+    bench.expect(&[0x14, 255, 255, 255], &[0x54]);
+    // An answer holds for its challenge alone, and access for its session.
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.expect(&[0x14, 255, 255, 255], &[0x7F, 0x14, 0x33]);
+    bench.seeds = vec![[8; 32]];
+    bench.expect(&[0x27, 1], &[&[0x67, 1][..], &[8; 32]].concat());
+    bench.expect(&[&[0x27, 2][..], &key.answer(&SERIAL, &seed)].concat(), &[0x7F, 0x27, 0x35]);
+}
+
+#[test]
+fn wrong_answers_cost_time_also_over_a_restart() {
+    let (flash, mut bench, key) = locked();
+    let attempt = |bench: &mut Bench, answer: [u8; 64]| {
+        bench.seeds = vec![[1; 32]];
+        bench.stand();
+        match bench.ask(&[0x27, 1]) {
+            Some(response) if response[0] == 0x67 => *bench
+                .ask(&[&[0x27, 2][..], &answer].concat())
+                .and_then(|r| r.last().copied())
+                .as_ref()
+                .expect("a response"),
+            response => response.expect("a response")[2],
+        }
+    };
+    for code in [0x35, 0x35, 0x36] {
+        assert_eq!(attempt(&mut bench, [0; 64]), code);
+    }
+    assert_eq!(attempt(&mut bench, [0; 64]), 0x37, "ten seconds");
+    // A restart does not help: the delay begins again.
+    let mut bench = Bench::new(&flash);
+    assert_eq!(access(&mut bench), (1, 0, 3));
+    let enter = |bench: &mut Bench| bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    enter(&mut bench);
+    assert_eq!(attempt(&mut bench, [0; 64]), 0x37);
+    bench.now += 9_000;
+    enter(&mut bench);
+    assert_eq!(attempt(&mut bench, [0; 64]), 0x37);
+    bench.now += 1_000;
+    enter(&mut bench);
+    assert_eq!(attempt(&mut bench, [0; 64]), 0x36, "the fourth one");
+    bench.now += 19_000;
+    enter(&mut bench);
+    assert_eq!(attempt(&mut bench, [0; 64]), 0x37, "twenty seconds");
+    bench.now += 1_100;
+    enter(&mut bench);
+    assert_eq!(attempt(&mut bench, key.answer(&SERIAL, &[1; 32])), 2, "the right answer");
+    assert_eq!(access(&mut bench), (2, 0, 0));
+}
+
+#[test]
+fn another_key_wants_the_signature_of_the_one_before() {
+    let (flash, mut bench, key) = locked();
+    let next = PrivateKey::generate().expect("random numbers");
+    let write = |public: [u8; 32], trailer: &[u8]| [&[0x2E, 1, 0x10][..], &public, trailer].concat();
+    bench.expect(&write(next.public(), &[]), &[0x7F, 0x2E, 0x13]);
+    bench.expect(&write(next.public(), &next.trailer(0x0110, None, 1, &next.public())), &[0x7F, 0x2E, 0x35]);
+    bench.expect(&write(next.public(), &key.trailer(0x0110, None, 1, &next.public())), &[0x6E, 1, 0x10]);
+    bench.expect(&write([0; 32], &key.trailer(0x0110, None, 2, &[0; 32])), &[0x7F, 0x2E, 0x35]);
+    bench.expect(&write([0; 32], &next.trailer(0x0110, None, 2, &[0; 32])), &[0x6E, 1, 0x10]);
+    assert_eq!(super::start(&flash).access(), Some(Access { key: None, counter: 2, wrong: 0 }));
+}
+
+/// Downloads a file, and returns the response to the routine that uses it.
+fn download(bench: &mut Bench, file: &[u8], trailer: &[u8]) -> Vec<u8> {
+    bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    let begin = [&[0x34, 0, 0x44, 0, 0, 0, 0][..], &(file.len() as u32).to_be_bytes()].concat();
+    assert_eq!(bench.ask(&begin).expect("a response")[0], 0x74);
+    for (number, bytes) in (1u8..=255).chain(0..=255).cycle().zip(file.chunks(256)) {
+        bench.expect(&[&[0x36, number], bytes].concat(), &[0x76, number]);
+    }
+    assert_eq!(bench.ask(&[0x37]).expect("a response")[0], 0x77);
+    bench.ask(&[&[0x31, 1, 0xFF, 1][..], trailer].concat()).expect("a response")
+}
+
+#[test]
+fn a_weight_file_is_used_with_its_own_signature_alone() {
+    let (flash, mut bench, key) = locked();
+    let (file, other) = (other_weights(1), other_weights(2));
+    let sign = |file: &[u8], counter| key.trailer(0xFF01, None, counter, file);
+    assert_eq!(download(&mut bench, &file, &[]), [0x7F, 0x31, 0x13]);
+    assert_eq!(download(&mut bench, &file, &sign(&other, 1)), [0x7F, 0x31, 0x35]);
+    let running = |flash: &Rc<RefCell<F405>>| super::start(flash).info().weights_crc;
+    let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
+    assert_eq!(running(&flash), Some(crc(&weights::DEFAULT.0)));
+    assert_eq!(download(&mut bench, &file, &sign(&file, 1)), [0x71, 1, 0xFF, 1]);
+    assert_eq!(running(&flash), Some(crc(&file)));
+    // The same file again is a replay.
+    assert_eq!(download(&mut bench, &file, &sign(&file, 1)), [0x7F, 0x31, 0x31]);
+}
+
+/// A cut leaves the counter as it was, or burnt; never a signature that is accepted twice.
+#[test]
+fn a_power_cut_never_takes_the_counter_back() {
+    let (flash, _, key) = locked();
+    let before = flash.borrow().clone();
+    let mut cuts = 0;
+    loop {
+        let flash = Rc::new(RefCell::new(before.clone()));
+        let mut bench = Bench::new(&flash);
+        bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+        bench.stand();
+        flash.borrow_mut().cut_after(cuts, Cut::ALL[cuts as usize % Cut::ALL.len()]);
+        let request = write(&content(1), &key.trailer(CONFIGURATION, None, 1, &content(1)));
+        let response = bench.ask(&request).expect("a response");
+        if !flash.borrow_mut().restore() {
+            assert_eq!(response, [0x6E, 1, 0]);
+            break;
+        }
+        let board = super::start(&flash);
+        let access = board.access().expect("it is read");
+        assert_eq!(access.key, Some(key.public()), "cut {cuts}");
+        let is_written = *board.configuration() == configuration(1);
+        assert!(is_written || *board.configuration() == Configuration::DEFAULT, "cut {cuts}");
+        assert!(!is_written || access.counter == 1, "cut {cuts}: {access:?}");
+        cuts += 1;
+    }
+    assert!(cuts > 4, "{cuts} operations to cut");
+}

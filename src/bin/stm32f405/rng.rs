@@ -1,0 +1,55 @@
+//! Random numbers of the chip's analogue noise (RNG, RM0090 24), 48 MHz from the PLL.
+//!
+//! A number is used only where the generator reports no error, and where it differs from the one before; the first one
+//! after the start is not used (RM0090 24.3.1, FIPS 140-2).
+#![allow(unsafe_code, reason = "a peripheral that nothing else uses; the block says so")]
+
+use super::{clock_delay, pac};
+
+/// Looks for a number, which comes after 40 periods of 48 MHz: several times that.
+const LOOKS: u32 = 2_000;
+
+/// Returns random bytes; `None` where the generator or its clock fails.
+#[inline(never)]
+pub fn bytes() -> Option<[u8; 32]> {
+    // SAFETY: idle alone calls this, and no other code uses RNG.
+    let rng = unsafe { pac::RNG::steal() };
+    // SAFETY: no other code uses the register that switches its clock on.
+    let rcc = unsafe { pac::RCC::steal() };
+    rcc.ahb2enr().modify(|_, w| w.rngen().enabled());
+    clock_delay();
+    // Enabled anew it has a new seed, and the flags of an earlier failure are gone.
+    rng.sr().write(|w| w.seis().clear_bit().ceis().clear_bit());
+    rng.cr().write(|w| w.rngen().set_bit());
+    let bytes = draw(&rng);
+    rng.cr().write(|w| w.rngen().clear_bit());
+    bytes
+}
+
+fn draw(rng: &pac::RNG) -> Option<[u8; 32]> {
+    let mut last = number(rng)?;
+    let mut bytes = [0; 32];
+    for word in bytes.as_chunks_mut::<4>().0 {
+        let number = number(rng)?;
+        if number == last {
+            return None;
+        }
+        last = number;
+        *word = number.to_le_bytes();
+    }
+    Some(bytes)
+}
+
+/// Waits for a number, for [`LOOKS`] at most.
+fn number(rng: &pac::RNG) -> Option<u32> {
+    for _ in 0..LOOKS {
+        let status = rng.sr().read();
+        if status.seis().bit() || status.ceis().bit() || status.secs().bit() || status.cecs().bit() {
+            return None;
+        }
+        if status.drdy().bit() {
+            return Some(rng.dr().read().bits());
+        }
+    }
+    None
+}

@@ -1,0 +1,125 @@
+//! A signature says who has written something, for which identifier and board, and when (Ed25519, RFC 8032).
+//!
+//! Behind what is written stands a trailer of 69 bytes: 0 for this board alone or 1 for any board, a counter (4 bytes),
+//! and the signature (64 bytes). What is signed is made by [`message`]: text of its own, so that no answer to a
+//! challenge passes for a signature; the identifier that is written, or the routine that uses a download; the serial
+//! number of the board, or zeros; the counter; the length of the content and its SHA-512.
+
+use salty::{PublicKey, Sha512, Signature};
+
+/// Bytes of a serial number.
+pub const SERIAL: usize = 12;
+/// Bytes of a signature.
+pub const SIGNATURE: usize = 64;
+/// Bytes of a trailer.
+pub const TRAILER: usize = 1 + 4 + SIGNATURE;
+/// Bytes of a challenge.
+pub const SEED: usize = 32;
+/// Bytes of a digest.
+const DIGEST: usize = 64;
+
+const CONTENT: [u8; 17] = *b"gyronet content 1";
+const ACCESS: [u8; 16] = *b"gyronet access 1";
+/// Bytes that are signed for a content, and for a challenge.
+const CONTENT_MESSAGE: usize = CONTENT.len() + 2 + SERIAL + 4 + 4 + DIGEST;
+const ACCESS_MESSAGE: usize = ACCESS.len() + SERIAL + SEED;
+
+/// Hashes a content as it comes.
+pub struct Hasher {
+    hash: Sha512,
+    length: u32,
+}
+
+/// The length of a content and its SHA-512.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Digest {
+    length: u32,
+    hash: [u8; DIGEST],
+}
+
+impl Default for Hasher {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl core::fmt::Debug for Hasher {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Hasher").field("length", &self.length).finish_non_exhaustive()
+    }
+}
+
+impl Hasher {
+    /// Begins with nothing.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { hash: Sha512::new(), length: 0 }
+    }
+
+    /// Takes bytes that follow.
+    #[inline(never)]
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.hash.update(bytes);
+        self.length = self.length.wrapping_add(bytes.len() as u32);
+    }
+
+    /// Returns the digest of all bytes, and begins again.
+    #[inline(never)]
+    pub fn finish(&mut self) -> Digest {
+        let Self { hash, length } = core::mem::take(self);
+        Digest { length, hash: hash.finalize() }
+    }
+}
+
+/// Returns the digest of a content.
+#[must_use]
+#[inline(never)]
+pub fn digest(content: &[u8]) -> Digest {
+    let mut hasher = Hasher::new();
+    hasher.update(content);
+    hasher.finish()
+}
+
+/// The statement that a signature is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Statement {
+    /// The data identifier that is written, or the routine that uses a download.
+    pub target: u16,
+    /// The serial number of the board; zeros for any.
+    pub serial: [u8; SERIAL],
+    /// Greater than that of any signature before.
+    pub counter: u32,
+}
+
+/// Returns the bytes that are signed for a content.
+#[must_use]
+pub fn message(statement: &Statement, digest: &Digest) -> [u8; CONTENT_MESSAGE] {
+    joined([
+        &CONTENT,
+        &statement.target.to_be_bytes(),
+        &statement.serial,
+        &statement.counter.to_be_bytes(),
+        &digest.length.to_be_bytes(),
+        &digest.hash,
+    ])
+}
+
+/// Returns the bytes that are signed for a challenge of a board.
+#[must_use]
+pub fn challenge(serial: &[u8; SERIAL], seed: &[u8; SEED]) -> [u8; ACCESS_MESSAGE] {
+    joined([&ACCESS, serial, seed])
+}
+
+fn joined<const N: usize, const PARTS: usize>(parts: [&[u8]; PARTS]) -> [u8; N] {
+    let mut message = [0; N];
+    message.iter_mut().zip(parts.into_iter().flatten()).for_each(|(place, byte)| *place = *byte);
+    message
+}
+
+/// Returns whether a signature of a message was made with the private part of a key.
+#[must_use]
+#[inline(never)]
+pub fn is_valid(key: &[u8; 32], message: &[u8], signature: &[u8; SIGNATURE]) -> bool {
+    let key = PublicKey::try_from(key);
+    key.is_ok_and(|key| key.verify(message, &Signature::from(signature)).is_ok())
+}

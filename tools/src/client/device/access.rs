@@ -1,0 +1,78 @@
+//! Access to a board with a key: its challenge is answered, and what is written is signed.
+
+use super::requests::ACCESS;
+use super::{Authority, Device, DeviceError};
+use crate::client::bus::Bus;
+use crate::signing::unhex;
+use gyronet::uds::Session;
+use gyronet::uds::signature::SEED;
+
+/// Who may write to a board.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct AccessState {
+    /// `open` (no key is stored), `locked`, or `unlocked` for this session.
+    pub state: &'static str,
+    /// The counter of the newest signature that was accepted.
+    pub counter: u32,
+    /// Wrong answers to challenges in a row.
+    pub wrong_answers: u8,
+    /// The begin of the public key, hexadecimal.
+    pub key: String,
+    /// The serial number of the board, hexadecimal.
+    pub serial: String,
+}
+
+impl<B: Bus> Device<B> {
+    /// Returns who may write.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn access(&mut self) -> Result<AccessState, DeviceError> {
+        let state = self.read(ACCESS)?;
+        let [state, a, b, c, d, wrong_answers, key @ ..] =
+            <[u8; 10]>::try_from(state).map_err(|_| DeviceError::Mismatch)?;
+        let state = ["open", "locked", "unlocked"].get(usize::from(state)).ok_or(DeviceError::Mismatch)?;
+        let serial = String::from_utf8(self.read(0xF18C)?).map_err(|_| DeviceError::Mismatch)?;
+        let key = if key == [0; 4] { String::new() } else { crate::signing::hex(&key) };
+        Ok(AccessState { state, counter: u32::from_be_bytes([a, b, c, d]), wrong_answers, key, serial })
+    }
+
+    /// Enters a session, with access where a key is there; the board leaves it after five seconds of silence.
+    pub(super) fn enter(&mut self, session: Session) -> Result<(), DeviceError> {
+        self.ask(&[0x10, session as u8])?;
+        let access = self.access()?;
+        let Authority::Key(_) = &self.authority else { return Ok(()) };
+        if access.state != "locked" {
+            return Ok(());
+        }
+        let seed = self.ask(&[0x27, 1])?;
+        let seed: [u8; SEED] =
+            seed.get(1..).and_then(|seed| seed.try_into().ok()).ok_or(DeviceError::Mismatch)?;
+        let serial = unhex(&access.serial).ok_or(DeviceError::Mismatch)?;
+        let Authority::Key(key) = &self.authority else { return Ok(()) };
+        let answer = key.answer(&serial, &seed);
+        self.ask(&[&[0x27, 2][..], &answer].concat()).map(drop)
+    }
+
+    /// Returns the trailer of a content for this board; nothing where it has no key, or nothing to sign with.
+    pub(super) fn trailer(&mut self, target: u16, content: &[u8]) -> Result<Vec<u8>, DeviceError> {
+        let access = self.access()?;
+        Ok(match &self.authority {
+            _ if access.state == "open" => Vec::new(),
+            Authority::None => Vec::new(),
+            Authority::Signature(trailer) => trailer.to_vec(),
+            Authority::Key(key) => {
+                let serial = unhex(&access.serial).ok_or(DeviceError::Mismatch)?;
+                key.trailer(target, Some(serial), access.counter.saturating_add(1), content).to_vec()
+            }
+        })
+    }
+
+    /// Stores the public key of those who may write; zeros for none.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn set_key(&mut self, key: &[u8; 32]) -> Result<(), DeviceError> {
+        self.write(super::requests::KEY, key)
+    }
+}

@@ -1,0 +1,70 @@
+//! `gyronet sign`: a signature for what a board with a key is to accept.
+
+use super::Common;
+use clap::ValueEnum;
+use gyronet_tools::calibrate::unit_file;
+use gyronet_tools::client::device::requests::{self, CONFIGURATION, KEY, UNIT, USE_DOWNLOAD, WHEELS};
+use gyronet_tools::client::device::settings::from_value;
+use gyronet_tools::signing::{PrivateKey, read_public, unhex};
+use gyronet_tools::wheels::WheelFile;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+/// Sign a file for boards with a key, which then accept it from anyone, once (`device ... --signature`).
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Weight file, whole configuration (`device get --json`), wheel frames (.toml), unit file, or public key.
+    file: PathBuf,
+    /// What the file is.
+    #[arg(long, value_enum)]
+    target: Target,
+    /// Private key (`gyronet keys`).
+    #[arg(long, value_name = "NAME.key")]
+    key: PathBuf,
+    /// Number of this signature: greater than that of every one that the board has accepted (`device access`).
+    #[arg(long)]
+    counter: u32,
+    /// Serial number of the one board that may accept it (`device access`); any with the key, where none is given.
+    #[arg(long, value_name = "HEX")]
+    serial: Option<String>,
+    /// The signature.
+    #[arg(long, value_name = "FILE.sig")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Target {
+    Weights,
+    Configuration,
+    Wheels,
+    Unit,
+    Key,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let name = args.file.display().to_string();
+    let read = || std::fs::read(&args.file).map_err(|error| format!("{name}: {error}"));
+    let text = || std::fs::read_to_string(&args.file).map_err(|error| format!("{name}: {error}"));
+    let (target, content) = match args.target {
+        Target::Weights => (USE_DOWNLOAD, read()?),
+        Target::Configuration => {
+            let value = serde_json::from_str(&text()?).map_err(|error| format!("{name}: {error}"))?;
+            (CONFIGURATION, requests::configuration_content(&from_value(value)?)?)
+        }
+        Target::Wheels => (WHEELS, requests::content(&WheelFile::parse(&name, &text()?)?.settings(&name)?)?),
+        Target::Unit => (UNIT, requests::content(&Some(unit_file::read(&args.file)?))?),
+        Target::Key => (KEY, read_public(&args.file)?.to_vec()),
+    };
+    let serial = args.serial.as_deref().map(|text| unhex(text).ok_or("--serial: not 24 hexadecimal digits"));
+    let trailer = PrivateKey::read(&args.key)?.trailer(target, serial.transpose()?, args.counter, &content);
+    std::fs::write(&args.out, trailer).map_err(super::WriteError::to(&args.out))?;
+    let out = &mut io::stdout().lock();
+    if common.json {
+        return super::print_json(
+            out,
+            &serde_json::json!({ "signature": args.out, "counter": args.counter }),
+        );
+    }
+    Ok(writeln!(out, "{}: signature {} of {name}", args.out.display(), args.counter)?)
+}

@@ -1,0 +1,182 @@
+//! Keys of those who may write to a board, and signatures of what they write ([`gyronet::uds::signature`]).
+//!
+//! The private part stays in its file on this computer; the board gets the public part.
+
+use ed25519_dalek::{Signer, SigningKey};
+use gyronet::uds::signature::{self, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
+use std::fmt::Write as _;
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The first lines of both files.
+const PRIVATE: &str = "gyronet private key 1";
+const PUBLIC: &str = "gyronet public key 1";
+
+/// The error of a key or signature that cannot be made, read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum KeyError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Its path.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// The file holds something else.
+    #[error("{}: not a {what}", path.display())]
+    Content {
+        /// Its path.
+        path: PathBuf,
+        /// What it should be.
+        what: &'static str,
+    },
+    /// The system has no random numbers.
+    #[error("no random numbers: {0}")]
+    Random(getrandom::Error),
+}
+
+/// A private key.
+#[derive(Clone)]
+pub struct PrivateKey(SigningKey);
+
+impl PrivateKey {
+    /// Makes a key of the system's random numbers.
+    ///
+    /// # Errors
+    /// [`KeyError::Random`].
+    pub fn generate() -> Result<Self, KeyError> {
+        let mut secret = [0; 32];
+        getrandom::fill(&mut secret).map_err(KeyError::Random)?;
+        Ok(Self(SigningKey::from_bytes(&secret)))
+    }
+
+    /// Reads `NAME.key`.
+    ///
+    /// # Errors
+    /// [`KeyError`].
+    pub fn read(path: &Path) -> Result<Self, KeyError> {
+        Ok(Self(SigningKey::from_bytes(&read(path, PRIVATE)?)))
+    }
+
+    /// Writes `NAME.key`, which its owner alone can read, and `NAME.pub`. Neither may be there.
+    ///
+    /// # Errors
+    /// [`KeyError::File`].
+    pub fn write(&self, name: &Path) -> Result<[PathBuf; 2], KeyError> {
+        let paths = ["key", "pub"].map(|end| {
+            let mut path = name.as_os_str().to_owned();
+            path.push(".");
+            path.push(end);
+            PathBuf::from(path)
+        });
+        let [private, public] = &paths;
+        create(private, PRIVATE, &self.0.to_bytes())?;
+        create(public, PUBLIC, &self.public())?;
+        Ok(paths)
+    }
+
+    /// Returns the public part.
+    #[must_use]
+    pub fn public(&self) -> [u8; 32] {
+        self.0.verifying_key().to_bytes()
+    }
+
+    /// Returns the trailer that has a board accept a content: one board by its serial number, or any.
+    #[must_use]
+    pub fn trailer(
+        &self,
+        target: u16,
+        serial: Option<[u8; SERIAL]>,
+        counter: u32,
+        content: &[u8],
+    ) -> [u8; TRAILER] {
+        let statement = Statement { target, serial: serial.unwrap_or_default(), counter };
+        let message = signature::message(&statement, &signature::digest(content));
+        let mut trailer = [0; TRAILER];
+        trailer[0] = u8::from(serial.is_none());
+        trailer[1..5].copy_from_slice(&counter.to_be_bytes());
+        trailer[5..].copy_from_slice(&self.0.sign(&message).to_bytes());
+        trailer
+    }
+
+    /// Returns the response to a board's challenge.
+    #[must_use]
+    pub fn answer(&self, serial: &[u8; SERIAL], seed: &[u8; SEED]) -> [u8; SIGNATURE] {
+        self.0.sign(&signature::challenge(serial, seed)).to_bytes()
+    }
+}
+
+/// Reads `NAME.pub`.
+///
+/// # Errors
+/// [`KeyError`].
+pub fn read_public(path: &Path) -> Result<[u8; 32], KeyError> {
+    read(path, PUBLIC)
+}
+
+/// Returns bytes as hexadecimal digits.
+#[must_use]
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02X}");
+        text
+    })
+}
+
+/// Reads as many bytes as there are of hexadecimal digits.
+#[must_use]
+pub fn unhex<const N: usize>(text: &str) -> Option<[u8; N]> {
+    let digits: Option<Vec<u8>> =
+        text.trim().chars().map(|c| c.to_digit(16).map(|digit| digit as u8)).collect();
+    let bytes: Vec<u8> =
+        digits?.chunks(2).map(|pair| pair.iter().fold(0, |byte, digit| byte << 4 | digit)).collect();
+    if text.trim().len() == 2 * N { bytes.try_into().ok() } else { None }
+}
+
+fn read(path: &Path, what: &'static str) -> Result<[u8; 32], KeyError> {
+    let text = fs::read_to_string(path).map_err(|source| KeyError::File { path: path.into(), source })?;
+    let key = text.strip_prefix(what).and_then(unhex);
+    key.ok_or_else(|| KeyError::Content { path: path.into(), what })
+}
+
+fn create(path: &Path, what: &str, key: &[u8; 32]) -> Result<(), KeyError> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    if what == PRIVATE {
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    }
+    let written = options.open(path).and_then(|mut file| writeln!(file, "{what}\n{}", hex(key)));
+    written.map_err(|source| KeyError::File { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_written_once_and_read_again() {
+        let folder = std::env::temp_dir().join(format!("gyronet-keys-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("there is room");
+        let key = PrivateKey::generate().expect("random numbers");
+        let [private, public] = key.write(&folder.join("fleet")).expect("it is new");
+        assert_eq!(PrivateKey::read(&private).expect("as written").public(), key.public());
+        assert_eq!(read_public(&public).expect("as written"), key.public());
+        assert!(
+            matches!(key.write(&folder.join("fleet")), Err(KeyError::File { .. })),
+            "none is overwritten"
+        );
+        assert!(matches!(PrivateKey::read(&public), Err(KeyError::Content { .. })));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = fs::metadata(&private).expect("it is there").permissions().mode();
+            assert_eq!(mode & 0o777, 0o600);
+        }
+        fs::remove_dir_all(&folder).expect("it is ours");
+        assert_ne!(PrivateKey::generate().expect("random numbers").public(), key.public());
+    }
+}
