@@ -36,8 +36,10 @@ def test_all(
     return results
 
 
-def run_mode(drive: Sequence, path: Path, run: Callable[[], Track], further: Callable[[Track], dict]) -> dict:
-    """Runs a drive in one mode, writes its trajectory into `path` and returns its numbers."""
+def run_mode(
+    drive: Sequence, path: Path, run: Callable[[], Track], further: Callable[[Track], dict] = lambda track: {}
+) -> dict:
+    """Runs a drive in one mode, writes its trajectory into `path` and returns its numbers, and `further` ones."""
     begin = time.monotonic()
     name = f"{drive.name} {path.parent.name}"
     try:
