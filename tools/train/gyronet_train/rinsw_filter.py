@@ -28,7 +28,7 @@ STILL_RATE, STILL_FORCE = 0.1, 0.6  # rad/s, m/s^2: the most that a sensor may b
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: of each sample, of the biases' walk, of the measurements of zero, and at the start."""
+    """Standard deviations: of each sample, of the biases' walk, and of the measurements of zero."""
 
     gyro: float = 5e-3  # rad/s
     force: float = 0.1  # m/s^2
@@ -39,6 +39,7 @@ class Noise:
     velocity: float = 1.0  # m/s, of each axis while the car stands
     still_gyro: float = 0.04  # rad/s
     still_force: float = 0.4  # m/s^2
+    # At the start: turn (the last is the heading's), velocity, position, gyro bias, force bias.
     start: tuple = (0.1, 0.1, 1e-3, 0, 0, 0, 0.01, 0.01, 0.01, 1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2)
 
 
