@@ -21,11 +21,11 @@ from pathlib import Path
 import torch
 
 from .results import mean_numbers, run_mode, test_all
-from .rinsw_detector import THRESHOLDS, Detectors, Settings, load_detectors, train
+from .rinsw_detector import THRESHOLDS, DetectorError, Detectors, Settings, load_detectors, train
 from .rinsw_filter import Noise
 from .rinsw_profiles import PROFILES, Limits, agreement, label
 from .rinsw_run import MODES, gates, run, samples_of
-from .sequence import Sequence, load_sequence
+from .sequence import Sequence, SequenceError, load_sequence
 
 
 def arguments() -> argparse.Namespace:
@@ -83,7 +83,7 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     try:
         detectors, trained = fit(args) if args.train else (load_detectors(args.detectors), {})
-    except ValueError as error:
+    except (DetectorError, SequenceError) as error:
         raise SystemExit(str(error)) from error
     results = test_all(args.test, args.out, args.modes, lambda drive: test(drive, detectors, args))
     report = {

@@ -2,7 +2,7 @@
 
 Each is an LSTM of two layers and a perceptron of two, which give a probability for every sample
 from that sample and those before it. They begin afresh every second with the three seconds before
-it: trained on windows of 4 s, a network that ran on for a drive found a third of the stops.
+it: trained on windows of 4 s, a network that ran on for a drive found 2 to 36 % of the stops.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 import unittest
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gyronet_train.lwoi_motion import (
     corrected,

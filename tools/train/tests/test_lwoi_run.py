@@ -4,7 +4,6 @@ import unittest
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gyronet_train.lwoi_process import Errors
 from gyronet_train.lwoi_run import Expected, run
