@@ -5,7 +5,8 @@ processes expect the error of each second of wheel and fibre-optic odometry and 
 sensor, and a Kalman filter uses both. It trains both processes on the training sequences, in the
 layout of KAIST Urban, and writes the trajectories of the test sequences in TUM format into
 FOLDER/odometry, FOLDER/constant, FOLDER/model and FOLDER/filter (lwoi_run.py says what these are),
-and all numbers into FOLDER/lwoi.json. A test sequence on which the filter diverges is named and left out.
+and all numbers into FOLDER/lwoi.json. A test sequence that cannot be read, or on which the filter
+diverges, is named and left out.
 """
 
 from __future__ import annotations
@@ -21,11 +22,12 @@ import gpytorch
 import numpy as np
 import torch
 
-from .lwoi_filter import FilterError
 from .lwoi_motion import inertial_errors, odometry_errors
 from .lwoi_process import Settings, Trained, inertial_features, odometry_features, train
-from .lwoi_run import MODES, Expected, consistency, run, trajectory_error, write_tum
-from .lwoi_sequence import STEPS, Sequence, load_sequence
+from .lwoi_run import MODES, Expected, run
+from .results import mean_numbers, run_mode, test_all
+from .sequence import STEPS, Sequence, load_sequence
+from .trajectory import Track, trajectory_error
 
 JITTER = {"odometry": 1e-3, "inertial": 1e-4}
 
@@ -99,28 +101,14 @@ def test(drive: Sequence, model: Model, out: Path) -> dict:
         "predict_s": round(time.monotonic() - begin, 2),
     }
     for mode in MODES:
-        begin = time.monotonic()
+
+        def late(track: Track) -> dict:
+            """The error of a pose that stands for the next second."""
+            error = trajectory_error(track.position[STEPS:], drive.position[:-STEPS], False)
+            return {"ate_a_second_late_m": round(error, 3)}
+
         path = out / mode / f"{drive.name}.txt"
-        try:
-            track = run(drive, expected, mode)
-        except FilterError as error:
-            path.unlink(missing_ok=True)
-            numbers[mode] = {"left_out": str(error)}
-            print(f"{drive.name} {mode}: left out, {error}", flush=True)
-            continue
-        seconds = time.monotonic() - begin
-        numbers[mode] = {
-            "ate_m": round(trajectory_error(track.position, drive.position, False), 3),
-            "aligned_ate_m": round(trajectory_error(track.position, drive.position, True), 3),
-            "ate_a_second_late_m": round(
-                trajectory_error(track.position[STEPS:], drive.position[:-STEPS], False), 3
-            ),
-            "squared_error_by_covariance": round(consistency(drive, track), 3),
-            "refused": track.refused,
-            "run_s": round(seconds, 2),
-        }
-        print(f"{drive.name} {mode}: {numbers[mode]}", flush=True)
-        write_tum(drive, track, path)
+        numbers[mode] = run_mode(drive, path, lambda: run(drive, expected, mode), late)
     return numbers
 
 
@@ -128,17 +116,11 @@ def main() -> None:
     args = arguments()
     torch.set_num_threads(args.threads)
     drives = [load_sequence(folder) for folder in args.train]
-    for mode in MODES:
-        (args.out / mode).mkdir(parents=True, exist_ok=True)
     processes = {what: fit(what, drives, args) for what in JITTER}
     errors = np.concatenate([odometry_errors(drive) for drive in drives])
     model = Model(processes, speed_variance(drives), errors.mean(axis=0), (errors**2).mean(axis=0))
-    results = {}
-    for folder in args.test:
-        drive = load_sequence(folder)
-        if drive.name in results:
-            raise SystemExit(f"{folder}: a second test sequence of the name {drive.name}")
-        results[drive.name] = test(drive, model, args.out)
+    results = test_all(args.test, args.out, MODES, lambda drive: test(drive, model, args.out))
+    means = {mode: mean_numbers(results, mode) for mode in MODES}
     report = {
         "method": "lwoi",
         "train": {drive.name: drive.sha256 for drive in drives},
@@ -147,6 +129,7 @@ def main() -> None:
         "seconds": {what: round(p.seconds, 1) for what, p in processes.items()},
         "speed_std_m_per_s": round(model.speed_variance**0.5, 5),
         "tests": results,
+        "means": means,
         "torch": torch.__version__.split("+")[0],
         "gpytorch": gpytorch.__version__,
         "date": datetime.date.today().isoformat(),
@@ -154,9 +137,7 @@ def main() -> None:
     path = args.out / "lwoi.json"
     path.write_text(json.dumps(report, indent=2) + "\n")
     for mode in MODES:
-        rows = [numbers[mode] for numbers in results.values() if "left_out" not in numbers[mode]]
-        means = {key: np.mean([row[key] for row in rows]).round(3).item() for key in rows[0]} if rows else {}
-        print(f"mean of {len(rows)} of {len(results)}, {mode}: {means}")
+        print(f"means of {mode}: {means[mode]}")
     print(path)
 
 

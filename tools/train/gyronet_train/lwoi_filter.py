@@ -14,17 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .lwoi_motion import GRAVITY, WINDOW_S, left_jacobian, skew
+from .lwoi_motion import WINDOW_S
+from .motion import GRAVITY, left_jacobian, skew
+from .trajectory import FilterError
 
 POSE, COPY = slice(0, 6), slice(6, 12)
 TURN, PLACE, OLD_TURN, OLD_PLACE = (slice(k, k + 3) for k in (0, 3, 6, 9))
 AHEAD = np.array([1.0, 0.0, 0.0])
 GATE = 27.88  # chi squared of nine numbers that one in a thousand exceeds
 REFUSED_IN_A_ROW = 30  # s without a measurement that fits: the filter has diverged
-
-
-class FilterError(ValueError):
-    """A filter that has diverged. Its text says at which second and why."""
 
 
 @dataclass(frozen=True)

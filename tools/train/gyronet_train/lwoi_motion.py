@@ -11,29 +11,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .lwoi_sequence import DT, STEPS, Sequence
+from .motion import GRAVITY, left_jacobian
+from .sequence import DT, STEPS, Sequence
 
-GRAVITY = np.array([0.0, 0.0, -9.80665])  # m/s^2
 WINDOW_S = STEPS * DT
-SMALL = 1e-4  # rad: below it, series replace quotients
-
-
-def skew(v: np.ndarray) -> np.ndarray:
-    """The matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
-    x, y, z = np.moveaxis(v, -1, 0)
-    zero = np.zeros_like(x)
-    rows = [np.stack(row, axis=-1) for row in ([zero, -z, y], [z, zero, -x], [-y, x, zero])]
-    return np.stack(rows, axis=-2)
-
-
-def left_jacobian(rotation: np.ndarray) -> np.ndarray:
-    """The left Jacobians (..., 3, 3) of rotation vectors (..., 3): it maps a twist's translation to a way."""
-    angle = np.linalg.norm(rotation, axis=-1)[..., None, None]
-    safe = np.where(angle < SMALL, 1.0, angle)
-    first = np.where(angle < SMALL, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
-    second = np.where(angle < SMALL, 1 / 6 - angle**2 / 120, (safe - np.sin(safe)) / safe**3)
-    cross = skew(rotation)
-    return np.eye(3) + first * cross + second * cross @ cross
 
 
 def odometry_poses(odometry: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

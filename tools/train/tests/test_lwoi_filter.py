@@ -9,7 +9,6 @@ from scipy.stats import chi2
 from gyronet_train.lwoi_filter import (
     REFUSED_IN_A_ROW,
     Filter,
-    FilterError,
     Measured,
     Motion,
     expectation,
@@ -17,6 +16,7 @@ from gyronet_train.lwoi_filter import (
     twist_jacobian,
 )
 from gyronet_train.lwoi_motion import corrected
+from gyronet_train.trajectory import FilterError
 
 STEP = 1e-6
 SPEEDS = (9.0, 9.5)

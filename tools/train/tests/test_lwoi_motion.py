@@ -3,19 +3,17 @@
 import unittest
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gyronet_train.lwoi_motion import (
-    GRAVITY,
     corrected,
     inertial_errors,
     inertial_motion,
-    left_jacobian,
     odometry_errors,
     odometry_motion,
 )
+from gyronet_train.motion import GRAVITY
 
-from .lwoi_drive import START, START_YAW, expected_end, make_drive
+from .made_drive import START, START_YAW, expected_end, make_drive
 
 SECONDS = 20
 
@@ -80,15 +78,3 @@ class Inertial(unittest.TestCase):
     def test_a_circle_has_no_error_but_for_the_length_of_a_step(self):
         drive = make_drive(np.full(100 * SECONDS, 10.0), np.full(100 * SECONDS, 0.1))
         self.assertLess(abs(inertial_errors(drive)[1:-1]).max(), 0.01)
-
-
-class LeftJacobian(unittest.TestCase):
-    def test_it_is_the_derivative_of_the_exponential(self):
-        for rotation in (np.array([0.3, -0.8, 0.5]), np.array([1e-5, 2e-5, -1e-5]), np.array([1e-3, 0.0, 1e-3])):
-            at, step = Rotation.from_rotvec(rotation), 1e-6
-            columns = [
-                (Rotation.from_rotvec(rotation + step * e) * at.inv()).as_rotvec() / step
-                - (Rotation.from_rotvec(rotation - step * e) * at.inv()).as_rotvec() / step
-                for e in np.eye(3)
-            ]
-            np.testing.assert_allclose(left_jacobian(rotation), np.array(columns).T / 2, atol=1e-8)

@@ -196,7 +196,7 @@ fn rivals(set: &[&SequenceErrors]) -> Table {
         paper_rows,
         notes: vec![
             "The paper's averages of RINS-W do not follow from its rows.".into(),
-            "RINS-W does not run here yet: its figures are the paper's.".into(),
+            "RINS-W's figures are the paper's; python -m gyronet_train.rinsw trains and runs it.".into(),
             FOGNET_SIGN.into(),
         ],
     }

@@ -1,4 +1,4 @@
-"""Sequences as lwoi sees them: windows of one second on a 100 Hz grid, and the true poses.
+"""Sequences in the layout of KAIST Urban: windows of one second on a 100 Hz grid, and the true poses.
 
 The grid begins with the first row of the inertial sensor that all other files have reached, as in
 `gyronet tables`, and has whole seconds only. Ways and turns are interpolated as sums, so that no
@@ -23,7 +23,7 @@ STANDING_M = 0.01  # the most that wheels may turn while the gyro's mean is take
 
 
 class SequenceError(ValueError):
-    """A sequence that lwoi cannot use. Its text names the folder and what is wrong."""
+    """A sequence that cannot be used. Its text names the folder and what is wrong."""
 
 
 @dataclass(frozen=True)

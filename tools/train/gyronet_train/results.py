@@ -1,0 +1,74 @@
+"""Runs a rival on test sequences, and collects its numbers.
+
+A sequence that cannot be read, and a mode in which the filter diverges, are named, counted and left
+out: they have a reason instead of numbers, and no trajectory.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from .sequence import Sequence, SequenceError, load_sequence
+from .trajectory import FilterError, Track, consistency, trajectory_error, write_tum
+
+
+def test_all(
+    folders: Iterable[Path], out: Path, modes: Iterable[str], test: Callable[[Sequence], dict]
+) -> dict[str, dict]:
+    """Tests each folder's sequence; returns numbers by the folder's name. Removes trajectories of an earlier run."""
+    results: dict[str, dict] = {}
+    for folder in folders:
+        if folder.name in results:
+            raise SystemExit(f"{folder}: a second test sequence of the name {folder.name}")
+        for mode in modes:
+            (out / mode).mkdir(parents=True, exist_ok=True)
+            (out / mode / f"{folder.name}.txt").unlink(missing_ok=True)
+        try:
+            drive = load_sequence(folder)
+        except SequenceError as error:
+            results[folder.name] = left_out(folder.name, error)
+            continue
+        results[folder.name] = test(drive)
+    return results
+
+
+def run_mode(
+    drive: Sequence, path: Path, run: Callable[[], Track], further: Callable[[Track], dict] = lambda track: {}
+) -> dict:
+    """Runs a drive in one mode, writes its trajectory into `path` and returns its numbers, and `further` ones."""
+    begin = time.monotonic()
+    name = f"{drive.name} {path.parent.name}"
+    try:
+        track = run()
+    except FilterError as error:
+        return left_out(name, error)
+    seconds = time.monotonic() - begin
+    numbers = {
+        "ate_m": round(trajectory_error(track.position, drive.position, False), 3),
+        "aligned_ate_m": round(trajectory_error(track.position, drive.position, True), 3),
+        "squared_error_by_covariance": round(consistency(drive, track), 3),
+        "refused": track.refused,
+        **further(track),
+        "run_s": round(seconds, 2),
+    }
+    print(f"{name}: {numbers}", flush=True)
+    write_tum(drive, track, path)
+    return numbers
+
+
+def left_out(name: str, error: ValueError) -> dict:
+    """Says that a sequence or one of its modes has no numbers, and why."""
+    print(f"{name}: left out, {error}", flush=True)
+    return {"left_out": str(error)}
+
+
+def mean_numbers(results: dict[str, dict], mode: str) -> dict:
+    """The means of a mode's numbers, with how many sequences have them and how many were left out."""
+    rows = [numbers[mode] for numbers in results.values() if "left_out" not in numbers]
+    rows = [row for row in rows if "left_out" not in row]
+    means = {key: round(float(np.mean([row[key] for row in rows])), 3) for key in (rows[0] if rows else {})}
+    return {"sequences": len(rows), "left_out": len(results) - len(rows), **means}

@@ -1,0 +1,56 @@
+"""A drive by RINS-W: from samples and detections to a pose every 10 ms.
+
+There are four ways to run it. `rinsw` takes the profiles that the four networks detect, as in the
+paper; `stops` takes the network of zero velocity alone, for zero rotation as well, and always counts
+lateral and vertical velocity as zero, as the program does that its authors released later; `truth`
+takes the true profiles, to show what better detectors would gain; `inertial` detects nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from .rinsw_filter import Filter, Noise
+from .rinsw_profiles import ROTATION, VELOCITY
+from .seconds import STATIC_S
+from .sequence import DT, STEPS, Sequence
+from .trajectory import Track
+
+MODES = ("rinsw", "stops", "truth", "inertial")
+
+
+def samples_of(sequence: Sequence) -> np.ndarray:
+    """A sequence's samples of the inertial sensor (N * 100, 6), its windows one after the other."""
+    return sequence.inertial.reshape(-1, sequence.inertial.shape[-1])
+
+
+def gates(detected: np.ndarray, true: np.ndarray, mode: str) -> np.ndarray:
+    """The profiles (steps, 4) that the filter is told of in a mode."""
+    if mode == "stops":
+        chosen = np.ones_like(detected)
+        chosen[:, VELOCITY] = chosen[:, ROTATION] = detected[:, VELOCITY]
+        return chosen
+    return {"rinsw": detected, "truth": true, "inertial": np.zeros_like(detected)}[mode]
+
+
+def run(sequence: Sequence, detected: np.ndarray, noise: Noise = Noise()) -> Track:
+    """Runs a drive from its true first place and heading. Raises FilterError where the filter diverges.
+
+    The first three seconds, which stand, give bias, roll and pitch; the pose is constant in them.
+    """
+    samples, standing = samples_of(sequence), int(STATIC_S / DT)
+    state = Filter(sequence.attitude[0].as_matrix(), noise)
+    state.start(samples[:standing])
+    attitudes, positions = [state.attitude], [state.position]
+    covariances = [state.pose_covariance()]
+    for k, (sample, gate) in enumerate(zip(samples, detected), start=1):
+        if k > standing:
+            state.move(sample, gate)
+            state.measure(sample, gate)
+        attitudes.append(state.attitude)
+        positions.append(state.position)
+        if k % STEPS == 0:
+            covariances.append(state.pose_covariance())
+    attitude = Rotation.from_matrix(np.array(attitudes))
+    return Track(attitude, sequence.position[0] + np.array(positions), np.array(covariances), state.refused)

@@ -1,0 +1,57 @@
+"""Trajectories that a rival estimates: their form, their errors, and the file that holds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from .sequence import PERIOD_NS, Sequence
+
+
+class FilterError(ValueError):
+    """A filter that has diverged. Its text says when and why."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A pose at each step, the errors' covariances (N + 1, 6, 6) at the edges, and the measurements refused."""
+
+    attitude: Rotation
+    position: np.ndarray
+    covariance: np.ndarray
+    refused: int
+
+
+def write_tum(sequence: Sequence, track: Track, path: Path) -> None:
+    """Writes the poses as `time x y z qx qy qz qw`, time in s (the stamps that are read are good to
+    a microsecond) and places in the frame of the true poses."""
+    with path.open("w") as file:
+        for k, (place, turn) in enumerate(zip(track.position, track.attitude.as_quat())):
+            whole, rest = divmod(round((sequence.start_ns + k * PERIOD_NS) / 1000), 10**6)
+            numbers = " ".join(f"{number:.6f}" for number in place) + " " + " ".join(f"{q:.9f}" for q in turn)
+            file.write(f"{whole}.{rest:06d} {numbers}\n")
+
+
+def trajectory_error(estimate: np.ndarray, truth: np.ndarray, align: bool) -> float:
+    """The RMS distance of places in the plane, m, after the best turn and shift if `align`."""
+    estimate, truth = estimate[:, :2], truth[:, :2]
+    if align:
+        estimate, truth = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
+        cross = (estimate[:, 0] * truth[:, 1] - estimate[:, 1] * truth[:, 0]).sum()
+        angle = np.arctan2(cross, (estimate * truth).sum())
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        estimate = estimate @ turn
+    return float(np.sqrt(((estimate - truth) ** 2).sum(axis=1).mean()))
+
+
+def consistency(sequence: Sequence, track: Track) -> float:
+    """The squared error of place and heading in the plane by its covariance, mean over the edges after the first, a
+    third of it: 1 where the filter knows how wrong it is."""
+    attitude, position = track.attitude[sequence.edges], track.position[sequence.edges]
+    turn = (sequence.attitude[sequence.edges] * attitude.inv()).as_rotvec()[:, 2:]
+    error = np.concatenate([turn, (sequence.position[sequence.edges] - position)[:, :2]], axis=1)[1:]
+    spread = track.covariance[1:, 2:5, 2:5]
+    return float(np.einsum("ni,ni->n", error, np.linalg.solve(spread, error[..., None])[..., 0]).mean() / 3)

@@ -1,0 +1,47 @@
+"""Sequences in the layout of KAIST Urban: what is read, and what is refused."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+from gyronet_train.sequence import SequenceError, load_sequence
+
+from .made_drive import SECONDS, SPEED, make_drive, start_and_go, write_kaist
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = Path(temporary.name) / "made"
+        self.drive = start_and_go()
+        write_kaist(self.drive, self.folder)
+
+    def test_a_folder_is_read_as_it_was_written(self):
+        read = load_sequence(self.folder)
+        self.assertEqual((read.name, len(read)), ("made", SECONDS))
+        self.assertAlmostEqual(read.start_ns, self.drive.start_ns, delta=256)
+        np.testing.assert_allclose(read.position, self.drive.position, atol=1e-6)
+        np.testing.assert_allclose(read.odometry[:, :, 2], self.drive.odometry[:, :, 2], atol=1e-7)
+        np.testing.assert_allclose(read.odometry[:, :, :2].sum(1), self.drive.odometry[:, :, :2].sum(1), atol=1e-3)
+        np.testing.assert_allclose(read.edge_speed[[2, 6, -1]], [0.0, SPEED, SPEED], atol=0.01)
+        np.testing.assert_allclose(np.linalg.norm(read.edge_velocity[[2, 6, -1]], axis=1), [0, SPEED, SPEED], atol=1e-3)
+
+    def test_a_missing_file_is_named(self):
+        (self.folder / "sensor_data" / "fog.csv").unlink()
+        with self.assertRaisesRegex(SequenceError, "made.*fog.csv"):
+            load_sequence(self.folder)
+
+    def test_a_drive_that_does_not_stand_at_first_is_named(self):
+        moving = make_drive(np.full(800, 5.0), np.zeros(800))
+        write_kaist(moving, self.folder.parent / "moving")
+        with self.assertRaisesRegex(SequenceError, "moving: it moves in its first 3 s"):
+            load_sequence(self.folder.parent / "moving")
+
+    def test_a_drive_of_a_moment_is_named(self):
+        short = make_drive(np.zeros(200), np.zeros(200))
+        write_kaist(short, self.folder.parent / "short")
+        with self.assertRaisesRegex(SequenceError, "short: its files have 2 s in common"):
+            load_sequence(self.folder.parent / "short")
