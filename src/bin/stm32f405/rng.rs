@@ -4,7 +4,7 @@
 //! after the start is not used (RM0090 24.3.1, FIPS 140-2).
 #![allow(unsafe_code, reason = "a peripheral that nothing else uses; the block says so")]
 
-use super::{clock_delay, pac};
+use super::pac;
 
 /// Looks for a number, which comes after 40 periods of 48 MHz: several times that.
 const LOOKS: u32 = 2_000;
@@ -14,10 +14,6 @@ const LOOKS: u32 = 2_000;
 pub fn bytes() -> Option<[u8; 32]> {
     // SAFETY: idle alone calls this, and no other code uses RNG.
     let rng = unsafe { pac::RNG::steal() };
-    // SAFETY: no other code uses the register that switches its clock on.
-    let rcc = unsafe { pac::RCC::steal() };
-    rcc.ahb2enr().modify(|_, w| w.rngen().enabled());
-    clock_delay();
     // Enabled anew it has a new seed, and the flags of an earlier failure are gone.
     rng.sr().write(|w| w.seis().clear_bit().ceis().clear_bit());
     rng.cr().write(|w| w.rngen().set_bit());
