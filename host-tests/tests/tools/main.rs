@@ -18,6 +18,7 @@ mod replay_mcap;
 mod replay_via;
 mod standstill;
 mod still_stretches;
+mod tables_methods;
 mod trajectory_evo;
 mod turns;
 mod unit_transfer;

@@ -5,8 +5,10 @@ use super::{Common, WriteError, import, print_json, progress, remark};
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogNet, GyroNet};
 use gyronet_tools::bundled;
+use gyronet_tools::drive::error::DataError;
 use gyronet_tools::network::weight_file::WeightFile;
 use gyronet_tools::paper::sequence::{self, Sequence};
+use gyronet_tools::paper::tables::given::Given;
 use gyronet_tools::paper::tables::results::{Results, SequenceErrors};
 use gyronet_tools::paper::tables::{estimates, html, pictures, table};
 use gyronet_tools::simulate::layout::Layout;
@@ -16,17 +18,23 @@ use std::path::PathBuf;
 
 /// Compute the paper's tables and figures on sequences of KAIST Urban or NCLT.
 ///
-/// The command prints tables I, II, III, V, VI and VII, as far as the sequences have figures for them, beside the
+/// The command prints tables I to VII, as far as the sequences have figures for them, beside the
 /// paper's own figures, and draws Figs. 6, 7, 9, 10 and 11.
 ///
 /// Sequences are folders in the layout of KAIST Complex Urban or NCLT, real ones or those of `gyronet simulate
 /// --layout`; figures of simulated ones are marked. Where the vehicle does not stand still for the first 3 s, methods
 /// that need static initialisation are left out, and the reason is printed.
+///
+/// --method puts another program's method beside ours: a folder of trajectories in the format of TUM's RGB-D benchmark
+/// (rows of time x y z qx qy qz qw, as evo has them), one for each sequence, named SEQUENCE.txt. A trajectory starts from
+/// the true pose, in the truth's frame and on the clock of the sequence's files, and reaches to within 1 s of the end. One
+/// that is missing or cannot be compared is left out; the tables say how many were, and why.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet simulate --layout kaist --set test --out sequences && gyronet tables sequences --out report
-  gyronet tables urban14 urban15 --json")]
+  gyronet tables urban14 urban15 --json
+  gyronet tables sequences --method lwoi=OUT/model --method mine=trajectories")]
 pub struct Args {
     /// Sequences, or folders that hold sequences.
     #[arg(required = true, value_name = "DIR")]
@@ -34,6 +42,9 @@ pub struct Args {
     /// Write report.html (one page with all tables and pictures) and each picture as SVG to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Put the trajectories of a folder into the tables under this name; for more methods give it again.
+    #[arg(long = "method", value_name = "NAME=FOLDER")]
+    methods: Vec<Given>,
     /// Weight file of GyroNet [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
@@ -53,6 +64,13 @@ fn title(sequence: &Sequence, number: usize) -> String {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
+    for (k, given) in args.methods.iter().enumerate() {
+        if args.methods[..k].iter().any(|other| other.method == given.method) {
+            return Err(format!("--method {}: this name is given twice", given.method.name).into());
+        }
+        // A folder without a sequence's trajectory is no error, a folder that is not there is.
+        fs::read_dir(&given.folder).map_err(|source| DataError::open(given.folder.display(), source))?;
+    }
     let weights = Weights::open(args.weights.as_deref())?;
     let mut network = GyroNet::new(weights.blob()?);
     let fog_weights = args.fog_weights.as_deref().map(WeightFile::read_fognet).transpose()?;
@@ -73,6 +91,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         let mut estimates = estimates::run(&sequence, &mut network, || bar.inc(1));
         estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
         bar.finish_and_clear();
+        args.methods.iter().for_each(|given| estimates.add_given(&sequence, given));
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
         if args.out.is_some() {
             drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)?));

@@ -123,6 +123,23 @@ pub enum DataFault {
     /// The calibration lacks a parameter, or the parameter is not a positive number.
     #[error("no usable parameter {0:?}")]
     Parameter(&'static str),
+    /// The four numbers of an attitude are no unit quaternion.
+    #[error("a quaternion of norm {norm:.3}, which is no attitude")]
+    Quaternion { norm: f64 },
+    /// Two poses of a trajectory are too far apart to interpolate between them.
+    #[error("{seconds:.2} s after the pose before, at most {most} s can be interpolated")]
+    FarApart { seconds: f64, most: f64 },
+    /// A trajectory does not cover what is compared.
+    #[error(
+        "has poses from {from_s:.2} to {to_s:.2} s, needed are {begin_s:.2} to {end_s:.2} s: its length or its clock is another's"
+    )]
+    Span { from_s: f64, to_s: f64, begin_s: f64, end_s: f64 },
+    /// A trajectory does not start from the true pose.
+    #[error("{metres:.2} m and {degrees:.1} deg from the truth at the start: its frame is another's")]
+    Frame { metres: f64, degrees: f64 },
+    /// A trajectory is further from the truth than the vehicle can have driven.
+    #[error("{metres:.0} m from the truth, where at most {most:.0} m are possible: it has diverged")]
+    Diverged { metres: f64, most: f64 },
     /// The request needs an inertial sensor, and the sequence has none.
     #[error("xsens_imu.csv has 8 columns: no gyro and no accelerometer")]
     NoGyro,

@@ -10,6 +10,10 @@ pub enum Gyro {
     Mems,
     /// The fibre-optic gyro.
     Fog,
+    /// None: the wheels alone.
+    Wheels,
+    /// That of another program, whose trajectory is given.
+    Given,
 }
 
 /// Names a method of computing a yaw rate.
@@ -32,6 +36,13 @@ const fn fog(key: &'static str, name: &'static str) -> Method {
 }
 
 impl Method {
+    /// Returns a method of another program. Its name lives as long as this one: a command line has few.
+    #[must_use]
+    pub fn given(name: &str) -> Self {
+        let name = String::leak(name.to_owned());
+        Self { key: name, name, gyro: Gyro::Given }
+    }
+
     /// The inertial sensor's gyro as it is.
     pub const RAW: Self = mems("raw", "raw gyro");
     /// The gyro less its mean over the first 3 s.
@@ -76,6 +87,8 @@ impl Method {
     /// FoGNet on the rate of [`Method::GYRONET_LOOP`], in the place of a fibre-optic gyro: the paper's future work.
     /// FoGNet was not trained on such rates.
     pub const PSEUDO_FOG: Self = mems("pseudo_fog", "FoGNet on GyroNet's rate");
+    /// The turn by the difference of the wheels' ways and their distance.
+    pub const WHEELS: Self = Self { key: "wheels", name: "wheels alone", gyro: Gyro::Wheels };
     /// FoGNet, its first minute padded.
     pub const FOGNET: Self = fog("fognet", "FoGNet");
     /// FoGNet, its first minute uncorrected.
@@ -96,7 +109,27 @@ impl Method {
         Self::NAVIGATION,
     ];
 
-    /// The classical methods among them.
+    /// The methods of a sequence, in the order of the paper's tables.
+    pub const ON_A_SEQUENCE: [Self; 16] = [
+        Self::RAW,
+        Self::STATIC,
+        Self::FIR,
+        Self::GYRONET,
+        Self::GYRONET_ONLINE,
+        Self::GYRONET_LOOP,
+        Self::VQF,
+        Self::VQF_VEHICLE,
+        Self::VENDOR,
+        Self::WHEELS,
+        Self::FOG,
+        Self::FOG_EARTH,
+        Self::FOG_DEFAULT,
+        Self::FOGNET,
+        Self::FOGNET_NOPAD,
+        Self::PSEUDO_FOG,
+    ];
+
+    /// The classical methods of a drive.
     pub const CLASSICAL: [Self; 6] =
         [Self::RAW, Self::STATIC, Self::STATIC_ZERO_RATE, Self::FIR, Self::FIR_ZERO_RATE, Self::VQF];
 }

@@ -16,6 +16,7 @@ mod track;
 mod utm;
 
 pub use export::{HEADER, write_csv};
+pub(super) use kaist::yaw;
 pub use summary::{Seen, Spread, StreamSummary};
 
 use crate::drive::DT;
@@ -75,6 +76,10 @@ pub struct Sequence {
     pub wheel_base: Option<f64>,
     /// Latitude of the first pose, deg, where poses are in UTM.
     pub latitude: Option<f64>,
+    /// The time of the first step, s since 1970.
+    pub start_s: f64,
+    /// The place of the first step in the truth's frame, m, east and north.
+    pub origin: [f64; 2],
     /// The steps, 10 ms apart.
     pub steps: Vec<Step>,
     /// Steps with a gap of the inertial sensor, the gyro, the wheels and the truth.
@@ -85,6 +90,8 @@ pub struct Sequence {
 
 /// Holds the open files of either layout.
 struct Files {
+    /// The time that the streams count from, s since 1970.
+    epoch_s: f64,
     imu: Box<dyn Stream<7>>,
     fog: Box<dyn Stream<1>>,
     wheels: Box<dyn Stream<2>>,
@@ -150,11 +157,11 @@ impl Sequence {
         };
         // In a simulated sequence the heading beside the sensor's data comes from no vendor's filter.
         let has_vendor = files.has_vendor && simulated.is_none();
-        let origin = files.origin()?;
+        let begin = files.begin()?;
         let mut steps = Vec::new();
         let mut in_gap = [0; 4];
         let mut last = None;
-        while let Some((now, gaps)) = files.at(origin + steps.len() as f64 * DT)? {
+        while let Some((now, gaps)) = files.at(begin + steps.len() as f64 * DT)? {
             for (count, gap) in in_gap.iter_mut().zip(gaps) {
                 *count += u64::from(gap);
             }
@@ -169,14 +176,12 @@ impl Sequence {
             let fault = DataFault::TooLittleInCommon { seconds, needed: NEEDED };
             return Err(DataError::of(folder.display(), fault));
         }
-        let mut latitude = None;
-        if let Some(Step { position: [x, y], .. }) = steps.first().copied() {
-            latitude = (layout == Layout::Kaist).then(|| utm::latitude_deg([x, y])).flatten();
-            for step in &mut steps {
-                step.position = [step.position[0] - x, step.position[1] - y];
-            }
+        let [x, y] = steps.first().map_or([0.0; 2], |step: &Step| step.position);
+        let latitude = (layout == Layout::Kaist).then(|| utm::latitude_deg([x, y])).flatten();
+        for step in &mut steps {
+            step.position = [step.position[0] - x, step.position[1] - y];
         }
-        let (wheel_base, has_gyro) = (files.wheel_base, files.has_gyro);
+        let (wheel_base, has_gyro, start_s) = (files.wheel_base, files.has_gyro, files.epoch_s + begin);
         let Files { imu, fog, wheels, truth, .. } = files;
         let files = [imu.finish()?, fog.finish()?, wheels.finish()?, truth.finish()?];
         let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
@@ -191,6 +196,8 @@ impl Sequence {
             has_vendor,
             wheel_base,
             latitude,
+            start_s,
+            origin: [x, y],
             steps,
             in_gap,
             files,
@@ -293,7 +300,7 @@ impl Values {
 
 impl Files {
     /// Returns the time of the first row of the inertial sensor that all files have reached.
-    fn origin(&mut self) -> Result<f64, DataError> {
+    fn begin(&mut self) -> Result<f64, DataError> {
         let others = [self.fog.first(), self.wheels.first(), self.truth.first()];
         let begin = others.into_iter().fold(self.imu.first(), f64::max);
         self.imu.at(begin)?;

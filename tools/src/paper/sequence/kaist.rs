@@ -44,8 +44,8 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
     let [imu, fog, encoder, pose] = PATHS.map(|path| folder.join(path));
     let parameters = EncoderParameters::read(&folder.join("calibration/EncoderParameter.txt"))?;
     let has_gyro = columns(&imu)? != ORIENTATION.columns;
-    let (imu, epoch) = if has_gyro { whole(&imu, progress)? } else { orientation(&imu, progress)? };
-    let epoch = Some(epoch);
+    let (imu, first) = if has_gyro { whole(&imu, progress)? } else { orientation(&imu, progress)? };
+    let epoch = Some(first);
     let mut turned = 0.0;
     let fog = Track::new(
         Rows::open(&fog, FOG, progress.clone())?,
@@ -78,6 +78,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
         }),
     )?;
     Ok(Files {
+        epoch_s: first as f64 / NANOS,
         imu,
         fog: Box::new(fog),
         wheels: Box::new(encoder),
@@ -113,7 +114,7 @@ fn orientation(path: &Path, progress: &Progress) -> Result<Imu, DataError> {
 }
 
 /// Returns the heading of a quaternion.
-fn yaw([x, y, z, w]: [f64; 4]) -> f64 {
+pub(in crate::paper) fn yaw([x, y, z, w]: [f64; 4]) -> f64 {
     libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 }
 

@@ -48,7 +48,8 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
             [fx, -fy, -fz, wx, -wy, -wz, 0.0]
         }),
     )?;
-    let epoch = Some(imu.epoch());
+    let first = imu.epoch();
+    let epoch = Some(first);
     let mut heading = Unwrap::default();
     let fog = Track::new(
         Rows::open(&fog, FOG, progress.clone())?,
@@ -78,6 +79,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
         }),
     )?;
     Ok(Files {
+        epoch_s: first as f64 / MICROS,
         imu: Box::new(imu),
         fog: Box::new(fog),
         wheels: Box::new(wheels),

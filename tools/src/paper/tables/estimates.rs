@@ -6,15 +6,17 @@
 //! accelerometer, bias learnt at rest; Laidig and Seel, VQF, Information Fusion 91, 2023), without a magnetometer, once
 //! with its published defaults and once with limits of rest that a vehicle with its engine running keeps.
 
+use super::given::Given;
 use crate::drive::DT;
 use crate::drive::recording::Recording;
 use crate::drive::replay::{Replay, Step};
 use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::fir::LowPass;
 use crate::evaluate::methods::Method;
+use crate::evaluate::trajectory_error::Point;
 use crate::evaluate::vqf;
 use crate::paper::fog_replay;
-use crate::paper::sequence::Sequence;
+use crate::paper::sequence::{self, Sequence};
 use crate::simulate::world::EARTH_RATE;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
 use gyronet::fog::FogConfig;
@@ -33,8 +35,11 @@ pub struct Estimate {
     pub method: Method,
     /// The angle turned in each step, from the first that is compared, rad.
     pub turns: Vec<f64>,
-    /// The run time, s.
-    pub run_time: f64,
+    /// The place after each of them, m from the first step's, of a trajectory that is given; without it, dead reckoning
+    /// makes the places.
+    pub places: Option<Vec<Point>>,
+    /// The run time on this machine, s.
+    pub run_time: Option<f64>,
 }
 
 /// Holds the estimates of all methods on a sequence.
@@ -44,6 +49,8 @@ pub struct Estimates {
     pub start: usize,
     /// The estimates of the methods that could be run.
     pub methods: Vec<Estimate>,
+    /// The methods whose given trajectory cannot be compared, and the reasons.
+    pub left_out: Vec<(Method, String)>,
     /// The reason why some methods could not be run.
     pub refused: Option<String>,
 }
@@ -52,13 +59,17 @@ pub struct Estimates {
 /// bias loop.
 pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl FnMut()) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
-    let mut estimates = Estimates { start, methods: Vec::new(), refused: None };
+    let mut estimates = Estimates { start, methods: Vec::new(), left_out: Vec::new(), refused: None };
     match sequence.recording() {
         Ok(recording) => estimates.inertial(sequence, &recording, network, &mut tick),
         Err(error) => estimates.refused = Some(error.to_string()),
     }
     if sequence.has_vendor {
         estimates.add(Method::VENDOR, || rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
+    }
+    if let Some(base) = sequence.wheel_base {
+        let turn = |step: &sequence::Step| (step.wheels[1] - step.wheels[0]) / base;
+        estimates.add(Method::WHEELS, || sequence.steps.iter().map(|step| turn(step) / DT).collect());
     }
     let fog: Vec<f64> = sequence.steps.iter().map(|step| step.fog / DT).collect();
     estimates.add(Method::FOG, || fog.clone());
@@ -88,16 +99,15 @@ impl Estimates {
         {
             let config = FogConfig { padding, ..FogConfig::DEFAULT };
             let (drive, run_time) = timed(|| fog_replay::run(sequence, network, config, &mut tick));
-            let turns = drive.turns[self.start..].to_vec();
-            self.methods.push(Estimate { method, turns, run_time });
+            self.push(method, drive.turns[self.start..].to_vec(), run_time);
         }
         self.add_pseudo_fog(sequence, network, tick);
     }
 
     /// Adds FoGNet on GyroNet's rate, if there is one; `tick` is called for each step.
     fn add_pseudo_fog(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, tick: impl FnMut()) {
-        let Some(looped) = self.methods.iter().find(|estimate| estimate.method == Method::GYRONET_LOOP)
-        else {
+        let looped = self.methods.iter().find(|estimate| estimate.method == Method::GYRONET_LOOP);
+        let Some((looped, looped_s)) = looped.and_then(|looped| Some((looped, looped.run_time?))) else {
             return;
         };
         let mut sequence = sequence.clone();
@@ -105,8 +115,7 @@ impl Estimates {
             step.fog = *turn;
         }
         let (drive, run_time) = timed(|| fog_replay::run(&sequence, network, FogConfig::DEFAULT, tick));
-        let turns = drive.turns[self.start..].to_vec();
-        self.methods.push(Estimate { method: Method::PSEUDO_FOG, turns, run_time });
+        self.push(Method::PSEUDO_FOG, drive.turns[self.start..].to_vec(), looped_s + run_time);
     }
 
     /// Runs the methods that start from the inertial sensor.
@@ -148,10 +157,7 @@ impl Estimates {
                         }),
                     ),
                 ] {
-                    self.add(method, || rates);
-                    if let Some(estimate) = self.methods.last_mut() {
-                        estimate.run_time = run_time;
-                    }
+                    self.push(method, self.turns(&rates), run_time);
                 }
             }
             Err(error) => self.refused = Some(error.to_string()),
@@ -176,8 +182,24 @@ impl Estimates {
     /// Adds a method from the rates of all steps, rad/s.
     fn add(&mut self, method: Method, rates: impl FnOnce() -> Vec<f64>) {
         let (rates, run_time) = timed(rates);
-        let turns = rates[self.start..].iter().map(|rate| rate * DT).collect();
-        self.methods.push(Estimate { method, turns, run_time });
+        self.push(method, self.turns(&rates), run_time);
+    }
+
+    /// Returns the turns of the steps that are compared.
+    fn turns(&self, rates: &[f64]) -> Vec<f64> {
+        rates[self.start..].iter().map(|rate| rate * DT).collect()
+    }
+
+    fn push(&mut self, method: Method, turns: Vec<f64>, run_time: f64) {
+        self.methods.push(Estimate { method, turns, places: None, run_time: Some(run_time) });
+    }
+
+    /// Adds another program's trajectory, or the reason why it cannot be compared.
+    pub fn add_given(&mut self, sequence: &Sequence, given: &Given) {
+        match given.estimate(sequence, self.start) {
+            Ok(estimate) => self.methods.push(estimate),
+            Err(error) => self.left_out.push((given.method, error.to_string())),
+        }
     }
 }
 

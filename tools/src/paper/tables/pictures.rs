@@ -43,10 +43,13 @@ pub struct Picture {
 pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Result<Vec<Picture>, PlotError> {
     let simulated = if errors.simulated { " (simulated)" } else { "" };
     let name = format!("{}{simulated}", errors.name);
-    // A gyro with its bias does not fit a scale that shows the others.
-    let in_scale = |path: &&Path| path.method.is_none_or(|method| method != Method::RAW);
+    // A gyro with its bias and the wheels' turn do not fit a scale that shows the others.
+    let in_scale =
+        |path: &&Path| path.method.is_none_or(|method| ![Method::RAW, Method::WHEELS].contains(&method));
     let of = |gyro: Gyro| {
-        let is_wanted = move |path: &&Path| path.method.is_none_or(|method| method.gyro == gyro);
+        let is_wanted = move |path: &&Path| {
+            path.method.is_none_or(|method| method.gyro == gyro || method.gyro == Gyro::Given)
+        };
         paths.iter().filter(is_wanted).filter(in_scale).collect::<Vec<&Path>>()
     };
     let start = sequence.seconds() - errors.seconds;

@@ -27,8 +27,21 @@ pub struct Errors {
     pub aligned_ate_m: f64,
     /// The mean distance after alignment, m.
     pub aligned_ate_mean_m: f64,
-    /// The run time on this machine, s.
-    pub run_time_s: f64,
+    /// The run time on this machine, s; `None` where a trajectory was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run_time_s: Option<f64>,
+}
+
+/// Names the group that a sequence is averaged with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Group {
+    /// The paper's first sequences, and simulated ones of the first device.
+    First,
+    /// Urban18 and later: the paper calls them newly released, and nothing says that their sensors are others.
+    NewlyReleased,
+    /// Simulated sequences of other devices.
+    OtherDevices,
 }
 
 /// Maps the key of a method to its errors.
@@ -54,9 +67,8 @@ pub struct SequenceErrors {
     pub layout: Layout,
     /// Says whether the sequence is simulated.
     pub simulated: bool,
-    /// Says whether its sensors differ from those of the paper's first sequences: urban18 and later, or a simulated
-    /// device other than the first.
-    pub other_devices: bool,
+    /// The group that it is averaged with.
+    pub group: Group,
     /// The length of the comparison, s.
     pub seconds: f64,
     /// The distance by its wheels, m.
@@ -66,6 +78,9 @@ pub struct SequenceErrors {
     pub refused: Option<String>,
     /// The errors.
     pub methods: ByMethod,
+    /// The reasons why given trajectories could not be compared, by the keys of their methods.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub left_out: BTreeMap<&'static str, String>,
     /// The methods in the order of the tables.
     #[serde(skip)]
     pub order: Vec<Method>,
@@ -86,7 +101,7 @@ impl SequenceErrors {
             vec![Path { method: None, yaw: steps.iter().map(|step| step.yaw).collect(), points: truth }];
         for estimate in &estimates.methods {
             let mut track = Track { position: begin, yaw: heading };
-            let (yaw, points): (Vec<f64>, Vec<Point>) = steps
+            let (yaw, mut points): (Vec<f64>, Vec<Point>) = steps
                 .iter()
                 .zip(&estimate.turns)
                 .map(|(step, turned)| {
@@ -94,6 +109,9 @@ impl SequenceErrors {
                     (track.yaw, track.position)
                 })
                 .unzip();
+            if let Some(places) = &estimate.places {
+                points.clone_from(places);
+            }
             if let Some(errors) = Errors::new(turns, estimate, &points, &paths[0].points) {
                 methods.insert(estimate.method.key, errors);
                 order.push(estimate.method);
@@ -104,10 +122,11 @@ impl SequenceErrors {
             name: sequence.name.clone(),
             layout: sequence.layout,
             simulated: sequence.simulated.is_some(),
-            other_devices: other_devices(sequence),
+            group: Group::of(sequence),
             seconds: steps.len() as f64 * crate::drive::DT,
             metres: steps.iter().map(|step| (step.wheels[0] + step.wheels[1]).abs() / 2.0).sum(),
             refused: estimates.refused.clone(),
+            left_out: estimates.left_out.iter().map(|(method, why)| (method.key, why.clone())).collect(),
             methods,
             order,
         };
@@ -115,13 +134,14 @@ impl SequenceErrors {
     }
 }
 
-fn other_devices(sequence: &Sequence) -> bool {
-    match &sequence.simulated {
-        Some(spec) => spec.device != 1,
-        None => {
-            let number = sequence.name.trim_start_matches(|c: char| !c.is_ascii_digit());
-            sequence.layout == Layout::Kaist && number.parse().is_ok_and(|number: u32| number >= 18)
+impl Group {
+    fn of(sequence: &Sequence) -> Self {
+        if let Some(spec) = &sequence.simulated {
+            return if spec.device == 1 { Self::First } else { Self::OtherDevices };
         }
+        let number = sequence.name.trim_start_matches(|c: char| !c.is_ascii_digit());
+        let is_new = sequence.layout == Layout::Kaist && number.parse().is_ok_and(|number: u32| number >= 18);
+        if is_new { Self::NewlyReleased } else { Self::First }
     }
 }
 
@@ -132,6 +152,8 @@ impl Errors {
         points: &[Point],
         truth: &[Point],
     ) -> Option<Self> {
+        // A trajectory that is given may end before the sequence.
+        let (turns, truth) = (turns.get(..points.len())?, truth.get(..points.len())?);
         let rates = |turns: &[f64]| turns.iter().map(|turn| turn / crate::drive::DT).collect::<Vec<f64>>();
         let yaw = YawError::new(&rates(&estimate.turns), &rates(turns))?;
         let ate = TrajectoryError::new(points, truth)?;
@@ -158,7 +180,11 @@ impl Errors {
             ate_mean_m: mean(|e| e.ate_mean_m),
             aligned_ate_m: mean(|e| e.aligned_ate_m),
             aligned_ate_mean_m: mean(|e| e.aligned_ate_mean_m),
-            run_time_s: mean(|e| e.run_time_s),
+            run_time_s: errors
+                .iter()
+                .map(|e| e.run_time_s)
+                .sum::<Option<f64>>()
+                .map(|sum| sum / errors.len() as f64),
         }
     }
 }

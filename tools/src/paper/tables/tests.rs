@@ -1,5 +1,5 @@
 use super::estimates::{Estimate, Estimates};
-use super::results::{Path, Results, SequenceErrors};
+use super::results::{Group, Path, Results, SequenceErrors};
 use super::{estimates, html, pictures, table};
 use crate::evaluate::methods::Method;
 use crate::paper::sequence::{Sequence, Step, StreamSummary};
@@ -60,6 +60,8 @@ fn exact() -> Sequence {
         has_vendor: true,
         wheel_base: None,
         latitude: None,
+        start_s: 1.5e9,
+        origin: [0.0; 2],
         steps: (0..6_000).map(step).collect(),
         in_gap: [0; 4],
         files: [file(), file(), file(), file()],
@@ -70,13 +72,13 @@ fn exact() -> Sequence {
 fn the_truth_has_no_error() {
     let sequence = exact();
     let turns = sequence.turns()[300..].to_vec();
-    let truth = Estimate { method: Method::FOG, turns, run_time: 0.0 };
-    let estimates = Estimates { start: 300, methods: vec![truth], refused: None };
+    let truth = Estimate { method: Method::FOG, turns, places: None, run_time: Some(0.0) };
+    let estimates = Estimates { start: 300, methods: vec![truth], left_out: Vec::new(), refused: None };
     let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
     let fog = errors.methods["fog"];
     assert!(fog.ate_m < 1e-9 && fog.aligned_ate_m < 1e-9 && fog.mean_1s_rad < 1e-12, "{fog:?}");
     assert_eq!(paths[0].points.len(), 5_700);
-    assert!(errors.other_devices && !errors.simulated);
+    assert!(errors.group == Group::NewlyReleased && !errors.simulated);
     assert!((errors.metres - 560.0).abs() < 0.2, "{}", errors.metres);
 }
 
@@ -97,6 +99,26 @@ fn each_method_does_what_it_says() {
     let earth = 7.292_115e-5 * 36.37f64.to_radians().sin() * seconds;
     assert!((final_rad("fog_earth") - earth).abs() < 1e-9, "nothing to take off here");
     assert!(errors.methods["fog"].ate_m < 1e-6);
+}
+
+#[test]
+fn wheels_alone_turn_by_their_difference() {
+    let mut sequence = exact();
+    sequence.wheel_base = Some(1.5);
+    for step in &mut sequence.steps {
+        let [left, right] = &mut step.wheels;
+        (*left, *right) = (*left - 0.75 * step.fog, *right + 0.75 * step.fog);
+    }
+    let estimates = estimates::run(&sequence, &mut Nothing, || {});
+    let (errors, _) = SequenceErrors::new(&sequence, &estimates);
+    let wheels = errors.methods["wheels"];
+    assert!(wheels.final_unwrapped_rad < 1e-9 && wheels.ate_m < 1e-6, "{wheels:?}");
+    // A base that is wrong by a tenth is a turn that is.
+    sequence.wheel_base = Some(1.5 / 1.1);
+    let estimates = estimates::run(&sequence, &mut Nothing, || {});
+    let (errors, _) = SequenceErrors::new(&sequence, &estimates);
+    let turned: f64 = sequence.turns()[300..].iter().sum();
+    assert!((errors.methods["wheels"].final_unwrapped_rad - 0.1 * turned.abs()).abs() < 1e-9, "{errors:?}");
 }
 
 #[test]
@@ -122,6 +144,7 @@ fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
         let (mut errors, _) = SequenceErrors::new(&sequence, &estimates);
         let fognet = errors.methods["fog"];
         errors.methods.insert(Method::FOGNET.key, fognet);
+        errors.order.push(Method::FOGNET);
         errors
     };
     let tables = table::tables(&Results::new(vec![of("urban15"), of("urban18")]));
@@ -132,8 +155,13 @@ fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
     assert!(rivals.rows.iter().all(|row| row.figures.iter().all(Option::is_some)));
     let recomputed = rivals.paper_rows.last().expect("the paper's rows");
     assert_eq!(recomputed.figures[1], Some(9.0), "printed: 10");
-    assert_eq!(titled("Table V:").title, "Table V: average ATE on sequences recorded later, 1 sequences, m");
-    assert!(titled("Table V:").notes[0].contains("simulated"), "{:?}", titled("Table V:").notes);
+    assert!(rivals.notes[0].contains("15.7 and 9.0, printed are 22 and 10"), "{:?}", rivals.notes);
+    let later = titled("Table V:");
+    assert_eq!(later.title, "Table V: average ATE on newly released sequences, 1 sequences, m");
+    for table in [rivals, later] {
+        assert!(table.notes.iter().any(|note| note.contains("trained on simulated")), "{:?}", table.notes);
+        assert!(table.notes.iter().any(|note| note.contains("prediction less")), "{:?}", table.notes);
+    }
 }
 
 #[test]
@@ -168,7 +196,7 @@ fn json_and_tables_of_simulated_sequences() {
 
     let tables = table::tables(&results);
     let titles: Vec<&str> = tables.iter().map(|table| table.title.split(':').next().unwrap()).collect();
-    assert_eq!(titles, ["Table I", "Table I", "Table II", "Table VI", "Table VII"]);
+    assert_eq!(titles, ["Table I", "Table I", "Table II", "Table VI", "Table VII"], "no FoGNet, no Table IV");
     for table in &tables {
         assert!(table.to_string().lines().next().unwrap().ends_with("(simulated)"));
         let columns = table.columns.len();

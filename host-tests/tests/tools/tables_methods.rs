@@ -1,0 +1,271 @@
+//! `gyronet tables --method`: another program's trajectories in the tables, on simulated sequences. The truth has no
+//! error, a known error is found, evo finds the same, and what cannot be compared is named and never a number.
+
+use gyronet::odometry::Track;
+use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::require::skipped;
+use gyronet_tools::evaluate::trajectory_error::Point;
+use gyronet_tools::paper::sequence::Sequence;
+use gyronet_tools::paper::tables::estimates::Estimates;
+use gyronet_tools::paper::tables::given::Given;
+use gyronet_tools::paper::tables::results::{Errors, Results, SequenceErrors};
+use gyronet_tools::paper::tables::table;
+use gyronet_tools::simulate::layout::{self, Layout, Spec};
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The methods are compared from here on.
+const START: usize = 300;
+const NAME: &str = "other program";
+
+/// A folder that is removed with it.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(name: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("tables_methods_{name}"));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+
+    /// Simulates a sequence of two minutes.
+    fn sequence(&self, layout: Layout, name: &str) -> Sequence {
+        let spec = Spec { layout, name: name.into(), seconds: 120, device: 1, run: 5 };
+        let folder = self.0.join(format!("{layout:?}")).join(name);
+        layout::write(&spec, &folder, || {}).unwrap();
+        Sequence::read(&folder, |_| {}).unwrap()
+    }
+
+    fn given(&self) -> Given {
+        format!("{NAME}={}", self.0.display()).parse().unwrap()
+    }
+
+    fn write(&self, sequence: &Sequence, rows: &[String]) {
+        fs::write(self.0.join(format!("{}.txt", sequence.name)), rows.join("\n")).unwrap();
+    }
+
+    fn errors(&self, sequence: &Sequence) -> SequenceErrors {
+        let mut estimates =
+            Estimates { start: START, methods: Vec::new(), left_out: Vec::new(), refused: None };
+        estimates.add_given(sequence, &self.given());
+        SequenceErrors::new(sequence, &estimates).0
+    }
+
+    fn compared(&self, sequence: &Sequence) -> Errors {
+        let errors = self.errors(sequence);
+        assert!(errors.left_out.is_empty(), "{:?}", errors.left_out);
+        errors.methods[NAME]
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Returns a row of the format for each step; places are from the sequence's first.
+fn rows(sequence: &Sequence, pose: impl Fn(usize) -> (Point, f64)) -> Vec<String> {
+    let row = |k: usize| {
+        let ([x, y], yaw) = pose(k);
+        let (time, [east, north]) = (sequence.start_s + k as f64 * 0.01, sequence.origin);
+        let (z, w) = (yaw / 2.0).sin_cos();
+        let mut row = String::new();
+        write!(row, "{time:.6} {:.6} {:.6} 61.5 0 0 {z:.9} {w:.9}", east + x, north + y).unwrap();
+        row
+    };
+    (0..sequence.steps.len()).map(row).collect()
+}
+
+fn truth(sequence: &Sequence) -> Vec<String> {
+    rows(sequence, |k| (sequence.steps[k].position, sequence.steps[k].yaw))
+}
+
+#[test]
+fn the_truth_has_no_error_in_either_layout() {
+    let scratch = Scratch::new("truth");
+    for (layout, name) in [(Layout::Kaist, "k"), (Layout::Nclt, "n")] {
+        let sequence = scratch.sequence(layout, name);
+        // As lwoi writes: whole seconds, so a little less than the sequence.
+        let mut rows = truth(&sequence);
+        rows.truncate(rows.len() - 95);
+        scratch.write(&sequence, &rows);
+        let errors = scratch.compared(&sequence);
+        assert!(errors.ate_m < 1e-4 && errors.aligned_ate_m < 1e-4, "{name}: {errors:?}");
+        assert!(errors.mean_1s_rad < 1e-7 && errors.final_unwrapped_rad < 1e-6, "{name}: {errors:?}");
+        assert_eq!(errors.run_time_s, None);
+    }
+}
+
+#[test]
+fn a_known_error_is_found() {
+    let scratch = Scratch::new("known");
+    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let steps = &sequence.steps;
+    let shifted = rows(&sequence, |k| {
+        let ([x, y], turned) = (steps[k].position, if k > 5_000 { 0.02 } else { 0.0 });
+        ([x + 0.3, y - 0.4], steps[k].yaw + turned)
+    });
+    scratch.write(&sequence, &shifted);
+    let errors = scratch.compared(&sequence);
+    assert!((errors.ate_m - 0.5).abs() < 1e-5 && (errors.ate_mean_m - 0.5).abs() < 1e-5, "{errors:?}");
+    assert!(errors.aligned_ate_m < 1e-4, "{errors:?}");
+    assert!((errors.final_rad - 0.02).abs() < 1e-6, "{errors:?}");
+    // It turns wrongly in one second of all.
+    let seconds = ((steps.len() - START) / 100) as f64;
+    assert!((errors.mean_1s_rad - 0.02 / seconds).abs() < 1e-6, "{errors:?}");
+
+    // A heading that is wrong from the start counts at the end, and is no frame of its own yet.
+    scratch.write(&sequence, &rows(&sequence, |k| (steps[k].position, steps[k].yaw + 0.05)));
+    let errors = scratch.compared(&sequence);
+    assert!((errors.final_rad - 0.05).abs() < 1e-6 && errors.ate_m < 1e-4, "{errors:?}");
+}
+
+#[test]
+fn ten_poses_a_second_are_enough() {
+    let scratch = Scratch::new("slow");
+    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let slow: Vec<String> = truth(&sequence).into_iter().step_by(10).collect();
+    scratch.write(&sequence, &slow);
+    let errors = scratch.compared(&sequence);
+    assert!(errors.ate_m < 0.005, "{errors:?}");
+}
+
+#[test]
+fn evo_finds_the_same_error() {
+    let test = "evo_finds_the_same_error";
+    let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    // evo brings 300 MB of packages with it, so no machine must have it.
+    let check = Command::new(&python).args(["-c", "import evo"]).output();
+    if !check.is_ok_and(|output| output.status.success()) {
+        return skipped(test, &format!("{python} has no evo"));
+    }
+    let scratch = Scratch::new("evo");
+    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let mut track = Track { position: [0.0; 2], yaw: sequence.steps[0].yaw };
+    let path: Vec<Track> = sequence
+        .steps
+        .iter()
+        .map(|step| {
+            track.step(step.wheels, step.fog + 5e-6);
+            track
+        })
+        .collect();
+    scratch.write(&sequence, &rows(&sequence, |k| (path[k].position, path[k].yaw)));
+    let errors = scratch.compared(&sequence);
+    let truth_file = scratch.0.join("truth.tum");
+    fs::write(&truth_file, truth(&sequence)[START..].join("\n")).unwrap();
+    let script = workspace().join("host-tests/tests/clients/evo_ate.py");
+    let output = Command::new(python).arg(script).arg(truth_file).arg(scratch.0.join("k.txt")).output();
+    let output = output.unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let evo: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(evo["poses"], sequence.steps.len() - START);
+    assert!(errors.ate_m > 2.0 * errors.aligned_ate_m && errors.aligned_ate_m > 0.1, "{errors:?}");
+    for (name, ours) in [
+        ("ate_m", errors.ate_m),
+        ("ate_mean_m", errors.ate_mean_m),
+        ("aligned_ate_m", errors.aligned_ate_m),
+        ("aligned_ate_mean_m", errors.aligned_ate_mean_m),
+    ] {
+        // Stamps are printed to a microsecond, and our places are on the line between two rows.
+        assert!((ours - evo[name].as_f64().unwrap()).abs() < 1e-5, "{name}: {ours} {evo}");
+    }
+}
+
+#[test]
+fn what_cannot_be_compared_is_left_out_and_named() {
+    let scratch = Scratch::new("bad");
+    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let good = truth(&sequence);
+    let steps = &sequence.steps;
+    let shifted = |seconds: f64| {
+        let later = Sequence { start_s: sequence.start_s + seconds, ..sequence.clone() };
+        truth(&later)
+    };
+    let with = |line: usize, row: &str| {
+        let mut rows = good.clone();
+        rows[line - 1] = row.into();
+        rows
+    };
+    let nan = good[4_000].replace(" 61.5 ", " NaN ");
+    let mut swapped = good.clone();
+    swapped.swap(500, 501);
+    let mut holed = good.clone();
+    holed.drain(700..760);
+    let far = rows(&sequence, |k| {
+        let [x, y] = steps[k].position;
+        (if k < 9_000 { [x, y] } else { [x + 3e4, y] }, steps[k].yaw)
+    });
+    let turned = rows(&sequence, |k| (steps[k].position, steps[k].yaw + 0.5));
+    let own_frame =
+        rows(&Sequence { origin: [0.0; 2], ..sequence.clone() }, |k| (steps[k].position, steps[k].yaw));
+    for (rows, expected) in [
+        (good[..9_000].to_vec(), "k.txt: has poses from 1524000000.01 to 1524000090.00 s, needed are"),
+        (good[1_000..].to_vec(), "k.txt: has poses from 1524000010.01 to"),
+        (shifted(-86_400.0), "k.txt: has poses from 1523913600.01 to"),
+        (shifted(-1.524e9), "k.txt: has poses from 0.01 to 119.99 s, needed are 1524000003.00 to"),
+        (own_frame, "k.txt: line 299: 4040624.95 m and 0.0 deg from the truth at the start"),
+        (turned, "k.txt: line 299: 0.00 m and 28.6 deg from the truth at the start"),
+        (with(4_001, &nan), "k.txt: line 4001, column z: \"NaN\" is not finite"),
+        (with(4_001, "1.5 0"), "k.txt: line 4001: 2 columns, expected 8"),
+        (with(4_001, "\u{7f}"), "k.txt: line 4001: 1 columns, expected 8"),
+        (swapped, "k.txt: line 502: time goes backwards from"),
+        (holed, "k.txt: line 701: 0.61 s after the pose before"),
+        (far, "k.txt: line 9001: 29999 m from the truth, where at most 1903 m are possible"),
+        (Vec::new(), "k.txt: holds no samples"),
+    ] {
+        scratch.write(&sequence, &rows);
+        let errors = scratch.errors(&sequence);
+        let why = errors.left_out.get(NAME).unwrap_or_else(|| panic!("no fault, expected {expected}"));
+        assert!(why.contains(expected), "{why}\nis not {expected}");
+        assert!(errors.methods.is_empty() && errors.order.is_empty());
+    }
+    fs::remove_file(scratch.0.join("k.txt")).unwrap();
+    let why = &scratch.errors(&sequence).left_out[NAME];
+    assert!(why.ends_with("k.txt: missing"), "{why}");
+}
+
+#[test]
+fn the_tables_count_what_was_left_out() {
+    let scratch = Scratch::new("counted");
+    let sequences = ["a", "b"].map(|name| scratch.sequence(Layout::Kaist, name));
+    scratch.write(&sequences[0], &truth(&sequences[0]));
+    let both = sequences.each_ref().map(|sequence| scratch.errors(sequence));
+    let tables = table::tables(&Results::new(both.to_vec()));
+    let titles: Vec<&str> = tables.iter().map(|table| table.title.split(':').next().unwrap()).collect();
+    assert_eq!(titles, ["Table I", "Table II", "Table IV", "Table VI"]);
+    for table in &tables[..3] {
+        let note = table.notes.iter().position(|note| note == "other program: 1 of 2 sequences left out");
+        let note = note.unwrap_or_else(|| panic!("{}: {:?}", table.title, table.notes));
+        assert!(table.notes[note + 1].ends_with("b.txt: missing"), "{:?}", table.notes);
+        // No number for what was left out, nor for a mean over one of two.
+        let last = table.rows.last().unwrap();
+        assert!(last.figures.iter().all(Option::is_none), "{table}");
+        assert!(table.to_string().contains(NAME), "{table}");
+    }
+    assert!(tables[1].rows[0].figures.iter().all(Option::is_some), "{}", tables[1]);
+    assert!(tables[1].rows[1].figures.iter().all(Option::is_none), "{}", tables[1]);
+
+    let alone = table::tables(&Results::new(both[..1].to_vec()));
+    assert_eq!(alone[0].rows[0].name, NAME);
+    assert!(alone[0].rows[0].figures.iter().all(Option::is_some), "{}", alone[0]);
+}
+
+#[test]
+fn a_name_is_one_of_its_own() {
+    for (text, expected) in [
+        ("mine", "expected NAME=FOLDER"),
+        ("=folder", "expected NAME=FOLDER"),
+        ("mine=", "expected NAME=FOLDER"),
+        ("fognet=folder", "\"fognet\" is a method of our own"),
+        ("FoGNet=folder", "\"FoGNet\" is a method of our own"),
+    ] {
+        assert_eq!(text.parse::<Given>().unwrap_err().to_string(), expected);
+    }
+    let given: Given = "mine=a=b".parse().unwrap();
+    assert_eq!((given.method.name, given.folder), ("mine", PathBuf::from("a=b")));
+}

@@ -1,0 +1,75 @@
+//! This module holds the remarks below the tables: what differs from the paper, and which trajectories were left out.
+
+use super::paper;
+use super::results::{ByMethod, SequenceErrors};
+use crate::evaluate::methods::{Gyro, Method};
+use std::collections::BTreeSet;
+
+/// The remarks on every table with FoGNet in it.
+const FOGNET: [&str; 2] = [
+    "Our FoGNet gives what the gyro has erred by, which is taken off; the paper's gives the prediction less the \
+     measurement, which is added.",
+    "FoGNet's bundled weights were trained on simulated sequences of KAIST's layout.",
+];
+
+/// Adds the remarks on FoGNet and on the trajectories left out.
+pub fn with_fognet(set: &[&SequenceErrors], notes: &[&str]) -> Vec<String> {
+    notes.iter().chain(&FOGNET).map(|note| (*note).to_owned()).chain(left_out(set)).collect()
+}
+
+/// Makes the remarks on Table I.
+pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
+    let mut notes: Vec<String> = [
+        "The paper's figures are for KAIST Urban. Its errors are against the FoG, ours against the data set's truth.",
+        "Unlike the paper's, our GyroNet and our FIR get readings less the mean of static initialisation.",
+        "GyroNet's bundled weights were trained on real drives of another car with another sensor.",
+    ]
+    .map(String::from)
+    .into();
+    let [still, network, looped] = ["static", "gyronet", "gyronet_loop"].map(|key| means.get(key));
+    if let (Some(still), Some(network), Some(looped)) = (still, network, looped) {
+        notes.push(format!(
+            "GyroNet's error in 1 s is {:.3} of that of static initialisation, {:.3} with the bias loop; \
+             in the paper {:.3}.",
+            network.mean_1s_rad / still.mean_1s_rad,
+            looped.mean_1s_rad / still.mean_1s_rad,
+            paper::GYRONET_TO_STATIC
+        ));
+    }
+    if set.iter().any(|sequence| !sequence.methods.contains_key(Method::VENDOR.key)) {
+        notes.push("VQF stands in for the vendor's filter, whose heading these data do not have.".into());
+    }
+    notes.extend(set.iter().filter_map(|s| Some(format!("{}: {}", s.name, s.refused.as_ref()?))));
+    notes.extend(with_fognet(set, &[]));
+    notes
+}
+
+/// Makes the remarks on Table IV.
+pub fn rivals(set: &[&SequenceErrors]) -> Vec<String> {
+    let own = paper::average(&paper::RINS_W);
+    let printed = paper::RINS_W_AVERAGE.figures;
+    let averages = format!(
+        "The paper's averages of RINS-W do not follow from its rows: they have {:.1} and {:.1}, printed are {} and {}.",
+        own[0], own[1], printed[0], printed[1]
+    );
+    let other = "The paper's rows are rounded from its Table II, but for urban16, where that has 18.08 in place of 19.";
+    let mean = "The paper speaks of the mean ATE here; ours is the rmse, and the JSON has both.";
+    let mut notes = with_fognet(set, &[&averages, other, mean]);
+    if !set.iter().flat_map(|sequence| &sequence.order).any(|method| method.gyro == Gyro::Given) {
+        notes.push("Other methods stand beside ours with --method NAME=FOLDER; python -m gyronet_train.rinsw and .lwoi train those rivals."
+                .into());
+    }
+    notes
+}
+
+/// Says for each given method on how many sequences it was left out, and why.
+fn left_out(set: &[&SequenceErrors]) -> Vec<String> {
+    let methods: BTreeSet<&str> = set.iter().flat_map(|s| s.left_out.keys().copied()).collect();
+    let mut notes = Vec::new();
+    for method in methods {
+        let reasons: Vec<&String> = set.iter().filter_map(|s| s.left_out.get(method)).collect();
+        notes.push(format!("{method}: {} of {} sequences left out", reasons.len(), set.len()));
+        notes.extend(reasons.into_iter().map(|why| format!("  {why}")));
+    }
+    notes
+}
