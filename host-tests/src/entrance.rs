@@ -14,6 +14,7 @@ mod sensors;
 mod sequences;
 mod service;
 mod slcan;
+mod trajectory;
 mod weights;
 
 /// Holds a named input.
@@ -33,7 +34,7 @@ pub struct Entrance {
 }
 
 /// All entrances.
-pub const ALL: [Entrance; 17] = [
+pub const ALL: [Entrance; 18] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "dsp3000", run: sensors::dsp3000, seeds: sensors::dsp3000_seeds, mutations: 20_000 },
@@ -56,6 +57,7 @@ pub const ALL: [Entrance; 17] = [
     Entrance { name: "recording", run: recording::csv, seeds: recording::seeds, mutations: 1_000 },
     Entrance { name: "logs", run: logs::file, seeds: logs::seeds, mutations: 2_000 },
     Entrance { name: "sequences", run: sequences::folder, seeds: sequences::seeds, mutations: 300 },
+    Entrance { name: "trajectory", run: trajectory::tum, seeds: trajectory::seeds, mutations: 20_000 },
 ];
 
 /// Runs an entrance by its name.

@@ -1,5 +1,5 @@
 //! This module compensates wheels and fibre-optic gyro together, which the paper names as future work: four numbers, fitted
-//! to the truth of training sequences by least squares over spans of [`SPAN`] steps.
+//! to the truth of training sequences by least squares over spans of 10 s.
 //!
 //! The turn is a share of the gyro's, a share of the difference of the wheels' ways (which holds their distance and their
 //! diameters), and a constant (which holds the Earth's rate and the gyro's bias); the way is that of the wheels times a
