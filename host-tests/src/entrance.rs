@@ -13,6 +13,7 @@ mod records;
 mod sensors;
 mod sequences;
 mod slcan;
+mod trajectory;
 mod weights;
 
 /// Holds a named input.
@@ -32,7 +33,7 @@ pub struct Entrance {
 }
 
 /// All entrances.
-pub const ALL: [Entrance; 16] = [
+pub const ALL: [Entrance; 17] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "dsp3000", run: sensors::dsp3000, seeds: sensors::dsp3000_seeds, mutations: 20_000 },
@@ -54,6 +55,7 @@ pub const ALL: [Entrance; 16] = [
     Entrance { name: "recording", run: recording::csv, seeds: recording::seeds, mutations: 1_000 },
     Entrance { name: "logs", run: logs::file, seeds: logs::seeds, mutations: 2_000 },
     Entrance { name: "sequences", run: sequences::folder, seeds: sequences::seeds, mutations: 300 },
+    Entrance { name: "trajectory", run: trajectory::tum, seeds: trajectory::seeds, mutations: 20_000 },
 ];
 
 /// Runs an entrance by its name.

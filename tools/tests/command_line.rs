@@ -57,6 +57,7 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["simulate", "--out", "a.csv", "--seconds", "1"],
         &["device", "info"],
         &["evaluate", "a.csv", "--lags", "--ablation"],
+        &["tables", "urban14", "--method", "mine"],
     ] {
         let output = gyronet(wrong);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", text(&output.stderr));
@@ -69,6 +70,7 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["simulate", "--out", "/nowhere/drive.csv"],
         &["import", "kaist", "/nowhere"],
         &["tables", "/nowhere"],
+        &["tables", "urban14", "--method", "mine=/nowhere"],
         &["quantize", "/nowhere/a.safetensors", "--out", "/nowhere/a.blob"],
         &["monitor", "/nowhere/can.log"],
         &["size", "--elf", "/nowhere/image"],
@@ -144,4 +146,25 @@ fn bash_completes() {
     let script = script.replace("/dev/stdin", &path);
     let output = Command::new("bash").args(["--norc", "-c", &script]).output().unwrap();
     assert_eq!(text(&output.stdout).trim(), "evaluate", "{}", text(&output.stderr));
+}
+
+#[test]
+fn tables_fit_to_training_sequences_and_take_other_methods() {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("tables");
+    let _ = std::fs::remove_dir_all(&folder);
+    let [sequence, methods] = ["one", "methods"].map(|name| folder.join(name).display().to_string());
+    std::fs::create_dir_all(&methods).unwrap();
+    let made = gyronet(&["simulate", "--layout", "kaist", "--minutes", "1", "--out", &sequence]);
+    assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
+    let mine = format!("mine={methods}");
+    let output = gyronet(&["tables", &sequence, "--train", &sequence, "--method", &mine]);
+    let (tables, errors) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+    assert!(tables.contains("FoG and wheels are fitted on one: "), "{tables}");
+    assert!(tables.contains("mine: 1 of 1 sequences left out\n    "), "{tables}");
+    assert!(tables.contains("one.txt: missing"), "{tables}");
+    let twice = gyronet(&["tables", &sequence, "--method", &mine, "--method", &mine]);
+    assert_eq!(twice.status.code(), Some(1));
+    assert!(text(&twice.stderr).contains("given twice"), "{}", text(&twice.stderr));
+    std::fs::remove_dir_all(&folder).unwrap();
 }

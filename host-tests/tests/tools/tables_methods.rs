@@ -48,8 +48,13 @@ impl Scratch {
     }
 
     fn errors(&self, sequence: &Sequence) -> SequenceErrors {
-        let mut estimates =
-            Estimates { start: START, methods: Vec::new(), left_out: Vec::new(), refused: None };
+        let mut estimates = Estimates {
+            start: START,
+            methods: Vec::new(),
+            left_out: Vec::new(),
+            fitted: None,
+            refused: None,
+        };
         estimates.add_given(sequence, &self.given());
         SequenceErrors::new(sequence, &estimates).0
     }

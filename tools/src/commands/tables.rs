@@ -9,6 +9,7 @@ use gyronet_tools::drive::error::DataError;
 use gyronet_tools::network::weight_file::WeightFile;
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::paper::tables::given::Given;
+use gyronet_tools::paper::tables::joint::{Fit, Joint};
 use gyronet_tools::paper::tables::results::{Results, SequenceErrors};
 use gyronet_tools::paper::tables::{estimates, html, pictures, table};
 use gyronet_tools::simulate::layout::Layout;
@@ -42,6 +43,10 @@ pub struct Args {
     /// Write report.html (one page with all tables and pictures) and each picture as SVG to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Fit the fibre-optic gyro and the wheels to these sequences, or to those of these folders, and show them as a method;
+    /// for more folders give it again.
+    #[arg(long, value_name = "DIR")]
+    train: Vec<PathBuf>,
     /// Put the trajectories of a folder into the tables under this name; for more methods give it again.
     #[arg(long = "method", value_name = "NAME=FOLDER")]
     methods: Vec<Given>,
@@ -60,6 +65,25 @@ fn title(sequence: &Sequence, number: usize) -> String {
         Layout::Nclt => "nclt",
     };
     format!("{:02}-{layout}-{}", number + 1, sequence.name)
+}
+
+/// Fits the fibre-optic gyro and the wheels to the sequences of each data set's layout.
+fn fit(folders: &[PathBuf], common: Common) -> Result<Vec<(Layout, Joint)>, Box<dyn std::error::Error>> {
+    let mut fits: Vec<(Layout, Fit)> = Vec::new();
+    for folder in folders {
+        for path in sequence::find(folder)? {
+            let sequence = import::read(&path, common)?;
+            let known = fits.iter().position(|(layout, _)| *layout == sequence.layout);
+            let at = known.unwrap_or_else(|| {
+                fits.push((sequence.layout, Fit::default()));
+                fits.len() - 1
+            });
+            fits[at].1.add(&sequence);
+        }
+    }
+    let solved =
+        fits.into_iter().map(|(layout, fit)| Some((layout, fit.solve()?))).collect::<Option<Vec<_>>>();
+    solved.ok_or_else(|| "--train: these sequences turn or move too little to fit anything".into())
 }
 
 /// Runs the subcommand.
@@ -84,6 +108,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     for folder in &args.folders {
         folders.extend(sequence::find(folder)?);
     }
+    let joint = fit(&args.train, common)?;
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for folder in &folders {
         let sequence = import::read(folder, common)?;
@@ -91,6 +116,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         let mut estimates = estimates::run(&sequence, &mut network, || bar.inc(1));
         estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
         bar.finish_and_clear();
+        if let Some((_, joint)) = joint.iter().find(|(layout, _)| *layout == sequence.layout) {
+            estimates.add_joint(&sequence, joint);
+        }
         args.methods.iter().for_each(|given| estimates.add_given(&sequence, given));
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
         if args.out.is_some() {

@@ -89,6 +89,8 @@ impl Method {
     pub const PSEUDO_FOG: Self = mems("pseudo_fog", "FoGNet on GyroNet's rate");
     /// The turn by the difference of the wheels' ways and their distance.
     pub const WHEELS: Self = Self { key: "wheels", name: "wheels alone", gyro: Gyro::Wheels };
+    /// The fibre-optic gyro and the wheels with four numbers fitted to training sequences ([`crate::paper::tables::joint`]).
+    pub const FOG_WHEELS: Self = fog("fog_wheels", "FoG and wheels, fitted");
     /// FoGNet, its first minute padded.
     pub const FOGNET: Self = fog("fognet", "FoGNet");
     /// FoGNet, its first minute uncorrected.
@@ -110,7 +112,7 @@ impl Method {
     ];
 
     /// The methods of a sequence, in the order of the paper's tables.
-    pub const ON_A_SEQUENCE: [Self; 16] = [
+    pub const ON_A_SEQUENCE: [Self; 17] = [
         Self::RAW,
         Self::STATIC,
         Self::FIR,
@@ -127,6 +129,7 @@ impl Method {
         Self::FOGNET,
         Self::FOGNET_NOPAD,
         Self::PSEUDO_FOG,
+        Self::FOG_WHEELS,
     ];
 
     /// The classical methods of a drive.

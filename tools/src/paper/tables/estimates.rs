@@ -6,14 +6,15 @@
 //! accelerometer, bias learnt at rest; Laidig and Seel, VQF, Information Fusion 91, 2023), without a magnetometer, once
 //! with its published defaults and once with limits of rest that a vehicle with its engine running keeps.
 
+use super::estimate::{Estimate, Places};
 use super::given::Given;
+use super::joint::Joint;
 use crate::drive::DT;
 use crate::drive::recording::Recording;
 use crate::drive::replay::{Replay, Step};
 use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::fir::LowPass;
 use crate::evaluate::methods::Method;
-use crate::evaluate::trajectory_error::Point;
 use crate::evaluate::vqf;
 use crate::paper::fog_replay;
 use crate::paper::sequence::{self, Sequence};
@@ -28,20 +29,6 @@ use gyronet::sample::PERIOD_US;
 use gyronet::units::AngularRate;
 use std::time::Instant;
 
-/// Holds the estimate of a method on a sequence.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
-    /// The method.
-    pub method: Method,
-    /// The angle turned in each step, from the first that is compared, rad.
-    pub turns: Vec<f64>,
-    /// The place after each of them, m from the first step's, of a trajectory that is given; without it, dead reckoning
-    /// makes the places.
-    pub places: Option<Vec<Point>>,
-    /// The run time on this machine, s.
-    pub run_time: Option<f64>,
-}
-
 /// Holds the estimates of all methods on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {
@@ -51,6 +38,8 @@ pub struct Estimates {
     pub methods: Vec<Estimate>,
     /// The methods whose given trajectory cannot be compared, and the reasons.
     pub left_out: Vec<(Method, String)>,
+    /// The numbers of [`Method::FOG_WHEELS`] and what they were fitted to.
+    pub fitted: Option<String>,
     /// The reason why some methods could not be run.
     pub refused: Option<String>,
 }
@@ -59,7 +48,8 @@ pub struct Estimates {
 /// bias loop.
 pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl FnMut()) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
-    let mut estimates = Estimates { start, methods: Vec::new(), left_out: Vec::new(), refused: None };
+    let mut estimates =
+        Estimates { start, methods: Vec::new(), left_out: Vec::new(), fitted: None, refused: None };
     match sequence.recording() {
         Ok(recording) => estimates.inertial(sequence, &recording, network, &mut tick),
         Err(error) => estimates.refused = Some(error.to_string()),
@@ -191,7 +181,13 @@ impl Estimates {
     }
 
     fn push(&mut self, method: Method, turns: Vec<f64>, run_time: f64) {
-        self.methods.push(Estimate { method, turns, places: None, run_time: Some(run_time) });
+        self.methods.push(Estimate { method, turns, places: Places::RECKONED, run_time: Some(run_time) });
+    }
+
+    /// Adds wheels and fibre-optic gyro, fitted.
+    pub fn add_joint(&mut self, sequence: &Sequence, joint: &Joint) {
+        self.methods.push(joint.estimate(sequence, self.start));
+        self.fitted = Some(joint.to_string());
     }
 
     /// Adds another program's trajectory, or the reason why it cannot be compared.

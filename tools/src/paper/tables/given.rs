@@ -6,7 +6,7 @@
 //! from where our methods start, which is the end of static initialisation, to within [`MISSING_END`] of its end. Poses
 //! at the sequence's steps are interpolated. A trajectory that cannot be compared is an error, and never a number.
 
-use super::estimates::Estimate;
+use super::estimate::{Estimate, Places};
 use crate::drive::DT;
 use crate::drive::error::{DataError, DataFault};
 use crate::evaluate::methods::Method;
@@ -68,7 +68,7 @@ impl Given {
     pub fn estimate(&self, sequence: &Sequence, start: usize) -> Result<Estimate, DataError> {
         let trajectory = Trajectory::read(&self.folder.join(format!("{}.txt", sequence.name)))?;
         let (turns, places) = compared(&trajectory, sequence, start)?;
-        Ok(Estimate { method: self.method, turns, places: Some(places), run_time: None })
+        Ok(Estimate { method: self.method, turns, places: Places::Given(places), run_time: None })
     }
 }
 

@@ -12,9 +12,11 @@ const FOGNET: [&str; 2] = [
     "FoGNet's bundled weights were trained on simulated sequences of KAIST's layout.",
 ];
 
-/// Adds the remarks on FoGNet and on the trajectories left out.
+/// Adds the remarks on FoGNet, on what was fitted and on the trajectories left out.
 pub fn with_fognet(set: &[&SequenceErrors], notes: &[&str]) -> Vec<String> {
-    notes.iter().chain(&FOGNET).map(|note| (*note).to_owned()).chain(left_out(set)).collect()
+    let mut fitted: Vec<String> = set.iter().filter_map(|sequence| sequence.fitted.clone()).collect();
+    fitted.dedup();
+    notes.iter().chain(&FOGNET).map(|note| (*note).to_owned()).chain(fitted).chain(left_out(set)).collect()
 }
 
 /// Makes the remarks on Table I.
@@ -52,7 +54,7 @@ pub fn rivals(set: &[&SequenceErrors]) -> Vec<String> {
         "The paper's averages of RINS-W do not follow from its rows: they have {:.1} and {:.1}, printed are {} and {}.",
         own[0], own[1], printed[0], printed[1]
     );
-    let other = "The paper's rows are rounded from its Table II, but for urban16, where that has 18.08 in place of 19.";
+    let other = "The paper's FoGNet is its Table II's, rounded, but for urban16: 18.08 there, 19 here.";
     let mean = "The paper speaks of the mean ATE here; ours is the rmse, and the JSON has both.";
     let mut notes = with_fognet(set, &[&averages, other, mean]);
     if !set.iter().flat_map(|sequence| &sequence.order).any(|method| method.gyro == Gyro::Given) {

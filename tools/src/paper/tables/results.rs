@@ -1,6 +1,8 @@
 //! This module computes the errors of every method on every sequence, and their means, for the tables and the JSON.
 
+use super::estimate::{Estimate, Places};
 use super::estimates::Estimates;
+use super::group::Group;
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::YawError;
 use crate::evaluate::trajectory_error::{Point, TrajectoryError};
@@ -30,18 +32,6 @@ pub struct Errors {
     /// The run time on this machine, s; `None` where a trajectory was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_time_s: Option<f64>,
-}
-
-/// Names the group that a sequence is averaged with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Group {
-    /// The paper's first sequences, and simulated ones of the first device.
-    First,
-    /// Urban18 and later: the paper calls them newly released, and nothing says that their sensors are others.
-    NewlyReleased,
-    /// Simulated sequences of other devices.
-    OtherDevices,
 }
 
 /// Maps the key of a method to its errors.
@@ -81,6 +71,9 @@ pub struct SequenceErrors {
     /// The reasons why given trajectories could not be compared, by the keys of their methods.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub left_out: BTreeMap<&'static str, String>,
+    /// The numbers that wheels and fibre-optic gyro were fitted with, and on which sequences.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<String>,
     /// The methods in the order of the tables.
     #[serde(skip)]
     pub order: Vec<Method>,
@@ -100,16 +93,17 @@ impl SequenceErrors {
         let mut paths =
             vec![Path { method: None, yaw: steps.iter().map(|step| step.yaw).collect(), points: truth }];
         for estimate in &estimates.methods {
+            let scale = if let Places::Reckoned { scale } = estimate.places { scale } else { 1.0 };
             let mut track = Track { position: begin, yaw: heading };
             let (yaw, mut points): (Vec<f64>, Vec<Point>) = steps
                 .iter()
                 .zip(&estimate.turns)
                 .map(|(step, turned)| {
-                    track.step(step.wheels, *turned);
+                    track.step(step.wheels.map(|way| scale * way), *turned);
                     (track.yaw, track.position)
                 })
                 .unzip();
-            if let Some(places) = &estimate.places {
+            if let Places::Given(places) = &estimate.places {
                 points.clone_from(places);
             }
             if let Some(errors) = Errors::new(turns, estimate, &points, &paths[0].points) {
@@ -127,6 +121,7 @@ impl SequenceErrors {
             metres: steps.iter().map(|step| (step.wheels[0] + step.wheels[1]).abs() / 2.0).sum(),
             refused: estimates.refused.clone(),
             left_out: estimates.left_out.iter().map(|(method, why)| (method.key, why.clone())).collect(),
+            fitted: estimates.fitted.clone(),
             methods,
             order,
         };
@@ -134,24 +129,8 @@ impl SequenceErrors {
     }
 }
 
-impl Group {
-    fn of(sequence: &Sequence) -> Self {
-        if let Some(spec) = &sequence.simulated {
-            return if spec.device == 1 { Self::First } else { Self::OtherDevices };
-        }
-        let number = sequence.name.trim_start_matches(|c: char| !c.is_ascii_digit());
-        let is_new = sequence.layout == Layout::Kaist && number.parse().is_ok_and(|number: u32| number >= 18);
-        if is_new { Self::NewlyReleased } else { Self::First }
-    }
-}
-
 impl Errors {
-    fn new(
-        turns: &[f64],
-        estimate: &super::estimates::Estimate,
-        points: &[Point],
-        truth: &[Point],
-    ) -> Option<Self> {
+    fn new(turns: &[f64], estimate: &Estimate, points: &[Point], truth: &[Point]) -> Option<Self> {
         // A trajectory that is given may end before the sequence.
         let (turns, truth) = (turns.get(..points.len())?, truth.get(..points.len())?);
         let rates = |turns: &[f64]| turns.iter().map(|turn| turn / crate::drive::DT).collect::<Vec<f64>>();

@@ -1,9 +1,10 @@
 //! This module makes the paper's tables with our figures: rows of words and numbers, which [`super::text`] and
 //! [`super::html`] print.
 
+use super::group::Group;
 use super::notes;
 use super::paper::{self, Line};
-use super::results::{ByMethod, Errors, Group, Results, SequenceErrors, mean};
+use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
 use crate::evaluate::methods::{Gyro, Method};
 use crate::simulate::layout::Layout;
 
@@ -123,19 +124,26 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
 
 const ATE: [fn(&Errors) -> f64; 2] = [|e| e.ate_m, |e| e.aligned_ate_m];
 
+/// Returns a row for each sequence with both errors of some methods, and their average.
+fn by_sequence(
+    set: &[&SequenceErrors],
+    methods: &[Method],
+    name: impl Fn(&SequenceErrors) -> String,
+) -> Vec<Row> {
+    let row = |name: String, by: &ByMethod| Row {
+        name,
+        figures: methods.iter().flat_map(|method| figures(by.get(method.key), &ATE)).collect(),
+    };
+    let average = row("average".into(), &mean(set.iter().copied()));
+    set.iter().map(|s| row(name(s), &s.methods)).chain([average]).collect()
+}
+
 /// Makes Table II.
 fn urban(set: &[&SequenceErrors]) -> Table {
     let is_wanted = |method: &Method| {
         method.gyro != Gyro::Mems || [Method::STATIC.key, Method::GYRONET.key].contains(&method.key)
     };
     let methods = methods_of(set, is_wanted);
-    let row = |name: String, by: &ByMethod| Row {
-        name,
-        figures: methods.iter().flat_map(|method| figures(by.get(method.key), &ATE)).collect(),
-    };
-    let mut rows: Vec<Row> =
-        set.iter().map(|s| row(format!("{}, {:.1} km", s.name, s.metres / 1e3), &s.methods)).collect();
-    rows.push(row("average".into(), &mean(set.iter().copied())));
     let mut paper_rows = lines(&paper::URBAN);
     paper_rows.extend(lines(&[paper::URBAN_AVERAGE]));
     for (name, lines) in [
@@ -151,7 +159,7 @@ fn urban(set: &[&SequenceErrors]) -> Table {
         simulated: set.iter().any(|sequence| sequence.simulated),
         columns: pairs(methods.iter().map(|method| method.name)),
         decimals: 2,
-        rows,
+        rows: by_sequence(set, &methods, |s| format!("{}, {:.1} km", s.name, s.metres / 1e3)),
         paper_columns: pairs(["FoG", "lwoi", "FoGNet"].into_iter()),
         paper_rows,
         notes: notes::with_fognet(
@@ -167,12 +175,6 @@ fn urban(set: &[&SequenceErrors]) -> Table {
 /// Makes Table IV.
 fn rivals(set: &[&SequenceErrors]) -> Table {
     let methods = methods_of(set, |method| method.gyro == Gyro::Given || method.key == Method::FOGNET.key);
-    let row = |name: &str, by: &ByMethod| Row {
-        name: name.to_owned(),
-        figures: methods.iter().flat_map(|method| figures(by.get(method.key), &ATE)).collect(),
-    };
-    let mut rows: Vec<Row> = set.iter().map(|s| row(&s.name, &s.methods)).collect();
-    rows.push(row("average", &mean(set.iter().copied())));
     let mut paper_rows = lines(&paper::RINS_W);
     paper_rows.extend(lines(&[paper::RINS_W_AVERAGE]));
     let figures = paper::average(&paper::RINS_W).into_iter().map(Some).collect();
@@ -182,7 +184,7 @@ fn rivals(set: &[&SequenceErrors]) -> Table {
         simulated: set.iter().any(|sequence| sequence.simulated),
         columns: pairs(methods.iter().map(|method| method.name)),
         decimals: 2,
-        rows,
+        rows: by_sequence(set, &methods, |s| s.name.clone()),
         paper_columns: pairs(["RINS-W", "FoGNet"].into_iter()),
         paper_rows,
         notes: notes::rivals(set),
@@ -237,7 +239,8 @@ fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
 /// Makes Table VI.
 fn run_time(set: &[&SequenceErrors]) -> Table {
     let hours = set.iter().map(|sequence| sequence.seconds).sum::<f64>() / 3600.0;
-    let rows = methods_of(set, |method| method.gyro != Gyro::Given).into_iter().map(|method| Row {
+    let timed = |method: &Method| method.gyro != Gyro::Given && *method != Method::FOG_WHEELS;
+    let rows = methods_of(set, timed).into_iter().map(|method| Row {
         name: method.name.to_owned(),
         figures: vec![set.iter().map(|s| s.methods.get(method.key)?.run_time_s).sum()],
     });

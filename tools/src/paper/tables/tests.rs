@@ -1,5 +1,8 @@
-use super::estimates::{Estimate, Estimates};
-use super::results::{Group, Path, Results, SequenceErrors};
+use super::estimate::{Estimate, Places};
+use super::estimates::Estimates;
+use super::group::Group;
+use super::joint::Fit;
+use super::results::{Path, Results, SequenceErrors};
 use super::{estimates, html, pictures, table};
 use crate::evaluate::methods::Method;
 use crate::paper::sequence::{Sequence, Step, StreamSummary};
@@ -72,8 +75,9 @@ fn exact() -> Sequence {
 fn the_truth_has_no_error() {
     let sequence = exact();
     let turns = sequence.turns()[300..].to_vec();
-    let truth = Estimate { method: Method::FOG, turns, places: None, run_time: Some(0.0) };
-    let estimates = Estimates { start: 300, methods: vec![truth], left_out: Vec::new(), refused: None };
+    let truth = Estimate { method: Method::FOG, turns, places: Places::RECKONED, run_time: Some(0.0) };
+    let estimates =
+        Estimates { start: 300, methods: vec![truth], left_out: Vec::new(), fitted: None, refused: None };
     let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
     let fog = errors.methods["fog"];
     assert!(fog.ate_m < 1e-9 && fog.aligned_ate_m < 1e-9 && fog.mean_1s_rad < 1e-12, "{fog:?}");
@@ -119,6 +123,44 @@ fn wheels_alone_turn_by_their_difference() {
     let (errors, _) = SequenceErrors::new(&sequence, &estimates);
     let turned: f64 = sequence.turns()[300..].iter().sum();
     assert!((errors.methods["wheels"].final_unwrapped_rad - 0.1 * turned.abs()).abs() < 1e-9, "{errors:?}");
+}
+
+#[test]
+fn wheels_and_gyro_are_fitted_together() {
+    let training = exact();
+    let (scale, constant, longer) = (1.0 + 1e-3, 4e-5, 1.002);
+    let worse = |sequence: &Sequence| {
+        let mut sequence = sequence.clone();
+        for step in &mut sequence.steps {
+            step.fog = step.fog * scale + 0.01 * constant;
+            step.wheels = step.wheels.map(|way| longer * way);
+        }
+        sequence
+    };
+    let mut fit = Fit::default();
+    fit.add(&worse(&training));
+    // Both wheels go the same way here, so nothing can be said of their difference.
+    assert_eq!(fit.solve(), None);
+    let mut turning = training.clone();
+    for (k, step) in turning.steps.iter_mut().enumerate() {
+        let way = 1e-3 * (k as f64 * 0.001).sin();
+        step.wheels = [step.wheels[0] - way, step.wheels[1] + way];
+    }
+    fit.add(&worse(&turning));
+    let joint = fit.solve().unwrap();
+    assert!((joint.gyro * scale - 1.0).abs() < 1e-9 && joint.difference.abs() < 1e-9, "{joint:?}");
+    assert!((joint.constant + constant / scale).abs() < 1e-9, "{joint:?}");
+    assert!((joint.way * longer - 1.0).abs() < 1e-6, "{joint:?}");
+
+    let tested = worse(&training);
+    let mut estimates = estimates::run(&tested, &mut Nothing, || {});
+    estimates.add_joint(&tested, &joint);
+    let (errors, _) = SequenceErrors::new(&tested, &estimates);
+    assert!(errors.methods["fog"].ate_m > 0.1, "{errors:?}");
+    let fitted = errors.methods["fog_wheels"];
+    assert!(fitted.ate_m < 1e-3 && fitted.final_unwrapped_rad < 1e-6, "{fitted:?}");
+    let table = &table::tables(&Results::new(vec![errors]))[0];
+    assert!(table.notes.iter().any(|note| note.contains("fitted on urban18, urban18")), "{:?}", table.notes);
 }
 
 #[test]

@@ -1,0 +1,30 @@
+//! This module says with which other sequences one is averaged.
+
+use crate::paper::sequence::Sequence;
+use crate::simulate::layout::Layout;
+use serde::Serialize;
+
+/// Names the group that a sequence is averaged with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Group {
+    /// The paper's first sequences, and simulated ones of the first device.
+    First,
+    /// Urban18 and later: the paper calls them newly released, and nothing says that their sensors are others.
+    NewlyReleased,
+    /// Simulated sequences of other devices.
+    OtherDevices,
+}
+
+impl Group {
+    /// Returns the group of a sequence.
+    #[must_use]
+    pub fn of(sequence: &Sequence) -> Self {
+        if let Some(spec) = &sequence.simulated {
+            return if spec.device == 1 { Self::First } else { Self::OtherDevices };
+        }
+        let number = sequence.name.trim_start_matches(|c: char| !c.is_ascii_digit());
+        let is_new = sequence.layout == Layout::Kaist && number.parse().is_ok_and(|number: u32| number >= 18);
+        if is_new { Self::NewlyReleased } else { Self::First }
+    }
+}
