@@ -16,7 +16,7 @@ pub mod configuration;
 mod error;
 #[doc(hidden)]
 pub mod layout;
-mod record;
+pub(crate) mod record;
 #[doc(hidden)]
 pub mod slots;
 mod troubles;

@@ -24,7 +24,7 @@ const WORD_U32: u32 = WORD as u32;
 /// Bytes of a sector's header.
 const HEADER: u32 = 2 * WORD_U32;
 /// Most bytes of an encoded record.
-const MAX_LEN: usize = 248;
+pub(crate) const MAX_LEN: usize = 248;
 /// The longest record, with its first and last word.
 const BUFFER: usize = MAX_LEN + 2 * WORD;
 /// Highest key.

@@ -22,6 +22,7 @@
 //! | 010D | postcard | gain and mounting of this unit's gyro, or none: [`crate::store::UnitMap`] (read in 0102) | extended |
 //! | 0110 | 32 | public key of those who may write, zeros for none: see [`super::security`] | extended |
 //! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest counter; wrong answers; begin of the key | |
+//! | 0112 | 4 | messages of the fibre-optic gyro since the start, by themselves | |
 //! | 0201 to 021C | | [settings](super::settings), each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
@@ -130,6 +131,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         0x010B => put_record(out, &device.refusal()),
         0x010C => put_record(out, &device.calibration_state()),
         0x0111 => security::state(security, device, out),
+        0x0112 => put(out, &counters.fog.samples.to_be_bytes()),
         _ => settings::read(id, device, out),
     }
 }

@@ -94,7 +94,8 @@ impl Download {
         let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
         put(out, &[slot as u8])?;
         put(out, &crc.to_be_bytes())?;
-        self.digest = Some(self.hasher.finish());
+        let hasher = &mut self.hasher;
+        self.digest.get_or_insert_with(|| hasher.finish());
         Ok(())
     }
 

@@ -5,12 +5,16 @@
 //! arguments. As receiver it grants [`BLOCK`] frames at a time, so that a queue of that length before it never
 //! overflows. Whatever breaks the order of a message ends it, is counted, and leaves room for the next one.
 
+use super::signature::TRAILER;
 use crate::health::count;
 use crate::service::message::BLOCK as DOWNLOAD_BLOCK;
+use crate::store::record::MAX_LEN;
 use heapless::Vec;
 
-/// Longest message, bytes: a block of a download with its service and number.
-pub const LONGEST: usize = DOWNLOAD_BLOCK + 2;
+/// Longest message, bytes: the longest record with its service, identifier, layout and trailer.
+pub const LONGEST: usize = 4 + MAX_LEN + TRAILER;
+const _: () =
+    assert!(LONGEST >= DOWNLOAD_BLOCK + 2, "a block of a download with its service and number fits");
 /// Frames that the tester may send before it waits for the next flow control.
 pub const BLOCK: u8 = 8;
 /// Longest wait for the next frame of a message, or for a flow control, ms (N_Cr and N_Bs, ISO 15765-2 9.8).

@@ -12,7 +12,7 @@
 //! | the third wrong answer in a row, and each after it | 0x36 |
 //! | the delay runs | 0x37 |
 //! | no trailer | 0x13 |
-//! | a counter that is not greater than that of the newest signature | 0x31 |
+//! | a counter that is not greater than that of the newest signature, or no public key | 0x31 |
 //! | no random numbers, or the vehicle may move | 0x22 |
 
 use super::response::{Nrc, Response, exactly, nrc, put};
@@ -126,9 +126,12 @@ impl Security {
         }
         let access = device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let key = Some(key).filter(|key| *key != [0; 32]);
+        if key.as_ref().is_some_and(|key| !signature::is_key(key)) {
+            return Err(Nrc::RequestOutOfRange);
+        }
         device.store_access(Access { key, ..access }).map_err(nrc)?;
-        // Whoever has stored it goes on.
-        self.is_unlocked = key.is_some();
+        // Whoever has stored the first one goes on; a signature proves nothing of who carries it.
+        self.is_unlocked = key.is_some() && (self.is_unlocked || access.key.is_none());
         Ok(())
     }
 }

@@ -10,10 +10,9 @@ use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, exactly, nrc, put};
 use super::security::{self, Security, Seed};
 use super::troubles;
-use crate::service::calibrate::{State, Task};
-use crate::service::message::{AllCounters, Calibrate, Request};
+use crate::service::message::{AllCounters, Request};
 use crate::service::{Device, MappedSlots};
-use automotive_diag::uds::{ResetType, RoutineControlType, UdsCommand};
+use automotive_diag::uds::{ResetType, UdsCommand};
 use embedded_storage::nor_flash::NorFlash;
 
 /// Longest silence of a tester in a session other than the default one, ms (S3).
@@ -21,10 +20,8 @@ const SESSION_MS: u32 = 5_000;
 /// Longest time to a response, ms, and to one after "response pending", 10 ms (P2, P2*).
 const P2_MS: u16 = 50;
 const P2_STAR_10_MS: u16 = 500;
-/// The routine that has a download used.
-const USE_DOWNLOAD: u16 = 0xFF01;
 /// This bit of a sub-function suppresses the positive response.
-const SUPPRESS: u8 = 0x80;
+pub(super) const SUPPRESS: u8 = 0x80;
 
 /// A diagnostic session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,8 +55,8 @@ pub(super) struct Services {
     pub is_silenced: bool,
     /// A tester has asked for a restart.
     pub is_restarting: bool,
-    download: Option<Download>,
-    security: Security,
+    pub(super) download: Option<Download>,
+    pub(super) security: Security,
 }
 
 /// What a request is answered from beside the device.
@@ -291,7 +288,7 @@ impl Services {
                 self.security.access(rest, device, now, entropy, out)?;
                 Ok(true)
             }
-            UdsCommand::RoutineControl => self.routine(rest, device, out),
+            UdsCommand::RoutineControl => self.routine(rest, device, entropy, out),
             UdsCommand::RequestDownload => {
                 self.needs(Session::Programming)?;
                 self.download = None;
@@ -318,83 +315,9 @@ impl Services {
     }
 
     /// Refuses a service that this session does not have.
-    fn needs(&self, session: Session) -> Result<(), Nrc> {
+    pub(super) fn needs(&self, session: Session) -> Result<(), Nrc> {
         let has =
             self.session == session || (self.session, session) == (Session::Programming, Session::Extended);
         if has { Ok(()) } else { Err(Nrc::ServiceNotSupportedInActiveSession) }
-    }
-
-    /// Runs a routine; its number and, for a calibration, its state are the response.
-    fn routine<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        rest: &[u8],
-        device: &mut Device<R, W>,
-        out: &mut Response,
-    ) -> Result<bool, Nrc> {
-        if let [1, 0x02, 0x03, after @ ..] = rest {
-            put(out, &[1, 0x02, 0x03])?;
-            data::put_record(out, &device.events(u32::from_be_bytes(exactly(after)?)))?;
-            return Ok(true);
-        }
-        self.needs(Session::Extended)?;
-        let (sub, high, low, option) = match *rest {
-            [sub, high, low, ref option @ ..] => (sub, high, low, option),
-            _ => return Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
-        };
-        let id = u16::from_be_bytes([high, low]);
-        let control = RoutineControlType::from_repr(sub & !SUPPRESS).ok_or(Nrc::SubFunctionNotSupported)?;
-        let task = match id {
-            0x0200 => Some(Task::Static),
-            0x0201 => Some(Task::Mounting),
-            _ => None,
-        };
-        put(out, &[sub & !SUPPRESS, high, low])?;
-        if id == USE_DOWNLOAD && control == RoutineControlType::StartRoutine {
-            self.needs(Session::Programming)?;
-            self.accept_download(option, device)?;
-            device.act(&Request::WeightsActivate).map_err(nrc)?;
-            return Ok(sub & SUPPRESS == 0);
-        }
-        let [] = exactly(option)?;
-        if control != RoutineControlType::RequestRoutineResult {
-            self.security.check(device)?;
-        }
-        match (id, task, control) {
-            (_, Some(task), RoutineControlType::StartRoutine) => {
-                device.act(&Request::Calibrate(Calibrate::Start(task))).map_err(nrc)?;
-            }
-            (_, Some(_), RoutineControlType::StopRoutine) => {
-                device.act(&Request::Calibrate(Calibrate::Cancel)).map_err(nrc)?;
-            }
-            (_, Some(task), RoutineControlType::RequestRoutineResult) => {
-                let state = match device.calibration_state() {
-                    State::Running(of) if of == task => 1,
-                    State::Found(of) if of == task => 2,
-                    State::Failed(of, _) if of == task => 3,
-                    _ => return Err(Nrc::RequestSequenceError),
-                };
-                put(out, &[state])?;
-            }
-            (0x0202, None, RoutineControlType::StartRoutine) => {
-                device.act(&Request::Calibrate(Calibrate::Store)).map_err(nrc)?;
-            }
-            (0x0202 | USE_DOWNLOAD, None, _) => return Err(Nrc::SubFunctionNotSupported),
-            _ => return Err(Nrc::RequestOutOfRange),
-        }
-        Ok(sub & SUPPRESS == 0)
-    }
-
-    /// Checks the signature of a download, where a key asks for one.
-    fn accept_download<R: NorFlash, W: MappedSlots>(
-        &self,
-        trailer: &[u8],
-        device: &mut Device<R, W>,
-    ) -> Result<(), Nrc> {
-        if device.access().is_some_and(|access| access.key.is_none()) {
-            return exactly(trailer).map(|[]: [u8; 0]| ());
-        }
-        let trailer = trailer.try_into().map_err(|_| Nrc::IncorrectMessageLengthOrInvalidFormat)?;
-        let digest = self.download.as_ref().and_then(Download::digest).ok_or(Nrc::RequestSequenceError)?;
-        security::accept(USE_DOWNLOAD, digest, trailer, device)
     }
 }

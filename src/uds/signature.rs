@@ -5,7 +5,9 @@
 //! challenge passes for a signature; the identifier that is written, or the routine that uses a download; the serial
 //! number of the board, or zeros; the counter; the length of the content and its SHA-512.
 
-use salty::{PublicKey, Sha512, Signature};
+use crate::store::access::KEY;
+use salty::{CompressedY, EdwardsPoint, Scalar};
+use sha2::{Digest as _, Sha512};
 
 /// Bytes of a serial number.
 pub const SERIAL: usize = 12;
@@ -67,7 +69,7 @@ impl Hasher {
     #[inline(never)]
     pub fn finish(&mut self) -> Digest {
         let Self { hash, length } = core::mem::take(self);
-        Digest { length, hash: hash.finalize() }
+        Digest { length, hash: hash.finalize().into() }
     }
 }
 
@@ -116,10 +118,53 @@ fn joined<const N: usize, const PARTS: usize>(parts: [&[u8]; PARTS]) -> [u8; N] 
     message
 }
 
-/// Returns whether a signature of a message was made with the private part of a key.
+/// Returns whether a signature of a message was made with the private part of a key (RFC 8032 5.1.7, without the
+/// cofactor; S is below the group's order, so a signature has one form). Everything here is public, so it need not take
+/// the same time for all.
 #[must_use]
 #[inline(never)]
-pub fn is_valid(key: &[u8; 32], message: &[u8], signature: &[u8; SIGNATURE]) -> bool {
-    let key = PublicKey::try_from(key);
-    key.is_ok_and(|key| key.verify(message, &Signature::from(signature)).is_ok())
+pub fn is_valid(key: &[u8; KEY], message: &[u8], signature: &[u8; SIGNATURE]) -> bool {
+    let Some((r, s)) = signature.split_first_chunk::<32>() else { return false };
+    let (Ok(s), Ok(point)) = (<&[u8; 32]>::try_from(s), CompressedY(*key).decompressed()) else {
+        return false;
+    };
+    if !Scalar::from_bytes(s).is_canonical() {
+        return false;
+    }
+    let k = Scalar::from_u512_le(
+        &Sha512::new().chain_update(r).chain_update(key).chain_update(message).finalize().into(),
+    );
+    sum_of_products(s, k.as_bytes(), &-&point) == *r
+}
+
+/// Returns s B + k P, encoded, with B the base point: one pass over the bits of both from the highest down.
+#[inline(never)]
+fn sum_of_products(s: &[u8; 32], k: &[u8; 32], point: &EdwardsPoint) -> [u8; 32] {
+    let base = EdwardsPoint::basepoint();
+    let both = &base + point;
+    let mut sum = EdwardsPoint::neutral_element();
+    for (s, k) in s.iter().zip(k).rev() {
+        for bit in (0..8).rev() {
+            sum = &sum + &sum;
+            match (s >> bit & 1, k >> bit & 1) {
+                (0, 0) => {}
+                (0, _) => sum = &sum + point,
+                (_, 0) => sum = &sum + &base,
+                _ => sum = &sum + &both,
+            }
+        }
+    }
+    sum.compressed().0
+}
+
+/// Returns whether bytes are a public key: a point of the curve, and not one of the eight of low order, for which anyone
+/// can sign.
+#[must_use]
+#[inline(never)]
+pub fn is_key(key: &[u8; KEY]) -> bool {
+    let Ok(mut point) = CompressedY(*key).decompressed() else { return false };
+    for _ in 0..3 {
+        point = &point + &point;
+    }
+    point.compressed() != EdwardsPoint::neutral_element().compressed()
 }

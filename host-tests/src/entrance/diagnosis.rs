@@ -32,7 +32,7 @@ struct Bench {
 impl Bench {
     /// Runs a turn; returns the frames that are sent in it.
     fn turn(&mut self) -> Vec<[u8; 8]> {
-        self.server.turn(&mut self.board, &AllCounters::default(), self.now, || None);
+        self.server.turn(&mut self.board, &AllCounters::default(), self.now, || Some([7; 32]));
         std::iter::from_fn(|| self.server.next_frame(self.now)).collect()
     }
 }
@@ -114,6 +114,21 @@ pub fn seeds() -> Vec<Seed> {
         ("sessions", script(0, &[&[0x10, 3], &[0x3E, 0], &[0x85, 2], &[0x11, 1]])),
         ("download", script(7, &[&[0x10, 2], &[0x34, 0, 0x11, 0, 16], &block, &[0x37], &[0x31, 1, 0xFF, 1]])),
         ("routine", script(7, &[&[0x10, 3], &[0x31, 1, 2, 0], &[0x31, 3, 2, 0], &[0x31, 1, 2, 2]])),
+        (
+            "key",
+            script(
+                7,
+                &[
+                    &[0x10, 3],
+                    &[&[0x2E, 1, 0x10][..], &[0x66; 32]].concat(),
+                    &[0x10, 3],
+                    &[0x27, 1],
+                    &[&[0x27, 2][..], &[0; 64]].concat(),
+                    &[&[0x2E, 2, 4, 0, 0, 0, 0, 1, 0, 0, 0, 1][..], &[0; 64]].concat(),
+                    &[0x22, 1, 0x11],
+                ],
+            ),
+        ),
         ("frames", vec![1, 0x28, 1, 0x10, 20, 0x22, 1, 0, 1, 1, 1, 0x28, 1, 0x21, 1, 2, 3, 4, 5, 6, 7]),
     ]
 }

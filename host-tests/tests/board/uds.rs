@@ -12,6 +12,7 @@ use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::Tester;
+use gyronet_tools::signing::{PrivateKey, hex};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -177,7 +178,14 @@ fn udsoncan_reads_writes_and_downloads() {
     let Some(mut board) = common::boot(TEST) else { return };
     board.run(START);
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("uds_weights.bin");
-    std::fs::write(&file, other_weights(2)).expect("there is room");
+    let weights = other_weights(2);
+    std::fs::write(&file, &weights).expect("there is room");
+    let key = PrivateKey::generate().expect("random numbers");
+    let signed = |content: &[u8]| hex(&key.trailer(0xFF01, None, 7, content));
+    let keys = serde_json::json!({
+        "public": hex(&key.public()), "good": signed(&weights), "foreign": signed(&other_weights(1)),
+    });
+    std::fs::write(file.with_extension("bin.json"), keys.to_string()).expect("there is room");
     let mut client = Command::new(python)
         .arg(workspace().join("host-tests/tests/clients/uds_client.py"))
         .arg("pipes")
@@ -192,6 +200,9 @@ fn udsoncan_reads_writes_and_downloads() {
     // Each line is a turn: frames to the board (identifier#data), or what the client has seen.
     for line in from_client.lines() {
         let line = line.expect("text");
+        if line == "reset" {
+            board.reset_pin();
+        }
         let Some(frames) = line.strip_prefix("turn") else {
             said.push(line);
             continue;

@@ -1,10 +1,11 @@
 """Diagnoses the board with udsoncan over can-isotp, as they are published.
 
 `uds_client.py slcan URL` reads over a serial line. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
-pipes: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
+pipes, with the key and signatures in WEIGHTS.json: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
 comes back the server's frames. Time is counted in turns, so that a slow model of the board breaks no timeout.
 """
 
+import json
 import struct
 import sys
 from pathlib import Path
@@ -98,9 +99,11 @@ def refused(code, call, *arguments, **named):
 
 
 DESCRIPTION = yaml.safe_load((Path(__file__).parents[3] / "tools/gyronet_uds.yaml").read_text())
-DIDS = {did: Bytes if data["format"] == "bytes" else data["format"] for did, data in DESCRIPTION["data"].items()}
+DIDS = DESCRIPTION["data"]
+CODECS = {did: Bytes if data["format"] == "bytes" else data["format"]
+          for did, data in (DIDS | DESCRIPTION["write_only"]).items()}
 # An emulated or modelled board does not keep real time, so its own time-outs do not count.
-CONFIG = dict(udsoncan.configs.default_client_config, data_identifiers=DIDS, request_timeout=None,
+CONFIG = dict(udsoncan.configs.default_client_config, data_identifiers=CODECS, request_timeout=None,
               p2_timeout=20, p2_star_timeout=60, use_server_timing=False)
 
 
@@ -110,7 +113,7 @@ def examine(client):
         value = client.read_data_by_identifier(did).service_data.values[did]
         print(f"{did:04x} {DESCRIPTION['data'][did]['name']}: {value}")
         fields = DESCRIPTION["data"][did].get("fields", [])
-        assert value and len(fields) in (0, len(value)), did
+        assert value is not None and (not fields or len(fields) == len(value)), did
     place = udsoncan.MemoryLocation(0, 4, 32, 32)
     refused(0x7F, client.request_download, place)
     troubles = client.get_supported_dtc().service_data.dtcs
@@ -128,20 +131,31 @@ def examine(client):
     return client.read_data_by_identifier(0x0100).service_data.values[0x0100]
 
 
-def write(client, pipes, weights):
-    """Writes a configuration, and a weight file that then runs."""
+def write(client, pipes, weights, signed):
+    """Writes a configuration, a key, and a weight file that runs once its signature is right."""
     configuration = examine(client)
     client.write_data_by_identifier(0x0100, configuration)
     refused(0x13, client.write_data_by_identifier, 0x0100, configuration[:-1])
     refused(0x31, client.write_data_by_identifier, 0xF186, 1)
+    client.write_data_by_identifier(0x0110, bytes.fromhex(signed["public"]))
     client.change_session(DiagnosticSessionControl.Session.programmingSession)
+    refused(0x33, client.ecu_reset, ECUReset.ResetType.hardReset)
     place = udsoncan.MemoryLocation(0, len(weights), 32, 32)
     length = client.request_download(place).service_data.max_length - 2
     for number, start in enumerate(range(0, len(weights), length), 1):
         client.transfer_data(number & 0xFF, weights[start:start + length])
+        if number == 1:
+            # A file that is cut.
+            refused(0x24, client.request_transfer_exit)
     client.request_transfer_exit()
-    client.start_routine(0xFF01)
-    client.ecu_reset(ECUReset.ResetType.hardReset)
+    refused(0x13, client.start_routine, 0xFF01)
+    refused(0x35, client.start_routine, 0xFF01, bytes.fromhex(signed["foreign"]))
+    client.start_routine(0xFF01, bytes.fromhex(signed["good"]))
+    # Again is a replay.
+    refused(0x31, client.start_routine, 0xFF01, bytes.fromhex(signed["good"]))
+    state, counter, _, _ = client.read_data_by_identifier(0x0111).service_data.values[0x0111]
+    assert (state, counter) == (1, 7), (state, counter)
+    print("reset", flush=True)
     for _ in range(300):
         pipes.turn()
     source, crc = client.read_data_by_identifier(0x0103).service_data.values[0x0103]
@@ -154,7 +168,7 @@ def main():
     if line == "pipes":
         pipes = Pipes()
         with Client(pipes, config=CONFIG) as client:
-            write(client, pipes, Path(name).read_bytes())
+            write(client, pipes, Path(name).read_bytes(), json.loads(Path(name + ".json").read_text()))
     else:
         bus = can.Bus(interface="slcan", channel=name, bitrate=500_000)
         notifier = can.Notifier(bus, [])

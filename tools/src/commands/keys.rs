@@ -7,6 +7,9 @@ use std::path::PathBuf;
 
 /// Make a key pair: NAME.key stays with whoever signs, NAME.pub goes onto boards (`device set-key`).
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet keys fleet                # fleet.key and fleet.pub")]
 pub struct Args {
     /// Begin of both files' names; neither may be there.
     #[arg(value_name = "NAME")]

@@ -12,6 +12,9 @@ use std::path::PathBuf;
 
 /// Sign a file for boards with a key, which then accept it from anyone, once (`device ... --signature`).
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet sign new.blob --target weights --key fleet.key --counter 7 --out new.sig")]
 pub struct Args {
     /// Weight file, whole configuration (`device get --json`), wheel frames (.toml), unit file, or public key.
     file: PathBuf,

@@ -80,6 +80,16 @@ fn signatures_are_those_of_rfc_8032() {
             assert!(!signature::is_valid(&public, message, &other), "bit {bit}");
         }
         assert!(!signature::is_valid(&public, &[message, b"x"].concat(), &signature));
+        // The order of the group added to S is the same number to a verifier that does not look.
+        let mut other = signature;
+        let order: [u8; 32] =
+            unhex("edd3f55c1a631258d69cf7a2def9de1400000000000000000000000000000010").expect("the order");
+        let mut carry = 0;
+        for (byte, more) in other[32..].iter_mut().zip(order) {
+            let sum = u16::from(*byte) + u16::from(more) + carry;
+            (*byte, carry) = (sum as u8, sum >> 8);
+        }
+        assert!(carry == 0 && !signature::is_valid(&public, message, &other));
     }
 }
 
@@ -251,11 +261,18 @@ fn another_key_wants_the_signature_of_the_one_before() {
     let next = PrivateKey::generate().expect("random numbers");
     let write = |public: [u8; 32], trailer: &[u8]| [&[0x2E, 1, 0x10][..], &public, trailer].concat();
     bench.expect(&write(next.public(), &[]), &[0x7F, 0x2E, 0x13]);
-    bench.expect(&write(next.public(), &next.trailer(0x0110, None, 1, &next.public())), &[0x7F, 0x2E, 0x35]);
-    bench.expect(&write(next.public(), &key.trailer(0x0110, None, 1, &next.public())), &[0x6E, 1, 0x10]);
-    bench.expect(&write([0; 32], &key.trailer(0x0110, None, 2, &[0; 32])), &[0x7F, 0x2E, 0x35]);
-    bench.expect(&write([0; 32], &next.trailer(0x0110, None, 2, &[0; 32])), &[0x6E, 1, 0x10]);
-    assert_eq!(super::start(&flash).access(), Some(Access { key: None, counter: 2, wrong: 0 }));
+    // What is no point of the curve, or one of low order, locks out or in everyone.
+    let mut low_order = [0; 32];
+    low_order[0] = 1;
+    for (counter, bad) in [(1, [2; 32]), (2, low_order)] {
+        let response = bench.ask(&write(bad, &key.trailer(0x0110, None, counter, &bad)));
+        assert_eq!(response, Some(vec![0x7F, 0x2E, 0x31]), "{bad:02x?}");
+    }
+    bench.expect(&write(next.public(), &next.trailer(0x0110, None, 3, &next.public())), &[0x7F, 0x2E, 0x35]);
+    bench.expect(&write(next.public(), &key.trailer(0x0110, None, 3, &next.public())), &[0x6E, 1, 0x10]);
+    bench.expect(&write([0; 32], &key.trailer(0x0110, None, 4, &[0; 32])), &[0x7F, 0x2E, 0x35]);
+    bench.expect(&write([0; 32], &next.trailer(0x0110, None, 4, &[0; 32])), &[0x6E, 1, 0x10]);
+    assert_eq!(super::start(&flash).access(), Some(Access { key: None, counter: 4, wrong: 0 }));
 }
 
 /// Downloads a file, and returns the response to the routine that uses it.

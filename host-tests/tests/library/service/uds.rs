@@ -5,6 +5,7 @@ use super::{Board, sample, start};
 use gyronet::health::{Faults, Status};
 use gyronet::model::weights;
 use gyronet::sample::Standstill;
+use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
 use gyronet::uds::Server;
@@ -444,4 +445,17 @@ fn every_setting_has_a_data_identifier() {
     for setting in settings {
         assert!(known.iter().any(|known| setting.starts_with(known)), "{setting}");
     }
+}
+
+#[test]
+fn a_self_test_names_the_parts_that_fail() {
+    let (_, mut bench) = bench();
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.expect(&[0x31, 1, 2, 4], &[0x71, 1, 2, 4, 1 << 6]);
+    bench.seeds = vec![[1; 32]];
+    bench.expect(&[0x31, 1, 2, 4], &[0x71, 1, 2, 4, 0]);
+    bench.board.sensor(Err(SensorFault::Reset));
+    bench.board.weights_damaged();
+    bench.expect(&[0x31, 1, 2, 4], &[0x71, 1, 2, 4, 1 << 6 | 1 << 4 | 1 << 2]);
+    bench.expect(&[0x31, 3, 2, 4], &[0x7F, 0x31, 0x12]);
 }

@@ -21,14 +21,15 @@ pub const WHEELS: u16 = 0x0101;
 const CALIBRATION: u16 = 0x0102;
 const PIPELINE_COUNTERS: u16 = 0x0105;
 const INPUT_COUNTERS: u16 = 0x0106;
-/// The first one counts messages.
-pub const FOG_COUNTERS: u16 = 0x0109;
+const FOG_COUNTERS: u16 = 0x0109;
 const INFO: u16 = 0x010A;
 const CALIBRATION_STATE: u16 = 0x010C;
 /// The map of the unit's gyro.
 pub const UNIT: u16 = 0x010D;
 /// The public key of those who may write.
 pub const KEY: u16 = 0x0110;
+/// Messages of the fibre-optic gyro.
+pub const FOG_MESSAGES: u16 = 0x0112;
 /// Who may write.
 pub const ACCESS: u16 = 0x0111;
 /// The request for all counters.

@@ -1,0 +1,115 @@
+//! Routines (service 0x31): calibrations, the log, a self-test, and the use of a download.
+
+use super::data;
+use super::download::Download;
+use super::response::{Nrc, Response, exactly, nrc, put};
+use super::security::{self, Seed};
+use super::services::{SUPPRESS, Services, Session};
+use crate::service::calibrate::{State, Task};
+use crate::service::message::{Calibrate, Request};
+use crate::service::{Device, MappedSlots};
+use automotive_diag::uds::RoutineControlType;
+use embedded_storage::nor_flash::NorFlash;
+
+/// Examines the parts of the board.
+const SELF_TEST: u16 = 0x0204;
+/// Has a download used.
+const USE_DOWNLOAD: u16 = 0xFF01;
+
+/// Returns the parts of the board that fail, a bit each: 0 the processor's clock, 1 the CAN controller, 2 the inertial
+/// sensor's set-up, 3 stored data, 4 the weights, 5 the flash controller, 6 the random numbers.
+fn self_test<R: NorFlash, W: MappedSlots>(device: &Device<R, W>, has_random: bool) -> u8 {
+    let now = device.conditions();
+    let failures = [
+        now.clock_fault,
+        now.can_fault,
+        now.sensor_refused,
+        device.stored_damaged(),
+        now.no_weights,
+        !device.info().writable,
+        !has_random,
+    ];
+    failures.into_iter().rev().fold(0, |bits, fails| bits << 1 | u8::from(fails))
+}
+
+impl Services {
+    /// Runs a routine; its number and, for a calibration, its state are the response.
+    pub(super) fn routine<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        rest: &[u8],
+        device: &mut Device<R, W>,
+        entropy: impl FnOnce() -> Option<Seed>,
+        out: &mut Response,
+    ) -> Result<bool, Nrc> {
+        if let [1, 0x02, 0x03, after @ ..] = rest {
+            put(out, &[1, 0x02, 0x03])?;
+            data::put_record(out, &device.events(u32::from_be_bytes(exactly(after)?)))?;
+            return Ok(true);
+        }
+        self.needs(Session::Extended)?;
+        let (sub, high, low, option) = match *rest {
+            [sub, high, low, ref option @ ..] => (sub, high, low, option),
+            _ => return Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
+        };
+        let id = u16::from_be_bytes([high, low]);
+        let control = RoutineControlType::from_repr(sub & !SUPPRESS).ok_or(Nrc::SubFunctionNotSupported)?;
+        if id == SELF_TEST && control == RoutineControlType::StartRoutine {
+            let [] = exactly(option)?;
+            put(out, &[sub & !SUPPRESS, high, low, self_test(device, entropy().is_some())])?;
+            return Ok(sub & SUPPRESS == 0);
+        }
+        let task = match id {
+            0x0200 => Some(Task::Static),
+            0x0201 => Some(Task::Mounting),
+            _ => None,
+        };
+        put(out, &[sub & !SUPPRESS, high, low])?;
+        if id == USE_DOWNLOAD && control == RoutineControlType::StartRoutine {
+            self.needs(Session::Programming)?;
+            self.accept_download(option, device)?;
+            device.act(&Request::WeightsActivate).map_err(nrc)?;
+            return Ok(sub & SUPPRESS == 0);
+        }
+        let [] = exactly(option)?;
+        if control != RoutineControlType::RequestRoutineResult {
+            self.security.check(device)?;
+        }
+        match (id, task, control) {
+            (_, Some(task), RoutineControlType::StartRoutine) => {
+                device.act(&Request::Calibrate(Calibrate::Start(task))).map_err(nrc)?;
+            }
+            (_, Some(_), RoutineControlType::StopRoutine) => {
+                device.act(&Request::Calibrate(Calibrate::Cancel)).map_err(nrc)?;
+            }
+            (_, Some(task), RoutineControlType::RequestRoutineResult) => {
+                let state = match device.calibration_state() {
+                    State::Running(of) if of == task => 1,
+                    State::Found(of) if of == task => 2,
+                    State::Failed(of, _) if of == task => 3,
+                    _ => return Err(Nrc::RequestSequenceError),
+                };
+                put(out, &[state])?;
+            }
+            (0x0202, None, RoutineControlType::StartRoutine) => {
+                device.act(&Request::Calibrate(Calibrate::Store)).map_err(nrc)?;
+            }
+            (0x0202 | SELF_TEST | USE_DOWNLOAD, None, _) => return Err(Nrc::SubFunctionNotSupported),
+            _ => return Err(Nrc::RequestOutOfRange),
+        }
+        Ok(sub & SUPPRESS == 0)
+    }
+
+    /// Checks the signature of a download, where a key asks for one.
+    fn accept_download<R: NorFlash, W: MappedSlots>(
+        &self,
+        trailer: &[u8],
+        device: &mut Device<R, W>,
+    ) -> Result<(), Nrc> {
+        if device.access().is_some_and(|access| access.key.is_none()) {
+            return exactly(trailer).map(|[]: [u8; 0]| ());
+        }
+        let trailer = trailer.try_into().map_err(|_| Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        let digest = self.download.as_ref().and_then(Download::digest).ok_or(Nrc::RequestSequenceError)?;
+        security::accept(USE_DOWNLOAD, digest, trailer, device)
+    }
+}
