@@ -89,7 +89,8 @@ fn a_frame_out_of_order_ends_the_request_and_the_next_one_is_taken() {
 #[test]
 fn a_request_that_is_too_long_is_refused_by_its_first_frame() {
     let mut transport = Transport::new();
-    let too_long = [0x11, 0x03, 0, 0, 0, 0, 0, 0];
+    let [high, low] = (LONGEST as u16 + 1).to_be_bytes();
+    let too_long = [0x10 | high, low, 0, 0, 0, 0, 0, 0];
     // 4 GB less one, in the long form.
     let four_gb = [0x10, 0x00, 0xFF, 0xFF, 0xFF, 0xFF, 0x36, 1];
     for (k, first) in [too_long, four_gb].iter().enumerate() {
