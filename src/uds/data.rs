@@ -23,7 +23,7 @@
 //! | 0110 | 32 | public key of those who may write, zeros for none: see [`super::security`] | extended |
 //! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest counter; wrong answers; begin of the key | |
 //! | 0112 | 4 | messages of the fibre-optic gyro since the start, by themselves | |
-//! | 0201 to 021C | | [settings](super::settings), each by itself | extended |
+//! | 0201 to 021C | | [`super::settings`], each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
 

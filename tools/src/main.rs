@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 /// Run gyronet on a host: recorded drives through the code that is flashed.
 ///
-/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header. Its columns may be in any order, and
+/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header, its columns in any order;
 /// other columns are ignored:
 ///
 ///   t_s                    time, s

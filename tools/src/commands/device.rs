@@ -16,7 +16,9 @@ use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Query and configure a board over diagnosis (UDS), on its service line, any SLCAN adapter, or CAN.
+/// Query and configure a board over diagnosis (UDS).
+///
+/// It goes over the service line, any SLCAN adapter, or a CAN interface.
 ///
 /// A new configuration or new weights take effect after a restart (`device restart`).
 #[derive(Debug, clap::Args)]

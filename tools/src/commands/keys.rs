@@ -5,7 +5,9 @@ use gyronet_tools::signing::{PrivateKey, hex};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Make a key pair: NAME.key stays with whoever signs, NAME.pub goes onto boards (`device set-key`).
+/// Make a key pair for signing files.
+///
+/// NAME.key stays with whoever signs, NAME.pub goes onto boards (`device set-key`).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -10,7 +10,9 @@ use gyronet_tools::wheels::WheelFile;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Sign a file for boards with a key, which then accept it from anyone, once (`device ... --signature`).
+/// Sign a file for boards that have the key.
+///
+/// Such a board accepts the file from anyone, once (`device ... --signature`).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
