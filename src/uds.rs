@@ -20,6 +20,7 @@
 //! | 0x3E | any | tester present |
 //! | 0x85 | 2, 3 | stop and continue the memory of troubles |
 
+mod control;
 pub mod data;
 mod download;
 pub mod dtc;

@@ -21,4 +21,6 @@ pub struct Conditions {
     pub can_fault: bool,
     /// The last start followed a crash.
     pub crashed: bool,
+    /// The last request was refused for want of access.
+    pub access_refused: bool,
 }

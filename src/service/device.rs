@@ -11,7 +11,9 @@ pub use weights::MappedSlots;
 use super::calibrate::{Calibrator, State, Task};
 use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, LogPage, SensorFault};
-use super::message::{Calibrate, FlashState, Identity, Info, Origin, PROTOCOL, Refusal, Request};
+use super::message::{
+    AccessCounters, Calibrate, FlashState, Identity, Info, Origin, PROTOCOL, Refusal, Request,
+};
 use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
 use crate::health::{Faults, Status};
@@ -60,6 +62,7 @@ pub struct Device<R: NorFlash, W> {
     troubles: Troubles,
     /// `None` where it could not be read: then nobody may write.
     access: Option<Access>,
+    access_counters: AccessCounters,
     weights: WeightSource,
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
@@ -99,6 +102,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             accepted: Accepted::NONE,
             troubles: Troubles::NONE,
             access: Some(Access::OPEN),
+            access_counters: AccessCounters::NONE,
             weights: WeightSource::None,
             weights_crc: None,
             refused_slots: [None; 2],
@@ -209,8 +213,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.refusal
     }
 
-    /// Notes why a request is refused, and returns that.
+    /// Notes why a request is refused, counts it, and returns the reason.
     pub(crate) fn refuse_request(&mut self, refusal: Refusal) -> Refusal {
+        self.access_counters.count(&refusal);
         self.refusal = Some(refusal);
         refusal
     }
@@ -225,6 +230,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[must_use]
     pub fn access(&self) -> Option<Access> {
         self.access
+    }
+
+    /// Returns the numbers of requests that were refused for want of access.
+    #[must_use]
+    pub fn access_counters(&self) -> AccessCounters {
+        self.access_counters
     }
 
     /// Forgets why the last request was refused.
@@ -291,6 +302,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             tick: self.tick,
             can_fault: self.identity.can_fault.is_some(),
             crashed: self.identity.crash.is_some(),
+            access_refused: self.refusal.is_some_and(|refusal| refusal.is_for_want_of_access()),
         }
     }
 

@@ -97,6 +97,12 @@ pub enum EventKind {
     Sensor(Option<SensorFault>),
     /// The memory of troubles could not be read or stored.
     TroublesRefused(StoreError),
+    /// The record of who may write could not be read: nobody may.
+    AccessRefused(StoreError),
+    /// A key was stored, or another one: from now on what is written must be signed.
+    KeyStored,
+    /// The key was removed: everyone may write.
+    KeyRemoved,
 }
 
 /// Something that happened.

@@ -10,7 +10,7 @@ use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
 /// The version of what is encoded as these types; it is raised when one changes.
-pub const PROTOCOL: u8 = 9;
+pub const PROTOCOL: u8 = 10;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -111,6 +111,12 @@ pub enum Refusal {
     /// A key is needed, and this session has not proven to have it.
     #[error("the board has a key, and this session has no access: give its private part with --key")]
     Locked,
+    /// What is written to a board with a key wants a signature, and has none.
+    #[error("the board has a key, and what is written is not signed: give --key or --signature")]
+    Unsigned,
+    /// The answer to a challenge is none of the board's key.
+    #[error("the answer to the board's challenge is not one of its key: this is the key of another board")]
+    Answer,
     /// The signature is none of the board's key, or is for another identifier, content or board.
     #[error("the signature is not one of the board's key for this content, identifier and board")]
     Signature,
@@ -125,6 +131,14 @@ pub enum Refusal {
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
     #[error("the vehicle is not proven to stand still")]
     Moving,
+}
+
+impl Refusal {
+    /// Returns whether the request was refused because nobody has proven that it is the owner's.
+    #[must_use]
+    pub const fn is_for_want_of_access(&self) -> bool {
+        matches!(self, Self::Locked | Self::Unsigned | Self::Answer | Self::Signature | Self::Counter { .. })
+    }
 }
 
 impl From<StoreError> for Refusal {
@@ -242,6 +256,39 @@ pub struct AllCounters {
     pub fog: FogCounters,
     /// The counters of the coprocessor's inputs.
     pub inputs: InputCounters,
+}
+
+/// The numbers of requests that were refused for want of access since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct AccessCounters {
+    /// Requests in a session without access.
+    pub locked: u32,
+    /// Contents without a signature.
+    pub unsigned: u32,
+    /// Wrong answers to a challenge.
+    pub answers: u32,
+    /// Wrong signatures.
+    pub signatures: u32,
+    /// Signatures that had been used, or were older than one that had.
+    pub replayed: u32,
+}
+
+impl AccessCounters {
+    /// The counters before the first refusal.
+    pub const NONE: Self = Self { locked: 0, unsigned: 0, answers: 0, signatures: 0, replayed: 0 };
+
+    /// Counts a refusal, where it was for want of access.
+    pub(crate) fn count(&mut self, refusal: &Refusal) {
+        let counter = match refusal {
+            Refusal::Locked => &mut self.locked,
+            Refusal::Unsigned => &mut self.unsigned,
+            Refusal::Answer => &mut self.answers,
+            Refusal::Signature => &mut self.signatures,
+            Refusal::Counter { .. } => &mut self.replayed,
+            _ => return,
+        };
+        *counter = counter.saturating_add(1);
+    }
 }
 
 /// The numbers of errors on the lines.

@@ -103,6 +103,9 @@ impl Display for EventKind {
             Self::WeightsDamaged => f.write_str("weights in use damaged: the network is off"),
             Self::RecordsDamaged => f.write_str("stored records damaged: older or built-in ones are used"),
             Self::Sensor(None) => f.write_str("sensor set up"),
+            Self::AccessRefused(error) => write!(f, "record of who may write refused, nobody may: {error}"),
+            Self::KeyStored => f.write_str("key stored: what is written must be signed"),
+            Self::KeyRemoved => f.write_str("key removed: everyone may write"),
             Self::TroublesRefused(error) => write!(f, "memory of troubles not read or stored: {error}"),
             Self::Sensor(Some(fault)) => write!(f, "sensor not set up: {fault}"),
         }

@@ -23,6 +23,7 @@
 //! | 0110 | 32 | public key of those who may write, zeros for none: see [`super::security`] | extended |
 //! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest counter; wrong answers; begin of the key | |
 //! | 0112 | 4 | messages of the fibre-optic gyro since the start, by themselves | |
+//! | 0113 | 4 each | requests that were refused for want of access, in the order of [`AccessCounters`] | |
 //! | 0201 to 021C | | [`super::settings`], each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
@@ -33,7 +34,7 @@ use super::security::{self, Security};
 use super::settings;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
-use crate::service::message::{AllCounters, Calibrate, LineCounters, Request};
+use crate::service::message::{AccessCounters, AllCounters, Calibrate, LineCounters, Request};
 use crate::service::{Device, MappedSlots};
 use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
@@ -132,6 +133,12 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         0x010C => put_record(out, &device.calibration_state()),
         0x0111 => security::state(security, device, out),
         0x0112 => put(out, &counters.fog.samples.to_be_bytes()),
+        0x0113 => put_words(
+            out,
+            &words!(device.access_counters() => AccessCounters {
+                locked, unsigned, answers, signatures, replayed
+            }),
+        ),
         _ => settings::read(id, device, out),
     }
 }

@@ -2,6 +2,23 @@
 //!
 //! A fault is confirmed at once, because the pipeline has already waited as long as each needs; it stays in the memory
 //! until a tester clears it, also over a restart, so that one that comes and goes is found, too.
+//!
+//! | code | bytes | trouble | to look at |
+//! |---|---|---|---|
+//! | C1A01-31 | 5A0131 | inertial sensor: no signal | supply and wires of the sensor, `imu` |
+//! | C1A01-2A | 5A012A | inertial sensor: readings stand still | the sensor |
+//! | C1A01-22 | 5A0122 | inertial sensor: saturated | its range, what it is screwed to |
+//! | C1A01-62 | 5A0162 | inertial sensor: implausible, or its clock is off | mounting, `mounting` |
+//! | C1A01-49 | 5A0149 | inertial sensor: could not be set up | wires of SPI; `device info` has the register |
+//! | C1A01-38 | 5A0138 | inertial sensor: samples are missing | its wires, its output rate |
+//! | C1A02-44 | 5A0244 | stored data are damaged | `device log`; what is missing is stored again |
+//! | C1A02-46 | 5A0246 | no weights that can be used | `device weights` |
+//! | C1A03-47 | 5A0347 | the software crashed | `device info` has the reason |
+//! | C1A03-38 | 5A0338 | the processor's clock is not the crystal's | the crystal |
+//! | U1A01-88 | DA0188 | CAN: no bus, or frames were lost | wires, terminators, bit rate |
+//! | U1A01-49 | DA0149 | CAN: the controller does not start | the transceiver |
+//! | U1A02-87 | DA0287 | wheels: silent, or they contradict the gyro | wheel frames, radius, slip |
+//! | U1A03-81 | DA0381 | diagnosis: a request was refused for want of access | who has tried: data 0113 |
 
 use crate::health::{Faults, Status};
 use crate::service::Conditions;
@@ -47,6 +64,7 @@ enum Cause {
     Crash,
     Clock,
     Can,
+    AccessRefused,
 }
 
 impl Cause {
@@ -59,12 +77,13 @@ impl Cause {
             Self::Crash => now.crashed,
             Self::Clock => now.clock_fault,
             Self::Can => now.can_fault,
+            Self::AccessRefused => now.access_refused,
         }
     }
 }
 
 /// All troubles, in the order of the documents.
-pub static TROUBLES: [Trouble; 13] = [
+pub static TROUBLES: [Trouble; 14] = [
     trouble(0x5A01, 0x31, "inertial sensor: no signal", Cause::Status(Status::Silent)),
     trouble(0x5A01, 0x2A, "inertial sensor: readings stand still", Cause::Status(Status::Stuck)),
     trouble(0x5A01, 0x22, "inertial sensor: saturated", Cause::Status(Status::Clipped)),
@@ -83,6 +102,7 @@ pub static TROUBLES: [Trouble; 13] = [
     trouble(0xDA01, 0x88, "CAN: no bus, or frames were lost", Cause::Fault(Faults::BUS)),
     trouble(0xDA01, 0x49, "CAN: the controller does not start", Cause::Can),
     trouble(0xDA02, 0x87, "wheels: silent, or they contradict the gyro", Cause::Fault(Faults::WHEELS)),
+    trouble(0xDA03, 0x81, "diagnosis: a request was refused for want of access", Cause::AccessRefused),
 ];
 
 const _: () = assert!(TROUBLES.len() <= MOST_TROUBLES, "a record has room for all");

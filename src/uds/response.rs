@@ -29,7 +29,8 @@ pub(super) fn nrc(refusal: Refusal) -> Nrc {
             Nrc::RequestOutOfRange
         }
         Refusal::Locked => Nrc::SecurityAccessDenied,
-        Refusal::Signature => Nrc::InvalidKey,
+        Refusal::Unsigned => Nrc::IncorrectMessageLengthOrInvalidFormat,
+        Refusal::Answer | Refusal::Signature => Nrc::InvalidKey,
         Refusal::Counter { .. } => Nrc::RequestOutOfRange,
         Refusal::Store(StoreError::NoFlash) | Refusal::Slot(SlotError::NoFlash) => Nrc::ConditionsNotCorrect,
         Refusal::Store(StoreError::Flash(_) | StoreError::Full) | Refusal::Slot(SlotError::Flash(_)) => {

@@ -6,7 +6,7 @@ use super::response::{Nrc, Response, exactly, nrc, put};
 use super::security::{self, Seed};
 use super::services::{SUPPRESS, Services, Session};
 use crate::service::calibrate::{State, Task};
-use crate::service::message::{Calibrate, Request};
+use crate::service::message::{Calibrate, Refusal, Request};
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::RoutineControlType;
 use embedded_storage::nor_flash::NorFlash;
@@ -108,7 +108,9 @@ impl Services {
         if device.access().is_some_and(|access| access.key.is_none()) {
             return exactly(trailer).map(|[]: [u8; 0]| ());
         }
-        let trailer = trailer.try_into().map_err(|_| Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        let Ok(trailer) = trailer.try_into() else {
+            return Err(nrc(device.refuse_request(Refusal::Unsigned)));
+        };
         let digest = self.download.as_ref().and_then(Download::digest).ok_or(Nrc::RequestSequenceError)?;
         security::accept(USE_DOWNLOAD, digest, trailer, device)
     }

@@ -3,6 +3,7 @@
 //! Without a key everyone may write. With one, what is written is signed; whoever has the private part, and proves it once a
 //! session, may also restart, silence and calibrate the board, and clear its troubles. Wrong answers are stored before they are answered, so that a restart does not help to guess; from the third
 //! in a row on, each doubles a delay, which also runs after a restart.
+//! Refusals are counted (data 0113) and a trouble.
 //!
 //! | what | code |
 //! |---|---|
@@ -13,9 +14,10 @@
 //! | the delay runs | 0x37 |
 //! | no trailer | 0x13 |
 //! | a counter that is not greater than that of the newest signature, or no public key | 0x31 |
-//! | no random numbers, or the vehicle may move | 0x22 |
+//! | no random numbers, the same again, or the vehicle may move | 0x22 |
 
 use super::response::{Nrc, Response, exactly, nrc, put};
+use super::services::SUPPRESS;
 use super::signature::{self, Digest, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
 use crate::service::message::Refusal;
 use crate::service::{Device, MappedSlots};
@@ -36,13 +38,15 @@ const MOST_DOUBLED: u8 = 6;
 pub(super) struct Security {
     is_unlocked: bool,
     seed: Option<Seed>,
+    /// The newest challenge: one that comes twice is no random number.
+    newest: Seed,
     /// The time of the last wrong answer, ms; before any, that of the start.
     wrong_at: u32,
 }
 
 impl Security {
     pub const fn new() -> Self {
-        Self { is_unlocked: false, seed: None, wrong_at: 0 }
+        Self { is_unlocked: false, seed: None, newest: [0; SEED], wrong_at: 0 }
     }
 
     /// Ends the access: the session is over.
@@ -76,6 +80,7 @@ impl Security {
         if beyond > 0 && now.wrapping_sub(self.wrong_at) < delay {
             return Err(Nrc::RequiredTimeDelayNotExpired);
         }
+        let sub = sub & !SUPPRESS;
         put(out, &[sub])?;
         match sub {
             1 => {
@@ -83,8 +88,9 @@ impl Security {
                 // What is open has the challenge zero.
                 let seed = match access.key {
                     Some(_) if !self.is_unlocked => {
-                        let seed = entropy().ok_or(Nrc::ConditionsNotCorrect)?;
-                        self.seed = Some(seed);
+                        let seed = entropy().filter(|seed| *seed != self.newest);
+                        let seed = seed.ok_or(Nrc::ConditionsNotCorrect)?;
+                        (self.seed, self.newest) = (Some(seed), seed);
                         seed
                     }
                     _ => [0; SEED],
@@ -108,6 +114,7 @@ impl Security {
                     return Ok(());
                 }
                 self.wrong_at = now;
+                device.refuse_request(Refusal::Answer);
                 Err(if wrong > FREE { Nrc::ExceedNumberOfAttempts } else { Nrc::InvalidKey })
             }
             _ => Err(Nrc::SubFunctionNotSupported),
@@ -146,7 +153,7 @@ pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
         return Ok(bytes);
     }
     let Some((content, trailer)) = bytes.split_last_chunk::<TRAILER>() else {
-        return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+        return Err(nrc(device.refuse_request(Refusal::Unsigned)));
     };
     accept(target, &signature::digest(content), trailer, device)?;
     Ok(content)

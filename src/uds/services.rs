@@ -7,19 +7,16 @@ use super::data::{self, Sources};
 use super::download::Download;
 use super::dtc::Memory;
 use super::isotp::TransportErrors;
-use super::response::{Nrc, Response, exactly, nrc, put};
+use super::response::{Nrc, Response, put};
 use super::security::{self, Security, Seed};
 use super::troubles;
-use crate::service::message::{AllCounters, Request};
+use crate::service::message::AllCounters;
 use crate::service::{Device, MappedSlots};
-use automotive_diag::uds::{ResetType, UdsCommand};
+use automotive_diag::uds::UdsCommand;
 use embedded_storage::nor_flash::NorFlash;
 
 /// Longest silence of a tester in a session other than the default one, ms (S3).
 const SESSION_MS: u32 = 5_000;
-/// Longest time to a response, ms, and to one after "response pending", 10 ms (P2, P2*).
-const P2_MS: u16 = 50;
-const P2_STAR_10_MS: u16 = 500;
 /// This bit of a sub-function suppresses the positive response.
 pub(super) const SUPPRESS: u8 = 0x80;
 
@@ -48,7 +45,7 @@ pub(super) struct Services {
     pub heard: u32,
     /// The request came for all servers.
     pub is_functional: bool,
-    memory: Memory,
+    pub(super) memory: Memory,
     /// The memory has taken over what was stored before the start.
     is_restored: bool,
     /// The messages of the board are stopped.
@@ -113,7 +110,7 @@ impl Services {
         }
     }
 
-    fn enter(&mut self, session: Session) {
+    pub(super) fn enter(&mut self, session: Session) {
         self.session = session;
         self.download = None;
         self.security.end();
@@ -128,7 +125,7 @@ impl Services {
         self.session != Session::Default
             && matches!(
                 request,
-                [0x2E | 0x34, ..] | [0x27, 2, ..] | [0x31, 1, 0x02, 0x02] | [0x31, 1, 0xFF, 0x01, ..]
+                [0x2E | 0x34, ..] | [0x27, 2 | 0x82, ..] | [0x31, 1, 0x02, 0x02] | [0x31, 1, 0xFF, 0x01, ..]
             )
     }
 
@@ -183,77 +180,12 @@ impl Services {
         }
         let Surroundings { counters, errors, now, entropy, .. } = surroundings;
         match command {
-            UdsCommand::DiagnosticSessionControl => {
-                let [sub] = exactly(rest)?;
-                let session = match sub & !SUPPRESS {
-                    1 => Session::Default,
-                    2 => Session::Programming,
-                    3 => Session::Extended,
-                    _ => return Err(Nrc::SubFunctionNotSupported),
-                };
-                self.enter(session);
-                let [[a, b], [c, d]] = [P2_MS.to_be_bytes(), P2_STAR_10_MS.to_be_bytes()];
-                put(out, &[session as u8, a, b, c, d])?;
-                Ok(sub & SUPPRESS == 0)
-            }
-            UdsCommand::ECUReset => {
-                let [sub] = exactly(rest)?;
-                let reset = ResetType::from_repr(sub & !SUPPRESS);
-                if !matches!(reset, Some(ResetType::HardReset | ResetType::SoftReset)) {
-                    return Err(Nrc::SubFunctionNotSupported);
-                }
-                self.security.check(device)?;
-                device.act(&Request::Restart).map_err(nrc)?;
-                self.is_restarting = true;
-                put(out, &[sub & !SUPPRESS])?;
-                Ok(sub & SUPPRESS == 0)
-            }
-            UdsCommand::TesterPresent => {
-                let [sub] = exactly(rest)?;
-                if sub & !SUPPRESS != 0 {
-                    return Err(Nrc::SubFunctionNotSupported);
-                }
-                put(out, &[0])?;
-                Ok(sub & SUPPRESS == 0)
-            }
-            UdsCommand::CommunicationControl => {
-                self.needs(Session::Extended)?;
-                let [sub, what] = exactly(rest)?;
-                let is_silenced = match sub & !SUPPRESS {
-                    0 => false,
-                    1 => true,
-                    _ => return Err(Nrc::SubFunctionNotSupported),
-                };
-                // Normal messages, or they and those of a network management that this board has not got.
-                if !matches!(what, 1 | 3) {
-                    return Err(Nrc::RequestOutOfRange);
-                }
-                self.security.check(device)?;
-                if is_silenced && !device.may_interrupt() {
-                    return Err(Nrc::ConditionsNotCorrect);
-                }
-                self.is_silenced = is_silenced;
-                put(out, &[sub & !SUPPRESS])?;
-                Ok(sub & SUPPRESS == 0)
-            }
-            UdsCommand::ControlDTCSetting => {
-                self.needs(Session::Extended)?;
-                let sub = *rest.first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
-                self.security.check(device)?;
-                self.memory.is_enabled = match sub & !SUPPRESS {
-                    1 => true,
-                    2 => false,
-                    _ => return Err(Nrc::SubFunctionNotSupported),
-                };
-                put(out, &[sub & !SUPPRESS])?;
-                Ok(sub & SUPPRESS == 0)
-            }
-            UdsCommand::ClearDiagnosticInformation => {
-                let [a, b, c] = exactly(rest)?;
-                self.security.check(device)?;
-                let is_known = self.memory.clear(u32::from_be_bytes([0, a, b, c]));
-                if is_known { Ok(true) } else { Err(Nrc::RequestOutOfRange) }
-            }
+            UdsCommand::DiagnosticSessionControl => self.session_control(rest, out),
+            UdsCommand::ECUReset => self.reset(rest, device, out),
+            UdsCommand::TesterPresent => Self::tester_present(rest, out),
+            UdsCommand::CommunicationControl => self.communication_control(rest, device, out),
+            UdsCommand::ControlDTCSetting => self.dtc_setting(rest, device, out),
+            UdsCommand::ClearDiagnosticInformation => self.clear_troubles(rest, device),
             UdsCommand::ReadDTCInformation => troubles::read(&self.memory, rest, out).map(|()| true),
             UdsCommand::ReadDataByIdentifier => {
                 if rest.is_empty() || !rest.len().is_multiple_of(2) {
@@ -286,7 +218,7 @@ impl Services {
             UdsCommand::SecurityAccess => {
                 self.needs(Session::Extended)?;
                 self.security.access(rest, device, now, entropy, out)?;
-                Ok(true)
+                Ok(rest.first().is_some_and(|sub| sub & SUPPRESS == 0))
             }
             UdsCommand::RoutineControl => self.routine(rest, device, entropy, out),
             UdsCommand::RequestDownload => {

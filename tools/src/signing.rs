@@ -73,6 +73,10 @@ impl PrivateKey {
             PathBuf::from(path)
         });
         let [private, public] = &paths;
+        if public.exists() {
+            let source = std::io::ErrorKind::AlreadyExists.into();
+            return Err(KeyError::File { path: public.clone(), source });
+        }
         create(private, PRIVATE, &self.0.to_bytes())?;
         create(public, PUBLIC, &self.public())?;
         Ok(paths)

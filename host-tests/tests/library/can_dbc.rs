@@ -5,6 +5,7 @@ use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch;
 use gyronet::can::config::{Config, Settings, Vdc2Settings};
+use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::j1939::Vdc2;
 use gyronet::can::load::Periodic;
@@ -69,12 +70,26 @@ fn the_file_has_every_message_with_its_cycle_time() {
     let fog =
         FOG_IDS.map(|id| Periodic { id: Id::Standard(StandardId::new(id).expect("11 bits")), period_ms: 10 });
     let sent: Vec<Periodic> = config.messages().iter().copied().chain(fog).collect();
-    assert_eq!(DBC.messages.len(), sent.len());
+    assert_eq!(DBC.messages.len(), sent.len() + DIAGNOSIS.len());
     for sent in sent {
         let message = message(sent.id);
         assert_eq!(message.size, 8);
         let cycle = DBC.message_attribute(message.id, "GenMsgCycleTime");
         assert_eq!(cycle, Some(&AttributeValue::Uint(sent.period_ms.into())), "{}", message.name);
+        assert!(DBC.message_comment(message.id).is_some(), "{}", message.name);
+    }
+}
+
+/// The attributes by which Vector's tools know a diagnostic message.
+const DIAGNOSIS: [&str; 3] = ["DiagRequest", "DiagState", "DiagResponse"];
+
+#[test]
+fn the_file_has_the_frames_of_diagnosis() {
+    let ids = DiagnosisIds::DEFAULT.ids().expect("they differ");
+    for (id, attribute) in ids.into_iter().zip(DIAGNOSIS) {
+        let message = message(id);
+        assert!(message.size == 8 && message.signals.is_empty(), "{}", message.name);
+        assert_eq!(DBC.message_attribute(message.id, attribute), Some(&AttributeValue::Uint(1)));
         assert!(DBC.message_comment(message.id).is_some(), "{}", message.name);
     }
 }

@@ -70,7 +70,10 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Ok(troubles) => self.troubles = troubles.unwrap_or(Troubles::NONE),
             Err(error) => self.note(EventKind::TroublesRefused(error)),
         }
-        self.access = store.get().map(|access| access.unwrap_or(Access::OPEN)).ok();
+        self.access = match self.take(store.get(), EventKind::AccessRefused) {
+            (_, Origin::Refused(_)) => None,
+            (access, _) => Some(access.unwrap_or(Access::OPEN)),
+        };
         self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
         self.store = self.writable.then_some(store);
     }
@@ -161,7 +164,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     pub(crate) fn store_access(&mut self, access: Access) -> Result<(), Refusal> {
         self.store()?.set(&access)?;
-        self.access = Some(access);
+        let before = self.access.replace(access).and_then(|access| access.key);
+        match access.key {
+            None if before.is_some() => self.note(EventKind::KeyRemoved),
+            Some(_) if before != access.key => self.note(EventKind::KeyStored),
+            _ => {}
+        }
         Ok(())
     }
 

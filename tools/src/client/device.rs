@@ -7,6 +7,8 @@ pub mod requests;
 pub mod settings;
 pub mod upload;
 
+pub use access::AccessState;
+
 use super::bus::Bus;
 use crate::signing::PrivateKey;
 use embedded_can::{Frame, Id};

@@ -6,11 +6,11 @@ mod settings;
 use super::Common;
 use clap::Subcommand;
 use gyronet::can::diagnosis::DiagnosisIds;
-use gyronet::service::message::Info;
+use gyronet::service::message::{AccessCounters, Info};
 use gyronet_tools::client::bus::{self, Bus};
 use gyronet_tools::client::device::settings::{flat, value as value_of};
 use gyronet_tools::client::device::upload::upload;
-use gyronet_tools::client::device::{Authority, Device};
+use gyronet_tools::client::device::{AccessState, Authority, Device};
 use gyronet_tools::signing::{self, PrivateKey};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -98,6 +98,15 @@ enum Action {
 
 type Board = Device<Box<dyn Bus>>;
 
+/// What `access` prints.
+#[derive(Serialize)]
+struct Access {
+    #[serde(flatten)]
+    access: AccessState,
+    /// Requests refused for want of access since the start.
+    refused: AccessCounters,
+}
+
 /// Reads two hexadecimal identifiers.
 fn identifiers(text: &str) -> Result<DiagnosisIds, String> {
     let (request, response) = text.split_once(',').ok_or("not REQUEST,RESPONSE")?;
@@ -147,7 +156,10 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             print_value(&counters, json)?;
         }
         Action::Weights { file } => weights(&mut device, file, json, common)?,
-        Action::Access => print_value(&device.access()?, json)?,
+        Action::Access => {
+            let access = Access { access: device.access()?, refused: device.access_counters()? };
+            print_value(&access, json)?;
+        }
         Action::SetKey { key } => {
             let public = if key.as_os_str() == "none" { [0; 32] } else { signing::read_public(key)? };
             device.set_key(&public)?;

@@ -1,7 +1,7 @@
 """Random number generator (RM0090 section 24): a number of 32 bits every 40 periods of the 48 MHz clock of the PLL.
 
 Settings: `seed` of the noise, `seed_error` (the noise is a constant: SECS), `stuck` (a number that comes again and again, or
-None). The noise goes on through resets, as an analogue source does.
+None), `clock_error` (its clock has failed: CECS). The noise goes on through resets, as an analogue source does.
 """
 
 from random import Random
@@ -24,7 +24,7 @@ class Rng(Peripheral):
     def __init__(self, board):
         super().__init__(board)
         self.random = Random(24)
-        self.seed_error, self.stuck = False, None
+        self.seed_error, self.stuck, self.clock_error = False, None, False
         self.cr, self.flags, self.data, self.ready, self.pending = 0, 0, 0, False, None
 
     def reset(self, cause):
@@ -44,7 +44,7 @@ class Rng(Peripheral):
         return rcc.pll_hz("q")
 
     def _clock_error(self):
-        return self._clock_hz() < self.board.rcc.clock_hz("HCLK") / 16
+        return self.clock_error or self._clock_hz() < self.board.rcc.clock_hz("HCLK") / 16
 
     def _start(self):
         if self.cr & RNGEN and not self.pending and not self._errors():
@@ -102,6 +102,8 @@ class Rng(Peripheral):
             self.random = Random(value)
         elif key == "seed_error":
             self.seed_error = value
+        elif key == "clock_error":
+            self.clock_error = value
         elif key == "stuck":
             self.stuck = value
         else:

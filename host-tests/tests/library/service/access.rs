@@ -1,11 +1,18 @@
 //! Who may write: a board with a key takes what is signed with its private part, once, and nothing else.
 
 use super::uds::{Bench, bench};
+use embedded_can::{ExtendedId, Id};
+use gyronet::can::e2e::{P02, Profile};
+use gyronet::can::signal::{BitField, ByteOrder};
+use gyronet::can::wheel::{Checksum, WheelFrame, WheelSettings, WheelSignal};
 use gyronet::model::weights;
+use gyronet::service::event::EventKind;
 use gyronet::service::message::Refusal;
-use gyronet::store::{Access, Configuration, Record};
+use gyronet::store::layout::{RECORD_SECTOR, STORE};
+use gyronet::store::{Access, Configuration, FieldError, Record, Store, StoreError};
 use gyronet::uds::signature;
-use gyronet_host_tests::flash::{Cut, F405};
+use gyronet::units::{Duration, WheelSpeed};
+use gyronet_host_tests::flash::{Cut, F405, Region};
 use gyronet_host_tests::stored::other_weights;
 use gyronet_tools::signing::{PrivateKey, unhex};
 use std::cell::RefCell;
@@ -144,7 +151,7 @@ fn what_is_unsigned_cut_foreign_or_changed_is_refused() {
     let mut any = good;
     any[0] = 1;
     for (what, request, code, reason) in [
-        ("unsigned", write(&content(1)[..40], &[]), 0x13, None),
+        ("unsigned", write(&content(1)[..40], &[]), 0x13, Some(Refusal::Unsigned)),
         ("cut", write(&content(1), &good[..68]), 0x35, Some(Refusal::Signature)),
         (
             "of another key",
@@ -172,7 +179,7 @@ fn what_is_unsigned_cut_foreign_or_changed_is_refused() {
         // A cut trailer takes a byte of the content for its own first one.
         let is_cut = what == "cut" && response == Some(vec![0x7F, 0x2E, 0x13]);
         assert!(is_cut || response == Some(vec![0x7F, 0x2E, code]), "{what}: {response:02x?}");
-        if reason.is_some() && !is_cut {
+        if !is_cut {
             assert_eq!(refusal(&mut bench), reason, "{what}");
         }
     }
@@ -207,7 +214,10 @@ fn access_is_proven_for_one_session() {
     assert_eq!(access(&mut bench).0, 2);
     bench.expect(&[0x27, 1], &[&[0x67, 1][..], &[0; 32]].concat());
     bench.expect(&[0x14, 255, 255, 255], &[0x54]);
-    // An answer holds for its challenge alone, and access for its session.
+    // An answer holds for its challenge alone, and access for its session, which five seconds of silence end.
+    bench.now += 5_001;
+    bench.expect(&[0x28, 0, 1], &[0x7F, 0x28, 0x7F]);
+    assert_eq!(access(&mut bench).0, 1);
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     bench.expect(&[0x14, 255, 255, 255], &[0x7F, 0x14, 0x33]);
     bench.seeds = vec![[8; 32]];
@@ -218,8 +228,10 @@ fn access_is_proven_for_one_session() {
 #[test]
 fn wrong_answers_cost_time_also_over_a_restart() {
     let (flash, mut bench, key) = locked();
-    let attempt = |bench: &mut Bench, answer: [u8; 64]| {
-        bench.seeds = vec![[1; 32]];
+    let mut seed = 0;
+    let mut attempt = |bench: &mut Bench, answer: [u8; 64]| {
+        seed += 1;
+        bench.seeds = vec![[seed; 32]];
         bench.stand();
         match bench.ask(&[0x27, 1]) {
             Some(response) if response[0] == 0x67 => *bench
@@ -251,7 +263,8 @@ fn wrong_answers_cost_time_also_over_a_restart() {
     assert_eq!(attempt(&mut bench, [0; 64]), 0x37, "twenty seconds");
     bench.now += 1_100;
     enter(&mut bench);
-    assert_eq!(attempt(&mut bench, key.answer(&SERIAL, &[1; 32])), 2, "the right answer");
+    let right = key.answer(&SERIAL, &[9; 32]);
+    assert_eq!(attempt(&mut bench, right), 2, "the right answer");
     assert_eq!(access(&mut bench), (2, 0, 0));
 }
 
@@ -331,4 +344,123 @@ fn a_power_cut_never_takes_the_counter_back() {
         cuts += 1;
     }
     assert!(cuts > 4, "{cuts} operations to cut");
+}
+
+/// What a workshop and the owner see of somebody who tried.
+#[test]
+fn refusals_are_counted_and_a_trouble_that_stays() {
+    let (flash, mut bench, key) = locked();
+    let counters = |bench: &mut Bench| bench.ask(&[0x22, 1, 0x13]).expect("counters")[3..].to_vec();
+    let words = |words: [u32; 5]| words.iter().flat_map(|word| word.to_be_bytes()).collect::<Vec<u8>>();
+    assert_eq!(counters(&mut bench), words([0; 5]));
+    let signed = |counter| key.trailer(CONFIGURATION, None, counter, &content(1));
+    bench.expect(&[0x28, 1, 1], &[0x7F, 0x28, 0x33]);
+    bench.expect(&write(&content(1)[..40], &[]), &[0x7F, 0x2E, 0x13]);
+    bench.seeds = vec![[1; 32]];
+    assert!(bench.ask(&[0x27, 1]).is_some_and(|response| response[0] == 0x67));
+    bench.expect(&[&[0x27, 2][..], &[0; 64]].concat(), &[0x7F, 0x27, 0x35]);
+    bench.expect(&write(&content(2), &signed(1)), &[0x7F, 0x2E, 0x35]);
+    bench.expect(&write(&content(1), &signed(1)), &[0x6E, 1, 0]);
+    bench.expect(&write(&content(1), &signed(1)), &[0x7F, 0x2E, 0x31]);
+    assert_eq!(counters(&mut bench), words([1; 5]));
+    // U1A03-81, present with the last request, in the memory after another one, and after a restart.
+    let status = |bench: &mut Bench| {
+        let list = bench.ask(&[0x19, 2, 0x08]).expect("a list");
+        list[3..]
+            .chunks(4)
+            .find(|trouble| trouble[..3] == [0xDA, 0x03, 0x81])
+            .map(|trouble| trouble[3] & 0x09)
+    };
+    assert_eq!(status(&mut bench), Some(0x09));
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert_eq!(status(&mut bench), Some(0x08));
+    let mut bench = Bench::new(&flash);
+    assert_eq!((status(&mut bench), counters(&mut bench)), (Some(0x08), words([0; 5])));
+}
+
+#[test]
+fn a_challenge_that_comes_twice_is_none() {
+    let (_, mut bench, key) = locked();
+    bench.seeds = vec![[7; 32], [7; 32]];
+    assert!(bench.ask(&[0x27, 1]).is_some_and(|response| response[0] == 0x67));
+    bench.expect(&[0x27, 1], &[0x7F, 0x27, 0x22]);
+    // Without a positive response where none is wanted; behind "response pending" there is a response all the same.
+    bench.seeds = vec![[8; 32]];
+    assert_eq!(bench.ask(&[0x27, 0x81]), None);
+    bench.expect(&[&[0x27, 0x82][..], &key.answer(&SERIAL, &[8; 32])].concat(), &[0x67, 2]);
+    assert_eq!(access(&mut bench).0, 2);
+}
+
+#[test]
+fn keys_that_come_and_go_are_in_the_log() {
+    let (_, mut bench) = bench();
+    let key = PrivateKey::generate().expect("random numbers");
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    let before = bench.board.events(0).total;
+    bench.expect(&[&[0x2E, 1, 0x10][..], &key.public()].concat(), &[0x6E, 1, 0x10]);
+    let remove = [&[0x2E, 1, 0x10][..], &[0; 32], &key.trailer(0x0110, None, 1, &[0; 32])].concat();
+    bench.expect(&remove, &[0x6E, 1, 0x10]);
+    let kinds: Vec<EventKind> = bench.board.events(before).events.iter().map(|event| event.kind).collect();
+    assert_eq!(kinds, [EventKind::KeyStored, EventKind::KeyRemoved]);
+}
+
+/// A record of a later firmware, for one: nobody may write, and the board reports why.
+#[test]
+fn a_record_that_cannot_be_read_locks_and_is_reported() {
+    let (flash, _, _) = locked();
+    let mut store = Store::open(Region::<RECORD_SECTOR>::new(&flash, STORE), 0, false).expect("it is whole");
+    store.set(&Later(0)).expect("there is room");
+    let mut bench = Bench::new(&flash);
+    assert_eq!(access(&mut bench).0, 1);
+    assert!(bench.board.stored_damaged());
+    let events = bench.board.events(0).events;
+    let refused = EventKind::AccessRefused(StoreError::Version { found: 200, expected: Access::VERSION });
+    assert!(events.iter().any(|event| event.kind == refused), "{events:?}");
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    bench.expect(&write(&content(1), &[0; 69]), &[0x7F, 0x2E, 0x33]);
+}
+
+/// A record under the key of access.
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Later(u8);
+
+impl Record for Later {
+    const KEY: u8 = Access::KEY;
+    const VERSION: u8 = 200;
+
+    fn check(&self) -> Result<(), FieldError> {
+        Ok(())
+    }
+}
+
+/// Four frames of 29 bits with the longest protection, and the largest numbers.
+#[test]
+fn the_longest_wheel_settings_fit_with_their_trailer() {
+    let (flash, mut bench, key) = locked();
+    let frame = |k: u32| WheelFrame {
+        id: Id::Extended(ExtendedId::new(0x1FFF_FFF0 + k).expect("29 bits")),
+        counter: None,
+        checksum: Checksum::E2e(Profile::P02(P02 { data_ids: [0xFF; 16] })),
+    };
+    let signal = |frame| WheelSignal {
+        frame,
+        field: BitField::new(32, 32, ByteOrder::Intel, true).expect("it fits"),
+        factor_q16: i32::MIN,
+        offset: WheelSpeed(i32::MIN),
+        invalid: Some(u32::MAX),
+    };
+    let wheels = WheelSettings {
+        frames: [0, 1, 2, 3].map(|k| Some(frame(k))),
+        signals: [0, 1, 2, 3].map(|k| Some(signal(k))),
+        timeout: Duration(10_000_000),
+        still_speed: WheelSpeed(i32::MAX),
+        still_for: Duration(10_000_000),
+    };
+    let content = postcard::to_stdvec(&wheels).expect("there is room");
+    assert!(content.len() > 180, "{}", content.len());
+    let request = [&[0x2E, 1, 1][..], &content, &key.trailer(0x0101, None, 1, &content)].concat();
+    bench.expect(&request, &[0x6E, 1, 1]);
+    assert_eq!(*super::start(&flash).wheels(), wheels);
 }

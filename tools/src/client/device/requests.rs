@@ -8,7 +8,7 @@ use gyronet::fog::FogCounters;
 use gyronet::health::{Counters, InputCounters, MonitorCounters};
 use gyronet::service::calibrate::{State, Task};
 use gyronet::service::event::LogPage;
-use gyronet::service::message::{AllCounters, Info, LineCounters, PROTOCOL};
+use gyronet::service::message::{AccessCounters, AllCounters, Info, LineCounters, PROTOCOL};
 use gyronet::store::{Calibration, Configuration, Record, UnitMap};
 use gyronet::uds::Session;
 use serde::de::value::{Error, SeqAccessDeserializer};
@@ -32,6 +32,7 @@ pub const KEY: u16 = 0x0110;
 pub const FOG_MESSAGES: u16 = 0x0112;
 /// Who may write.
 pub const ACCESS: u16 = 0x0111;
+const ACCESS_COUNTERS: u16 = 0x0113;
 /// The request for all counters.
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
@@ -166,6 +167,16 @@ impl<B: Bus> Device<B> {
     /// [`DeviceError`].
     pub fn counters(&mut self) -> Result<AllCounters> {
         counters(&self.ask(&COUNTERS)?)
+    }
+
+    /// Returns the numbers of requests that were refused for want of access since the start.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn access_counters(&mut self) -> Result<AccessCounters> {
+        let words = self.read(ACCESS_COUNTERS)?;
+        let mut words = Words(&words);
+        words.fields()
     }
 
     /// Restarts the board.
