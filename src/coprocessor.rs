@@ -22,6 +22,7 @@ mod config;
 mod handover;
 mod timeline;
 
+pub use crate::pipeline::DueWindow;
 pub use config::{Clock, Config, InputError, StorageFaults};
 
 use crate::bias::{Latitude, StaticError};
@@ -39,7 +40,7 @@ use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::SecondsWindow;
 use crate::monitor::{SensorMonitor, TIMEOUT_US};
-use crate::pipeline::{DueWindow, Pipeline};
+use crate::pipeline::Pipeline;
 use crate::sample::{FogSample, ImuSample, Standstill, WheelSample};
 use crate::units::Micros;
 use handover::Handover;

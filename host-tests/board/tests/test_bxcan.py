@@ -5,6 +5,7 @@ import unittest
 from .fake_board import MS, US, FakeBoard
 from virtual_board.peripherals import can_frame
 from virtual_board.peripherals.can_frame import Frame, frame_bits, priority
+from virtual_board.violation import Violation
 
 MCR, MSR, TSR, RF0R, IER, ESR, BTR = 0x00, 0x04, 0x08, 0x0C, 0x14, 0x18, 0x1C
 FMR, FM1R, FS1R, FFA1R, FA1R, BANK = 0x200, 0x204, 0x20C, 0x214, 0x21C, 0x240
@@ -112,6 +113,22 @@ class BxCan(unittest.TestCase):
         self.assertEqual(self.read(MSR) & 1, 1)
         self.board.advance(2 * US)
         self.assertEqual(self.read(MSR) & 3, 0)
+
+    def test_asking_again_for_normal_mode_does_not_start_the_wait_anew(self):
+        self.write(MCR, INRQ)
+        self.board.advance(10 * US)
+        self.write(BTR, BTR_500K)
+        for _ in range(12):
+            self.write(MCR, ABOM)
+            self.board.advance(2 * US)
+        self.assertEqual(self.read(MSR) & 3, 0)
+
+    def test_a_time_stamp_is_not_modelled(self):
+        self.start(ABOM | 1 << 7)
+        self.assertEqual(self.read(0x188), 0)
+        for length in (0x184, 0x1B4):
+            with self.assertRaises(Violation):
+                self.read(length)
 
     def test_without_the_receive_pin_it_never_synchronises(self):
         self.board.alternate("A", 11, 1)

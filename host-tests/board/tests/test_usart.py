@@ -3,6 +3,7 @@
 import unittest
 
 from .fake_board import MS, US, FakeBoard
+from virtual_board.violation import Violation
 
 SR, DR, BRR, CR1 = range(0, 0x10, 4)
 RXNE, TC, TXE, ORE, FE, IDLE = 1 << 5, 1 << 6, 1 << 7, 1 << 3, 1 << 1, 1 << 4
@@ -50,6 +51,13 @@ class Usart(unittest.TestCase):
         self.write(DR, 1)
         self.board.advance(1 * MS)
         self.assertEqual(self.usart.take_sent()[0][0] - begun, 2 * 10 * 139 * 62_500)
+
+    def test_bytes_are_read_from_the_data_register_alone(self):
+        self.usart.inject(b"\x5A")
+        self.board.advance(1 * MS)
+        self.assertEqual(self.board.read("USART2", DR, 1), 0x5A)
+        with self.assertRaises(Violation):
+            self.board.read("USART2", SR, 1)
 
     def test_no_pin_no_byte(self):
         self.board.alternate("A", 2, 1)

@@ -6,6 +6,7 @@ mod can;
 mod clock;
 mod common;
 mod crash;
+mod embassy;
 mod endurance;
 mod icm42688;
 mod model;

@@ -1,7 +1,7 @@
 """bxCAN, controller CAN1 (RM0090 section 32): modes, mailboxes, FIFOs, error management, interrupts.
 
 The bus behind it is `can_bus.CanBus`, reached as `bus`; the filters are `can_filters.Filters`.
-Left out: time-triggered communication, the debug freeze, CAN2.
+Left out: time stamps (time-triggered mode can be set, and reading a stamp then ends the run), the debug freeze, CAN2.
 Rests on the manual's silence: a receive pin without its alternate function reads dominant, so the controller does not synchronise;
 mailboxes keep their requests in initialisation and in bus-off; MSR.RX shows the level between frames; entering initialisation or Sleep
 outside of a frame takes one bit.
@@ -30,6 +30,8 @@ MCR_RESET, BTR_RESET = 0x0001_0002, 0x0123_0000
 TX_PINS = (("A", 12), ("B", 9), ("D", 1))
 RX_PINS = (("A", 11), ("B", 8), ("D", 0), ("I", 9))
 FUNCTION = 9
+#: The lengths of the mailboxes, whose upper halves are the frames' time stamps in time-triggered mode.
+STAMPED = (0x184, 0x194, 0x1A4, 0x1B4, 0x1C4)
 RECOVERY_SEQUENCES, SEQUENCE_BITS = 128, 11
 
 
@@ -103,10 +105,14 @@ class BxCan(Peripheral):
             wanted = "init"
         else:
             wanted = "normal"
+        wanted = None if wanted == self.state else wanted
         if self.mode_event:
+            if wanted == self.wanted:
+                # What is under way goes on.
+                return
             self.mode_event.cancel()
             self.mode_event = None
-        self.wanted = None if wanted == self.state else wanted
+        self.wanted = wanted
         if self.wanted == "normal":
             self._synchronise()
         elif self.wanted:
@@ -372,6 +378,8 @@ class BxCan(Peripheral):
 
     def read(self, offset, size):
         registers.check(self, offset, size, registers.WORD)
+        if self.mcr & TTCM and offset in STAMPED:
+            raise Violation("CAN1: time stamps are not modelled")
         if offset == 0x08:
             return self.mailboxes.tsr(self.mcr & TXFP)
         if offset in (0x0C, 0x10):
@@ -439,12 +447,10 @@ class BxCan(Peripheral):
         self._interrupts()
 
     def _write_mcr(self, value):
-        if value & TTCM:
-            raise Violation("CAN1: time-triggered communication is not modelled")
         if value & RESET:
             self.reset("rcc")
             return
-        self.mcr = value & 0x0001_007F
+        self.mcr = value & 0x0001_00FF
         self._request_mode()
 
     def _write_btr(self, value):

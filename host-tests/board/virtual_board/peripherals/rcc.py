@@ -32,6 +32,8 @@ CFGR_WRITABLE = 0xFFFF_FCF3
 AHB_SHIFT = {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}
 APB_SHIFT = {4: 1, 5: 2, 6: 3, 7: 4}
 BUS_OF_ENABLE = {0x30: "HCLK", 0x34: "HCLK", 0x38: "HCLK", 0x40: "PCLK1", 0x44: "PCLK2"}
+#: A register of the STM32F42x, which embassy-stm32 writes on this part too; here it reads 0 and takes nothing.
+DCKCFGR = 0x8C
 OSCILLATOR_SWITCH_PS = 200_000
 
 
@@ -313,6 +315,8 @@ class Rcc(Peripheral):
             value = self.sscgr
         elif word == 0x84:
             value = self.plli2scfgr
+        elif word == DCKCFGR:
+            value = 0
         else:
             raise registers.unmodelled(self, offset, "read")
         return registers.cut(value, offset, size)
@@ -337,6 +341,8 @@ class Rcc(Peripheral):
             self._write_csr(value)
         elif word == 0x84:
             self.plli2scfgr = value & 0x7000_7FC0
+        elif word == DCKCFGR:
+            self.board.record("ignored_write", register="RCC_DCKCFGR", value=value)
         else:
             raise registers.unmodelled(self, offset, "write")
 

@@ -1,0 +1,71 @@
+//! The coprocessor on a Cortex-M0 with 16 KiB of RAM, whose network is a linear part alone.
+//!
+//! `cargo run -p gyronet --release --example cortex_m0 --features microbit --target thumbv6m-none-eabi` runs it in QEMU:
+//! a parked car and a turn; the exit status says whether the last rate is that of the turn.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("this is for a Cortex-M0: add --features microbit --target thumbv6m-none-eabi");
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use cortex_m_semihosting::{debug, hprintln};
+    use gyronet::health::{Source, Status};
+    use gyronet::model::gyronet::GyroNetState;
+    use gyronet::sample::Validity;
+    use gyronet::units::SpecificForce;
+    use gyronet::{AngularRate, Blob, Coprocessor, GyroNet, ImuSample, Micros, WindowNetwork, weights};
+    use panic_semihosting as _;
+
+    /// A network of a linear part alone.
+    type Linear = GyroNet<'static, GyroNetState<0, 0, 0>, 0, 0, 0>;
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        let coprocessor = cortex_m::singleton!(: Coprocessor = Coprocessor::START);
+        let blob = Blob::new_checked(&weights::LINEAR_WINDOW.0);
+        let network = blob.and_then(|blob| Linear::with_state(blob, GyroNetState::ZERO));
+        let passed =
+            coprocessor.zip(network.ok()).is_some_and(|(coprocessor, network)| run(coprocessor, network));
+        debug::exit(if passed { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+
+    /// Corrects five seconds of samples. Returns whether the last rate is the network's, and within 1 % of the turn's.
+    fn run(coprocessor: &mut Coprocessor, mut network: Linear) -> bool {
+        let mut last = None;
+        for number in 0..500 {
+            let now = Micros(10_000 * u64::from(number));
+            last = coprocessor.imu(read(number, now), now).ok();
+            if let Some(window) = coprocessor.window() {
+                let _ = coprocessor.deliver(window.end, network.estimate(&window.features));
+            }
+            while let Some(sent) = coprocessor.next_frame() {
+                // To your CAN controller.
+                core::hint::black_box(sent.frame);
+            }
+        }
+        let Some(rate) = last.map(|last| last.vehicle.prompt) else { return false };
+        hprintln!("corrected yaw rate {}e-6 rad/s", (1e6 * rate.rate.rad_per_sec()) as i32);
+        let good = rate.status == Status::Ready && rate.source == Source::GyroNet;
+        good && (rate.rate.rad_per_sec() - 0.1).abs() < 0.001
+    }
+
+    /// Your sensor. This one has a bias of 0.01 rad/s; its car is parked for four seconds and then turns at 0.1 rad/s.
+    fn read(number: u32, time: Micros) -> ImuSample {
+        // A least bit that moves: an axis without noise is a stuck one.
+        let noise = (number % 2) as i32;
+        let yaw_rate = if number < 400 { 1_342_177 } else { 14_763_950 };
+        ImuSample {
+            time,
+            specific_force: [noise, noise, 10_286_531 + noise].map(SpecificForce),
+            angular_rate: [noise, noise, yaw_rate + noise].map(AngularRate),
+            temperature: None,
+            validity: Validity::Good,
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! The example `examples/embassy` on the virtual board: it sends what the host makes of the same samples, and nothing
+//! old after the bus was away.
+
+use crate::common::{IMU, SAMPLE, SET, drive, frames};
+use gyronet::can::DataFrame;
+use gyronet::sensor::xsens::Mti;
+use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, WindowNetwork, weights};
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::recordings::workspace;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+fn elf() -> PathBuf {
+    const TARGET: &str = "thumbv7em-none-eabihf";
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("embassy");
+    let cargo = Command::new(env!("CARGO"))
+        .current_dir(workspace())
+        .args(["build", "--release", "--locked", "--quiet", "--manifest-path", "examples/embassy/Cargo.toml"])
+        .args(["--target", TARGET, "--target-dir"])
+        .arg(&folder)
+        .status();
+    assert!(cargo.is_ok_and(|status| status.success()), "the example is built");
+    folder.join(TARGET).join("release/gyronet-embassy")
+}
+
+/// The frames of these samples.
+fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
+    let mut coprocessor = Coprocessor::new(Config::DEFAULT);
+    let mut network =
+        GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
+    let (mut mti, mut made) = (Mti::new(), Vec::new());
+    for (k, byte) in
+        samples.iter().enumerate().flat_map(|(k, sample)| sample.iter().map(move |byte| (k, byte)))
+    {
+        mti.receive(*byte);
+        while let Some(sample) = mti.next_sample() {
+            let now = Micros(10_000 * k as u64);
+            coprocessor.imu(sample.expect("a sample"), now).expect("in order");
+            made.extend(std::iter::from_fn(|| coprocessor.next_frame()).map(|sent| sent.frame));
+            if let Some(window) = coprocessor.window() {
+                coprocessor
+                    .deliver(window.end, network.estimate(&window.features))
+                    .expect("the one that is due");
+            }
+        }
+    }
+    made
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn the_example_sends_what_the_host_makes_and_nothing_old() {
+    const SAMPLES: usize = 450;
+    const AWAY: usize = 40;
+    const BEGIN: Duration = Duration::from_millis(100);
+    let test = "the_example_sends_what_the_host_makes_and_nothing_old";
+    let Some(mut board) = Board::boot(test, &elf()) else { return };
+    let samples = drive(SAMPLES + 2 * AWAY);
+    let made = host(&samples);
+    for (k, sample) in samples.iter().enumerate() {
+        board.send_at(IMU, sample, BEGIN + SAMPLE * k as u32);
+    }
+    board.run(BEGIN + SAMPLE * SAMPLES as u32);
+    let sent = frames(&board.can_frames());
+    println!("{test}: {} frames", sent.len());
+    assert_eq!(sent.len(), SET * SAMPLES);
+    assert!(sent == made[..sent.len()], "in order, and the same");
+
+    board.configure("CAN1.connected", false);
+    board.run(SAMPLE * AWAY as u32);
+    assert_eq!(board.can_frames().len(), 0);
+    board.configure("CAN1.connected", true);
+    board.run(SAMPLE * AWAY as u32);
+    let sent = frames(&board.can_frames());
+    let first = made.iter().position(|frame| *frame == sent[0]).expect("the host's");
+    println!("{test}: sample {} is the first after {}", first / SET, SAMPLES + AWAY);
+    assert!(first >= SET * (SAMPLES + AWAY - 3) && sent.len() > SET * (AWAY - 10));
+}
