@@ -43,7 +43,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let mut out = std::io::stdout().lock();
     if common.json {
         let findings = doctor.findings.iter().map(|Finding { what, verdict, text }| {
-            serde_json::json!({ "subject": what, "verdict": word(*verdict), "text": text })
+            serde_json::json!({ "subject": what, "verdict": verdict.word(), "text": text })
         });
         let gains = gains.iter().map(|(by, text)| serde_json::json!({ "by": by, "text": text }));
         let json = serde_json::json!({
@@ -57,7 +57,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     } else {
         writeln!(out, "{}: {:.0} s", doctor.name, doctor.seconds)?;
         for Finding { what, verdict, text } in &doctor.findings {
-            writeln!(out, "{:<4} {what}: {text}", word(*verdict))?;
+            writeln!(out, "{:<4} {what}: {text}", verdict.word())?;
         }
         for (by, text) in &gains {
             writeln!(out, "gain {by}: {text}")?;
@@ -66,14 +66,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let bad = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad).count();
     if bad > 0 { Err(format!("{bad} findings are to be cured first").into()) } else { Ok(()) }
-}
-
-fn word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Good => "good",
-        Verdict::Note => "note",
-        Verdict::Bad => "cure",
-    }
 }
 
 /// What calibration and training would gain on this drive, or why that cannot be said.

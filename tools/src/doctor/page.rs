@@ -1,7 +1,6 @@
-//! The page of an examined recording.
+//! This module writes the page of an examined recording.
 
-use super::allan::{Allan, Noise};
-use super::findings::{Doctor, Verdict};
+use super::{Allan, Doctor, Noise, Verdict};
 use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{document, escaped, table};
 
@@ -30,14 +29,15 @@ pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
     );
     body += "<h2>Findings</h2>\n<div class=\"scroll\"><table class=\"costs\">\n<thead><tr><th>subject</th><th></th><th>finding</th></tr></thead>\n<tbody>\n";
     for finding in &doctor.findings {
-        let (class, word) = match finding.verdict {
-            Verdict::Good => ("agrees", "good"),
-            Verdict::Note => ("note", "note"),
-            Verdict::Bad => ("differs", "cure"),
+        let class = match finding.verdict {
+            Verdict::Good => "agrees",
+            Verdict::Note => "note",
+            Verdict::Bad => "differs",
         };
         body += &format!(
-            "<tr><td>{}</td><td><span class=\"{class}\">{word}</span></td><td>{}</td></tr>\n",
+            "<tr><td>{}</td><td><span class=\"{class}\">{}</span></td><td>{}</td></tr>\n",
             finding.what,
+            finding.verdict.word(),
             escaped(&finding.text)
         );
     }

@@ -3,8 +3,11 @@
 use crate::drive::error::DataError;
 use crate::drive::recording::{Reader, Row, WHEELS};
 use std::fs::File;
+use std::ops::Range;
 use std::path::Path;
 
+/// Rows of a second.
+pub const SECOND: usize = 100;
 /// Rows kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
 
@@ -84,4 +87,22 @@ impl Rows {
     pub fn len(&self) -> usize {
         self.seconds.len()
     }
+
+    /// Returns a value of each row, with its time, where it is known.
+    pub fn series(&self, of: impl Fn(usize) -> Option<f64>) -> Vec<(f64, f64)> {
+        (0..self.len()).filter_map(|row| Some((self.seconds[row], of(row)?))).collect()
+    }
+
+    /// Returns the mean of the gyro about z, rad/s.
+    pub fn mean_yaw_rate(&self, span: Range<usize>) -> f64 {
+        let rates = &self.rate[span];
+        rates.iter().map(|rate| rate[2]).sum::<f64>() / rates.len() as f64
+    }
+}
+
+/// Returns values from the least to the greatest.
+pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values
 }
