@@ -73,7 +73,7 @@ fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
     let refused = |error: &dyn std::fmt::Display| format!("Cannot be said: {error}.");
     let recording = match Recording::read(&args.file) {
         Ok(recording) => recording,
-        Err(error) => return vec![("any", refused(&error))],
+        Err(error) => return vec![("calibration and training", refused(&error))],
     };
     let calibration = unit(args, &recording, common).unwrap_or_else(|error| refused(&error));
     let training = trained(args, &recording, common).unwrap_or_else(|error| refused(&error));

@@ -9,7 +9,7 @@ use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::report::{COLUMNS, columns};
 use crate::plot::page::chart::{Chart, Curve};
-use crate::plot::page::{document, escaped, grouped, table};
+use crate::plot::page::{HINT, document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
 
 /// The curves of these methods are drawn, from back to front.
@@ -121,8 +121,7 @@ fn yaw(demo: &Demo<'_>) -> String {
         }
         .html();
     }
-    html += "<p class=\"note\">Drag over a chart to zoom in, tap a name to hide its curve. From the end of static \
-             initialisation on (3 s at rest).";
+    html += &format!("<p class=\"note\">{HINT} From the end of static initialisation on (3 s at rest).");
     html += match truth {
         Some(_) => {
             " The errors' scale is that of the corrected methods; what keeps its bias runs off it.</p>\n"

@@ -28,7 +28,7 @@ pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
     Finding::note(
         "what it can judge",
         format!(
-            "{turns} turns of more than 45 deg, {turned:.1} rad turned in all, {stops} later stops, {seconds:.0} s. It cannot judge: {lacks}."
+            "Turns of more than 45 deg: {turns}; turned in all: {turned:.1} rad; later stops: {stops}; length: {seconds:.0} s. It cannot judge: {lacks}."
         ),
     )
 }
