@@ -21,7 +21,6 @@ mod ros_message;
 mod select;
 mod table;
 mod ulog;
-pub mod vehicle;
 mod zstd;
 
 pub use format::{read_bytes, read_file};

@@ -11,6 +11,7 @@ mod fognet_golden;
 mod fognet_integer;
 mod fognet_simulated;
 mod gyronet_golden;
+mod import_converted;
 mod import_logs;
 mod mounting;
 mod pages;

@@ -1,6 +1,6 @@
 //! `gyronet doctor`: one page on a recording before anyone trusts it.
 
-use super::{Common, WriteError, print_json, progress, weights};
+use super::{Common, WriteError, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::calibrate::{Drive, Share, calibrate};
@@ -71,7 +71,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 /// What calibration and training would gain on this drive, or why that cannot be said.
 fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
     let refused = |error: &dyn std::fmt::Display| format!("Cannot be said: {error}.");
-    let recording = match Recording::read(&args.file) {
+    let recording = match read_drive(&args.file, common) {
         Ok(recording) => recording,
         Err(error) => return vec![("calibration and training", refused(&error))],
     };

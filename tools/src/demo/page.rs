@@ -43,7 +43,7 @@ pub fn page(demo: &Demo<'_>) -> String {
     body += &yaw(demo);
     if let Some(trajectories) = &demo.trajectories {
         body += "<h2>Path</h2>\n";
-        body += &paths(trajectories);
+        body += &paths(trajectories, demo.recording.vehicle.radius_m());
     }
     body += "<h2>Methods</h2>\n";
     body += &methods(demo);
@@ -131,7 +131,7 @@ fn yaw(demo: &Demo<'_>) -> String {
     html
 }
 
-fn paths(trajectories: &Trajectories) -> String {
+fn paths(trajectories: &Trajectories, radius: f64) -> String {
     let Trajectories { paths, wheels, metres } = trajectories;
     let mut curves: Vec<Curve> = paths
         .iter()
@@ -150,7 +150,7 @@ fn paths(trajectories: &Trajectories) -> String {
     let of_wheels = if *wheels == 1 { "one wheel".into() } else { format!("the mean of {wheels} wheels") };
     format!(
         "{chart}<p class=\"note\">Dead reckoning over {metres:.0} m: each method's yaw rate with the speed of \
-         {of_wheels}, the same for all, as recorded (radius 0.289 m). The reference is the reference's yaw rate with the \
+         {of_wheels}, the same for all, as recorded (radius {radius} m). The reference is the reference's yaw rate with the \
          same speed.</p>\n"
     )
 }

@@ -2,6 +2,7 @@
 
 use crate::drive::error::DataError;
 use crate::drive::recording::{Reader, Row, WHEELS};
+use crate::drive::vehicle::Vehicle;
 use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
@@ -28,6 +29,8 @@ pub struct Rows {
     /// Rows that could not be read, and why the first one could not.
     pub bad: u64,
     pub first_bad: Option<String>,
+    /// What the vehicle file beside it says.
+    pub vehicle: Vehicle,
 }
 
 impl Rows {
@@ -39,7 +42,9 @@ impl Rows {
         let shown = path.display().to_string();
         let file = File::open(path).map_err(|source| DataError::open(&shown, source))?;
         let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or(&shown).to_owned();
-        Self::parse(&name, Reader::new(&shown, std::io::BufReader::new(file))?)
+        let vehicle = Vehicle::of_drive(path)?;
+        let reader = Reader::new(&shown, std::io::BufReader::new(file))?.mounted(&vehicle);
+        Ok(Self { vehicle, ..Self::parse(&name, reader)? })
     }
 
     pub fn parse(
@@ -56,6 +61,7 @@ impl Rows {
             wheels: Default::default(),
             bad: 0,
             first_bad: None,
+            vehicle: Vehicle::default(),
         };
         let mut start = None;
         for row in reader {

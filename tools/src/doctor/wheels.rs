@@ -2,7 +2,6 @@
 
 use super::finding::Finding;
 use super::recording::{Rows, SECOND};
-use crate::drive::wheel_frames::RADIUS;
 
 /// Least seconds of turning that say something.
 const LEAST_TURNING_S: usize = 5;
@@ -31,9 +30,12 @@ pub fn finding(rows: &Rows) -> Finding {
             format!("{known}; no axle with both wheels turns enough to be held against the gyro."),
         );
     };
-    let track = slope * RADIUS;
+    let radius = rows.vehicle.radius_m();
+    let track = slope * radius;
+    let named = rows.vehicle.wheels.track_m.map(|track| format!(" ({track} m in the vehicle file)"));
     let text = format!(
-        "{known}; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {RADIUS} m, offset {offset:+.3} rad/s"
+        "{known}; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {radius} m{}, offset {offset:+.3} rad/s",
+        named.unwrap_or_default()
     );
     if correlation > 0.9 && (0.2..4.0).contains(&track) {
         Finding::good(what, format!("{text}."))

@@ -7,9 +7,8 @@ use super::error::ImportError;
 use super::format::read_file;
 use super::grid::{self, resample};
 use super::select::{Channel, File, Selection, select};
-use super::vehicle::Vehicle;
 use crate::drive::DT;
-use crate::drive::wheel_frames::RADIUS;
+use crate::drive::vehicle::Vehicle;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -147,7 +146,7 @@ fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<
             continue;
         };
         let ((right, _), (left, is_rate)) = (right.speed(), left.speed());
-        let scale = if is_rate { vehicle.wheels.radius_m.unwrap_or(RADIUS) } else { 1.0 };
+        let scale = if is_rate { vehicle.radius_m() } else { 1.0 };
         let track = vehicle.wheels.track_m.unwrap_or(1.5);
         let start = right.first()?.0.max(left.first()?.0);
         let count = ((right.last()?.0.min(left.last()?.0) - start) / DT).clamp(0.0, LONGEST / DT) as usize;
@@ -247,7 +246,7 @@ fn wheels(
     (start, count): (f64, usize),
     report: &mut Vec<String>,
 ) -> [Grid; 4] {
-    let radius = vehicle.wheels.radius_m.unwrap_or(RADIUS);
+    let radius = vehicle.radius_m();
     let assumed = if vehicle.wheels.radius_m.is_some() { "" } else { ", assumed: name wheels.radius_m" };
     if let Some(channel) = &selection.odometry {
         let speed = shifted(channel.odometry(), offsets[channel.file]);

@@ -3,8 +3,8 @@
 use super::can::Bus;
 use super::error::ImportError;
 use super::log::Log;
-use super::vehicle::Columns;
 use super::{blf, candump, mcap, ros_bag, table, ulog};
+use crate::drive::vehicle::Columns;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -95,11 +95,11 @@ pub fn read_up_to(input: &mut Input<'_>, len: usize) -> std::io::Result<Vec<u8>>
     Ok(bytes)
 }
 
-/// Reads a line without its end, of at most `most` bytes; what is beyond them is the next line.
+/// Reads a line without its end (fields of spaces stay), of at most `most` bytes; what is beyond them is the next line.
 pub fn read_line(input: &mut Input<'_>, most: u64) -> std::io::Result<Option<String>> {
     let mut bytes = Vec::new();
     if input.take(most).read_until(b'\n', &mut bytes)? == 0 {
         return Ok(None);
     }
-    Ok(Some(String::from_utf8_lossy(&bytes).trim_end().to_owned()))
+    Ok(Some(String::from_utf8_lossy(&bytes).trim_end_matches(['\r', '\n']).to_owned()))
 }

@@ -2,10 +2,13 @@
 
 use super::error::ImportError;
 use super::log::{Fix, Kind, Log, Sample, Value};
-use super::vehicle::Vehicle;
+use crate::drive::vehicle::Vehicle;
 
 /// The name with which a role is left out.
 const NONE: &str = "none";
+/// The wheels of our own drives, in the order of their columns, and the reference yaw rate.
+pub const WHEELS: [&str; 4] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
+pub const REFERENCE: &str = "ref_gyr_z";
 
 /// A file that was read.
 #[derive(Debug)]
@@ -44,9 +47,13 @@ pub fn select<'a>(files: &'a [File], vehicle: &'a Vehicle) -> Result<Selection<'
     let imu = imu.ok_or_else(|| ImportError::Missing { role: "IMU", candidates: listed(files, |_| true) })?;
     let wheels = &vehicle.wheels;
     let names = [&wheels.front_right, &wheels.rear_right, &wheels.front_left, &wheels.rear_left];
-    let [fr, rr, fl, rl] = names.map(|name| {
-        name.as_deref().map(|name| by_name(files, "a wheel", name, Some(Kind::Number))).transpose()
-    });
+    let mut names = names.map(Option::as_deref);
+    let has = |name: &str| channels(files).any(|channel| channel.name == name);
+    if names == [None; 4] {
+        names = WHEELS.map(|name| has(name).then_some(name));
+    }
+    let [fr, rr, fl, rl] =
+        names.map(|name| name.map(|name| by_name(files, "a wheel", name, Some(Kind::Number))).transpose());
     let wheels = [fr?, rr?, fl?, rl?];
     let odometry = match (&signals.odometry, wheels.iter().flatten().next()) {
         // Wheels by name need no odometry.
@@ -60,6 +67,7 @@ pub fn select<'a>(files: &'a [File], vehicle: &'a Vehicle) -> Result<Selection<'
         reference_rate: signals
             .reference_rate
             .as_deref()
+            .or(has(REFERENCE).then_some(REFERENCE))
             .map(|name| by_name(files, "the reference rate", name, None))
             .transpose()?,
         wheels,
