@@ -59,18 +59,18 @@ fn an_mf4_is_converted_by_the_command_in_the_message() {
     let folder = scratch("mf4");
     let script = workspace().join("host-tests/tests/clients/make_mf4.py");
     let drive = workspace().join("tools/data/simulated_drive.csv");
-    run(&python, &[script.to_str().unwrap(), drive.to_str().unwrap(), "FILE"], &folder);
+    run(&python, &[script.to_str().unwrap(), drive.to_str().unwrap(), "drive.mf4"], &folder);
 
-    let refused = import(&request(folder.join("FILE"), "")).unwrap_err().to_string();
+    let refused = import(&request(folder.join("drive.mf4"), "")).unwrap_err().to_string();
     let program = refused.split('"').nth(1).expect("a program in quotation marks");
-    run(&python, &["-c", program], &folder);
+    run(&python, &["-c", &program.replace("FILE", "drive.mf4")], &folder);
     let columns = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
         .map(|name| format!("{name} = {{ name = 'IMU_{name}' }}\n"));
     let toml = format!(
         "[wheels]\nradius_m = 0.3\nrear_right = 'WheelSpeedRR'\n[columns]\n{}wheel = {{ name = 'WheelSpeedRR', unit = 'km/h' }}\n",
         columns.concat()
     );
-    let Imported { rows, report, dropped } = import(&request(folder.join("FILE.csv"), &toml)).unwrap();
+    let Imported { rows, report, dropped } = import(&request(folder.join("drive.mf4.csv"), &toml)).unwrap();
     assert_eq!((rows.len(), dropped), (9_000, 0), "{report:?}");
     for (row, truth) in rows.iter().zip(&bundled::simulated_drive().unwrap().rows) {
         assert!((row.imu[5] - truth.sample.angular_rate[2].rad_per_sec()).abs() < 1e-6, "{row:?}");

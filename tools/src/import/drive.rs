@@ -4,9 +4,10 @@ use super::align::{self, Offset};
 use super::can::Bus;
 use super::course::{Course, courses};
 use super::error::ImportError;
-use super::format::read_file;
+use super::format::read_into;
 use super::grid::{self, resample};
-use super::select::{Channel, File, Selection, select};
+use super::log::Log;
+use super::select::{self, Channel, File, Selection, select};
 use crate::drive::DT;
 use crate::drive::vehicle::Vehicle;
 use std::io::{self, Write};
@@ -68,7 +69,8 @@ pub fn import(request: &Request) -> Result<Imported, ImportError> {
     let bus = request.vehicle.bus.dbc.as_deref().map(Bus::read).transpose()?;
     let mut files = Vec::new();
     for path in &request.files {
-        let log = read_file(path, bus.as_ref(), &request.vehicle.columns)?;
+        let log = Log { wanted: Some(select::numbers(&request.vehicle)), ..Log::default() };
+        let log = read_into(path, bus.as_ref(), &request.vehicle.columns, log)?;
         files.push(File { path: path.display().to_string(), log });
     }
     let mut report = Vec::new();
@@ -98,7 +100,7 @@ fn clocks(
 ) -> Result<Vec<f64>, ImportError> {
     let mut offsets = vec![0.0; files.len()];
     let main = selection.imu.file;
-    if request.same_clock {
+    if request.same_clock || files.len() == 1 {
         return Ok(offsets);
     }
     let imu = selection.imu.imu();

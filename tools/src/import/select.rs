@@ -37,6 +37,14 @@ pub struct Selection<'a> {
     pub wheels: [Option<Channel<'a>>; 4],
 }
 
+/// Returns the names of the plain numbers that [`select`] may choose.
+pub fn numbers(vehicle: &Vehicle) -> Vec<String> {
+    let wheels = &vehicle.wheels;
+    let named = [&wheels.front_right, &wheels.rear_right, &wheels.front_left, &wheels.rear_left];
+    let named = named.into_iter().chain([&vehicle.signals.reference_rate]).flatten().cloned();
+    named.chain(WHEELS.into_iter().chain([REFERENCE]).map(str::to_owned)).collect()
+}
+
 /// Chooses the channels.
 ///
 /// # Errors
