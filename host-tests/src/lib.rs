@@ -2,6 +2,7 @@
 //! skipped, the emulated board and its image, and every generator of bytes, samples, streams and weights.
 
 pub mod board;
+pub mod browser;
 pub mod connected;
 pub mod dead_reckoning;
 pub mod entrance;

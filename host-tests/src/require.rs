@@ -19,11 +19,13 @@ pub enum Need {
     Data,
     /// A Python with the packages that a test names.
     Python,
+    /// Chromium.
+    Browser,
 }
 
 impl Need {
-    const ALL: [(&'static str, Self); 3] =
-        [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python)];
+    const ALL: [(&'static str, Self); 4] =
+        [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python), ("browser", Self::Browser)];
 }
 
 /// Holds the requirements that must be met.

@@ -24,6 +24,8 @@ pub mod tables;
 mod weights;
 pub mod wheels;
 
+use gyronet_tools::drive::recording::Recording;
+
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.
 pub type Result = std::result::Result<(), Box<dyn std::error::Error>>;
@@ -38,6 +40,18 @@ fn print_json(out: &mut impl std::io::Write, value: &impl serde::Serialize) -> R
 fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
     use std::io::Write;
     if common.quiet { Ok(()) } else { writeln!(std::io::stderr(), "{line}") }
+}
+
+/// Reads a drive, and names the vehicle file beside it.
+fn read_drive(
+    path: &std::path::Path,
+    common: Common,
+) -> std::result::Result<Recording, Box<dyn std::error::Error>> {
+    let recording = Recording::read(path)?;
+    if let Some(vehicle) = &recording.vehicle.path {
+        remark(common, format_args!("{}: vehicle file {}", recording.path, vehicle.display()))?;
+    }
+    Ok(recording)
 }
 
 /// The options of all subcommands.

@@ -1,12 +1,14 @@
 //! These modules handle recorded drives: [`recording`] reads one, [`wheel_frames`] turns its wheels into the frames of
-//! a vehicle's bus, [`replay`] runs it through the coprocessor as the board would, [`candump`] writes what was
-//! sent, and [`foxglove`] writes everything for Foxglove.
+//! a vehicle's bus, [`vehicle`] is the file beside it that says what is known of the vehicle, [`replay`] runs it through the coprocessor as the board would, [`candump`] writes what was
+//! sent, [`foxglove`] writes everything for Foxglove, and [`export`] writes tables and paths.
 
 pub mod candump;
 pub mod error;
+pub mod export;
 pub mod foxglove;
 pub mod recording;
 pub mod replay;
+pub mod vehicle;
 pub mod wheel_frames;
 
 use gyronet::sample::RATE_HZ;

@@ -2,8 +2,8 @@
 //! those that were chosen on the 100 Hz grid and writes the CSV that every other command reads.
 //!
 //! A log is read once, from front to back, with one record in memory at a time; what stays is the samples of the
-//! channels that a drive can need, up to [`log::MAX_SAMPLES`] of each. A record that cannot be used is counted with
-//! the reason, and reading goes on behind it where the format allows that.
+//! channels that a drive can need, of plain numbers only those that are named, up to [`log::MAX_SAMPLES`] of each. A
+//! record that cannot be used is counted with the reason, and reading goes on behind it where the format allows that.
 
 pub(crate) mod align;
 mod blf;
@@ -21,7 +21,6 @@ mod ros_message;
 mod select;
 mod table;
 mod ulog;
-pub mod vehicle;
 mod zstd;
 
 pub use format::{read_bytes, read_file};

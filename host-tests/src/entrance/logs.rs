@@ -1,10 +1,10 @@
 //! Logs of other tools: whatever the bytes, what comes out is finite, in rising order of time, and counted.
 
 use super::Seed;
+use gyronet_tools::drive::vehicle::Columns;
 use gyronet_tools::import::can::Bus;
 use gyronet_tools::import::log::Value;
 use gyronet_tools::import::read_bytes;
-use gyronet_tools::import::vehicle::Columns;
 
 /// Signals of every kind that a frame can hold.
 const DBC: &str = r#"VERSION ""

@@ -3,8 +3,8 @@
 use gyronet_host_tests::recordings::{folder, trial};
 use gyronet_host_tests::require::{Need, wants};
 use gyronet_tools::doctor::{Doctor, Mounting, Noise, Verdict, page};
+use gyronet_tools::drive::vehicle::Vehicle;
 use gyronet_tools::import::drive::{Request, import, write_csv};
-use gyronet_tools::import::vehicle::Vehicle;
 
 #[test]
 fn a_car_is_fit_and_its_reference_has_the_known_floor() {

@@ -4,10 +4,10 @@
 use gyronet_host_tests::recordings::{folder, workspace};
 use gyronet_host_tests::require::{Need, python, wants};
 use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::vehicle::{Columns, Vehicle};
 use gyronet_tools::import::can::Bus;
 use gyronet_tools::import::drive::{Imported, Request, import};
 use gyronet_tools::import::log::{Log, Value};
-use gyronet_tools::import::vehicle::{Columns, Vehicle};
 use gyronet_tools::import::{read_bytes, read_file};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

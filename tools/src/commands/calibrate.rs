@@ -1,7 +1,7 @@
 //! `gyronet calibrate`: gain and mounting of a unit's gyro, from drives with a reference yaw rate.
 
 use super::weights::Weights;
-use super::{Common, WriteError, print_json, progress};
+use super::{Common, WriteError, print_json, progress, read_drive};
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::calibrate::{Drive, Share, calibrate};
@@ -39,7 +39,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = Weights::open(args.weights.as_deref())?;
     let blob = weights.blob()?;
     let recordings: Vec<Recording> =
-        args.files.iter().map(|file| Recording::read(file)).collect::<Result<_, _>>()?;
+        args.files.iter().map(|file| read_drive(file, common)).collect::<Result<_, _>>()?;
     let mut drives = Vec::new();
     for recording in &recordings {
         let bar = progress::bar(common, recording.rows.len(), recording.name());

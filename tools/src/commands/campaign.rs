@@ -1,7 +1,7 @@
 //! `gyronet campaign`: fault injection.
 
 use super::weights::Weights;
-use super::{Common, WriteError, print_json, progress};
+use super::{Common, WriteError, print_json, progress, read_drive};
 use gyronet::model::{Blob, weights};
 use gyronet_tools::bundled;
 use gyronet_tools::campaign::drive::Drive;
@@ -10,7 +10,6 @@ use gyronet_tools::campaign::report::Report;
 use gyronet_tools::campaign::scene::Scene;
 use gyronet_tools::campaign::weight_upsets::WeightUpsets;
 use gyronet_tools::campaign::{self, Plan, plot};
-use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::parts::Part;
 use std::fs;
 use std::io::Write;
@@ -54,7 +53,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let blob = weights.blob()?;
     let mut drives = vec![Drive::new(&bundled::simulated_drive()?)];
     for path in &args.drives {
-        drives.push(Drive::new(&Recording::read(path)?));
+        drives.push(Drive::new(&read_drive(path, common)?));
     }
     if let Some(bits) = args.upsets {
         return upset(bits, args, &drives[0], common);

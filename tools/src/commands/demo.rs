@@ -1,6 +1,6 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, paint, print_json, progress, replay, weights};
+use super::{Common, WriteError, paint, print_json, progress, read_drive, replay, weights};
 use gyronet::can::config::Config;
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
@@ -46,7 +46,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = args.networks.weights()?;
     let (recording, title) = match &args.file {
         Some(path) => {
-            let recording = Recording::read(path)?;
+            let recording = read_drive(path, common)?;
             let title = format!("Yaw of a recorded drive, {}", recording.name());
             (recording, title)
         }

@@ -1,6 +1,6 @@
 //! `gyronet doctor`: one page on a recording before anyone trusts it.
 
-use super::{Common, WriteError, print_json, progress, weights};
+use super::{Common, WriteError, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::calibrate::{Drive, Share, calibrate};
@@ -43,7 +43,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let mut out = std::io::stdout().lock();
     if common.json {
         let findings = doctor.findings.iter().map(|Finding { what, verdict, text }| {
-            serde_json::json!({ "subject": what, "verdict": word(*verdict), "text": text })
+            serde_json::json!({ "subject": what, "verdict": verdict.word(), "text": text })
         });
         let gains = gains.iter().map(|(by, text)| serde_json::json!({ "by": by, "text": text }));
         let json = serde_json::json!({
@@ -57,7 +57,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     } else {
         writeln!(out, "{}: {:.0} s", doctor.name, doctor.seconds)?;
         for Finding { what, verdict, text } in &doctor.findings {
-            writeln!(out, "{:<4} {what}: {text}", word(*verdict))?;
+            writeln!(out, "{:<4} {what}: {text}", verdict.word())?;
         }
         for (by, text) in &gains {
             writeln!(out, "gain {by}: {text}")?;
@@ -68,20 +68,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if bad > 0 { Err(format!("{bad} findings are to be cured first").into()) } else { Ok(()) }
 }
 
-fn word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Good => "good",
-        Verdict::Note => "note",
-        Verdict::Bad => "cure",
-    }
-}
-
 /// What calibration and training would gain on this drive, or why that cannot be said.
 fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
     let refused = |error: &dyn std::fmt::Display| format!("Cannot be said: {error}.");
-    let recording = match Recording::read(&args.file) {
+    let recording = match read_drive(&args.file, common) {
         Ok(recording) => recording,
-        Err(error) => return vec![("any", refused(&error))],
+        Err(error) => return vec![("calibration and training", refused(&error))],
     };
     let calibration = unit(args, &recording, common).unwrap_or_else(|error| refused(&error));
     let training = trained(args, &recording, common).unwrap_or_else(|error| refused(&error));

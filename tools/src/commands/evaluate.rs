@@ -1,6 +1,6 @@
 //! `gyronet evaluate`: heading errors of each method on recorded drives.
 
-use super::{Common, paint, print_json, progress, weights};
+use super::{Common, paint, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::drive::recording::Recording;
@@ -48,8 +48,8 @@ pub struct Args {
 
 impl Args {
     /// Reads a drive, calibrated if that is asked for.
-    fn recording(&self, file: &Path) -> Result<Recording, Box<dyn std::error::Error>> {
-        let mut recording = Recording::read(file)?;
+    fn recording(&self, file: &Path, common: Common) -> Result<Recording, Box<dyn std::error::Error>> {
+        let mut recording = read_drive(file, common)?;
         if let Some(path) = &self.calibration {
             let map = unit_file::read_for(path, self.networks.weights()?.blob()?.crc)?;
             for row in &mut recording.rows {
@@ -70,7 +70,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let mut drives = Vec::new();
     for file in &args.files {
-        let recording = args.recording(file)?;
+        let recording = args.recording(file, common)?;
         let rates = args.networks.rates(&recording, common)?;
         drives.push(DriveErrors::new(&recording, &rates)?);
     }
@@ -96,7 +96,7 @@ fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
     for file in &args.files {
-        let recording = args.recording(file)?;
+        let recording = args.recording(file, common)?;
         let bar = progress::bar(common, variants.len() * recording.rows.len(), recording.name());
         let scores = ablation::run(&recording, &mut network, variants, || bar.inc(1));
         bar.finish_and_clear();

@@ -4,8 +4,8 @@ use super::{Common, WriteError, print_json, progress, remark};
 use clap::ValueEnum;
 use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::vehicle::Vehicle;
 use gyronet_tools::import::drive::{Imported, Request, import, write_csv};
-use gyronet_tools::import::vehicle::Vehicle;
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::paper::tables::pictures;
 use gyronet_tools::simulate::layout::Layout;
@@ -19,7 +19,8 @@ use std::time::Instant;
 /// The other subcommands read the CSV. Logs are ROS 1 bags, MCAP (ROS 1 and 2), PX4 ULog, candump, Vector ASC and BLF,
 /// PEAK TRC, Xsens MT text and CSV. The first channel with a gyro, an odometry and a GNSS position is found by its type;
 /// where several fit, name one. What a log cannot say (mounting, wheels, columns, the DBC file) stands in a vehicle file:
-/// `vehicle.toml` beside the first log unless --vehicle names another. It is written beside the drive again.
+/// `drive.toml` beside the first log `drive.bag`, or `vehicle.toml`, unless --vehicle names another. It is written beside the drive, as drive.toml, where
+/// every command that reads the drive finds it.
 ///
 /// The clocks of several files are laid on each other by the yaw rates that they have in common. Records that cannot be
 /// used are counted and reported.
@@ -42,7 +43,7 @@ pub struct Args {
     /// Write the drive, at 100 Hz, to this file.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
-    /// Vehicle file [default: vehicle.toml beside the first log, if there is one].
+    /// Vehicle file [default: that of the first log's name, or vehicle.toml, beside it].
     #[arg(long, value_name = "FILE.toml")]
     vehicle: Option<PathBuf>,
     /// Names and signals of the CAN frames.
@@ -86,18 +87,19 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
     if !(0.0..1e6).contains(&args.from) {
         return Err("--from should be seconds from the first sample on".into());
     }
+    let mut vehicle = vehicle(args)?;
     let Imported { rows, mut report, dropped } = import(&Request {
         files: args.files.clone(),
-        vehicle: vehicle(args)?,
+        vehicle: vehicle.clone(),
         same_clock: args.same_clock,
         from: args.from,
     })?;
     if let Some(path) = &args.out {
         let error = WriteError::to(path);
         write_csv(&rows, BufWriter::new(File::create(path).map_err(&error)?)).map_err(&error)?;
-        let beside = path.with_extension("vehicle.toml");
-        let text = toml::to_string(&vehicle(args)?)?;
-        std::fs::write(&beside, text).map_err(WriteError::to(&beside))?;
+        let beside = Vehicle::beside(path);
+        vehicle.mounting.applied = true;
+        std::fs::write(&beside, toml::to_string(&vehicle)?).map_err(WriteError::to(&beside))?;
         report.push(format!("{}: {} rows; {} beside it", path.display(), rows.len(), beside.display()));
         // Read as all others will read it, so that its faults are known now.
         if let Err(error) = Recording::read(path) {
@@ -121,12 +123,26 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
 
 /// The vehicle file, and what the arguments put in its place.
 fn vehicle(args: &Args) -> Result<Vehicle, Box<dyn std::error::Error>> {
-    let beside =
-        args.files.first().map(|file| file.with_file_name("vehicle.toml")).filter(|path| path.is_file());
-    let mut vehicle = match args.vehicle.as_ref().or(beside.as_ref()) {
+    let first = args.files.first();
+    let own = first.map(|file| Vehicle::beside(file)).filter(|path| args.vehicle.is_none() && path.is_file());
+    let shared = first.map(|file| file.with_file_name("vehicle.toml")).filter(|path| path.is_file());
+    let mut vehicle = match own.as_ref().or(args.vehicle.as_ref()).or(shared.as_ref()) {
         Some(path) => Vehicle::read(path)?,
         None => Vehicle::default(),
     };
+    // Whether the rows are turned is known of a drive by its own file alone, whose names are those of the logs before it.
+    vehicle.mounting.applied &= own.is_some();
+    if vehicle.mounting.applied {
+        vehicle = vehicle.without_names();
+    }
+    let written = args.out.as_deref().map(|out| std::path::absolute(Vehicle::beside(out))).transpose()?;
+    if let Some(read) = &vehicle.path
+        && Some(std::path::absolute(read)?) == written
+    {
+        return Err(
+            format!("{}: --out would overwrite it; give the drive another name", read.display()).into()
+        );
+    }
     let dbc = args.dbc.as_ref().or(vehicle.bus.dbc.as_ref());
     // The copy beside the drive may lie elsewhere than the DBC file.
     vehicle.bus.dbc = dbc.map(std::path::absolute).transpose()?;

@@ -1,12 +1,11 @@
 //! `gyronet quantize`: an f32 checkpoint becomes a weight file for the integer kernels.
 
-use super::{Common, WriteError, print_json};
+use super::{Common, WriteError, print_json, read_drive};
 use gyronet::fog::FogConfig;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogNet, GyroNet};
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::bundled;
-use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use gyronet_tools::network::quantization_error::{Both, QuantizationError};
@@ -68,7 +67,7 @@ impl fmt::Display for Added {
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let (bytes, report, added) =
-        if Checkpoint::is_in(&args.checkpoint)? { fognet(args)? } else { gyronet(args)? };
+        if Checkpoint::is_in(&args.checkpoint)? { fognet(args)? } else { gyronet(args, common)? };
     std::fs::write(&args.out, &bytes).map_err(WriteError::to(&args.out))?;
     let Report { rows, raised, largest_raise, bytes } = report;
     let mut out = std::io::stdout().lock();
@@ -90,14 +89,14 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 /// A weight file, how it was made, and what that adds.
 type Made = Result<(Vec<u8>, Report, Vec<Added>), Box<dyn std::error::Error>>;
 
-fn gyronet(args: &Args) -> Made {
+fn gyronet(args: &Args, common: Common) -> Made {
     let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&args.checkpoint)?;
     let (bytes, report) = quantize(&checkpoint)?;
     let weights = WeightFile::parse(&args.out.display().to_string(), &bytes)?;
     let drives = if args.drives.is_empty() {
         vec![bundled::simulated_drive()?]
     } else {
-        args.drives.iter().map(|path| Recording::read(path)).collect::<Result<_, _>>()?
+        args.drives.iter().map(|path| read_drive(path, common)).collect::<Result<_, _>>()?
     };
     let mut added = Vec::new();
     for drive in &drives {

@@ -1,13 +1,13 @@
 //! `gyronet replay`: the CAN log of a recording that runs through the integer pipeline.
 
 use super::weights::Weights;
-use super::{Common, WriteError, print_json, progress};
+use super::{Common, WriteError, print_json, progress, read_drive};
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
-use gyronet_tools::drive::foxglove;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::drive::wheel_frames::{Speeds, WheelFrames};
+use gyronet_tools::drive::{export, foxglove};
 use gyronet_tools::parts::compare::{Bound, Difference, STAND_INS};
 use gyronet_tools::parts::{Part, Via};
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 ///
 /// The drive runs through the pipeline that is flashed. The log has the format of `candump -L` and the recording's
 /// own time stamps; can-utils' canplayer and python-can can play it. It goes to standard output unless --out names a
-/// file or --mcap is given. The summary goes to standard error, or with --json to standard output if the log does not.
+/// file, or --mcap, --csv or --tum is given. The summary goes to standard error, or with --json to standard output if the log does not.
 ///
 /// With --via the samples go through the bytes of a part first: they are encoded as the part would send them and
 /// read back by the parser that the board runs. The summary then has the difference of the corrected yaw from that
@@ -30,6 +30,7 @@ Examples:
   gyronet replay drive.csv --out can.log
   gyronet replay drive.csv | head
   gyronet replay drive.csv --out can.log --mcap drive.mcap    # and drive.layout.json, for Foxglove
+  gyronet replay drive.csv --out can.log --csv rates.csv --tum path.tum
   gyronet replay drive.csv --via icm42688 --out can.log")]
 pub struct Args {
     /// Recorded drive.
@@ -41,6 +42,12 @@ pub struct Args {
     /// Write inputs, rates, heading, states and frames for Foxglove to this file, and a layout beside it.
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "via")]
     mcap: Option<PathBuf>,
+    /// Write the rates, the yaw and its expected error to this table, a line a sample.
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// Write the path by the wheels and the yaw sent for navigation to this file, in TUM's format, which evo reads.
+    #[arg(long, value_name = "FILE.tum")]
+    tum: Option<PathBuf>,
     /// Weight file [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
@@ -53,19 +60,31 @@ pub struct Args {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = Weights::open(args.weights.as_deref())?;
     let mut network = GyroNet::new(weights.blob()?);
-    let recording = Recording::read(&args.file)?;
+    let recording = read_drive(&args.file, common)?;
     let replays = if args.via.is_some() { 2 + STAND_INS as usize } else { 1 };
     let bar = progress::bar(common, replays * recording.rows.len(), recording.name());
     let replayed = replay(&recording, args.via, &mut network, || bar.inc(1));
     bar.finish_and_clear();
     let (drive, detour) = replayed?;
+    let writes_elsewhere = [&args.mcap, &args.csv, &args.tum].into_iter().any(Option::is_some);
     let frames = match &args.out {
-        None if args.mcap.is_some() => drive.frames().count() as u64,
+        None if writes_elsewhere => drive.frames().count() as u64,
         Some(path) => write_file(&drive, path)?,
         None => drive.log(BufWriter::new(io::stdout().lock()))?,
     };
     if let Some(path) = &args.mcap {
         write_mcap(&recording, &drive, path)?;
+    }
+    if let Some(path) = &args.csv {
+        let error = WriteError::to(path);
+        export::csv(&recording, &drive, BufWriter::new(File::create(path).map_err(&error)?))
+            .map_err(&error)?;
+    }
+    if let Some(path) = &args.tum {
+        let speeds = Speeds::new(&recording)
+            .ok_or_else(|| format!("{}: --tum needs wheels, since a path needs a speed", recording.path))?;
+        let error = WriteError::to(path);
+        export::tum(&drive, &speeds, BufWriter::new(File::create(path).map_err(&error)?)).map_err(&error)?;
     }
     if common.json {
         let summary = serde_json::json!({
@@ -76,9 +95,10 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             "events": events(&drive).into_iter().collect::<BTreeMap<_, _>>(),
             "via": detour.as_ref().map(Detour::json),
         });
-        match args.out.as_ref().or(args.mcap.as_ref()) {
-            Some(_) => print_json(&mut io::stdout().lock(), &summary)?,
-            None => print_json(&mut io::stderr().lock(), &summary)?,
+        if args.out.is_some() || writes_elsewhere {
+            print_json(&mut io::stdout().lock(), &summary)?;
+        } else {
+            print_json(&mut io::stderr().lock(), &summary)?;
         }
     } else if !common.quiet {
         let mut err = io::stderr().lock();

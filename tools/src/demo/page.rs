@@ -9,7 +9,7 @@ use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::report::{COLUMNS, columns};
 use crate::plot::page::chart::{Chart, Curve};
-use crate::plot::page::{document, escaped, grouped, table};
+use crate::plot::page::{HINT, document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
 
 /// The curves of these methods are drawn, from back to front.
@@ -43,7 +43,7 @@ pub fn page(demo: &Demo<'_>) -> String {
     body += &yaw(demo);
     if let Some(trajectories) = &demo.trajectories {
         body += "<h2>Path</h2>\n";
-        body += &paths(trajectories);
+        body += &paths(trajectories, demo.recording.vehicle.radius_m());
     }
     body += "<h2>Methods</h2>\n";
     body += &methods(demo);
@@ -121,8 +121,7 @@ fn yaw(demo: &Demo<'_>) -> String {
         }
         .html();
     }
-    html += "<p class=\"note\">Drag over a chart to zoom in, tap a name to hide its curve. From the end of static \
-             initialisation on (3 s at rest).";
+    html += &format!("<p class=\"note\">{HINT} From the end of static initialisation on (3 s at rest).");
     html += match truth {
         Some(_) => {
             " The errors' scale is that of the corrected methods; what keeps its bias runs off it.</p>\n"
@@ -132,7 +131,7 @@ fn yaw(demo: &Demo<'_>) -> String {
     html
 }
 
-fn paths(trajectories: &Trajectories) -> String {
+fn paths(trajectories: &Trajectories, radius: f64) -> String {
     let Trajectories { paths, wheels, metres } = trajectories;
     let mut curves: Vec<Curve> = paths
         .iter()
@@ -151,7 +150,7 @@ fn paths(trajectories: &Trajectories) -> String {
     let of_wheels = if *wheels == 1 { "one wheel".into() } else { format!("the mean of {wheels} wheels") };
     format!(
         "{chart}<p class=\"note\">Dead reckoning over {metres:.0} m: each method's yaw rate with the speed of \
-         {of_wheels}, the same for all, as recorded (radius 0.289 m). The reference is the reference's yaw rate with the \
+         {of_wheels}, the same for all, as recorded (radius {radius} m). The reference is the reference's yaw rate with the \
          same speed.</p>\n"
     )
 }

@@ -1,10 +1,13 @@
-//! The Allan deviation of a gyro at rest, with the two figures that are read off it.
+//! This module computes the Allan deviation of a gyro at rest, and the two figures that are read off it.
 //!
 //! Averages of neighbouring spans of length tau differ by white noise, which falls as one over the root of tau (its value at
 //! 1 s is the angular random walk), and by what does not average out: the flat bottom of the curve, over 0.664, is the
 //! bias instability (IEEE Std 952).
 
+use super::finding::Finding;
+use super::recording::{Rows, sorted};
 use crate::drive::DT;
+use std::ops::Range;
 
 /// Fewest pairs of spans behind a point: below, it scatters by more than a third.
 const LEAST_PAIRS: usize = 9;
@@ -12,15 +15,17 @@ const LEAST_PAIRS: usize = 9;
 const PER_DECADE: f64 = 8.0;
 /// The flat part of 1/f noise lies at this times its coefficient.
 const FLAT: f64 = 0.664;
+/// Standstill that a noise figure needs, s.
+const LEAST_S: f64 = 10.0;
 
-/// The deviation over averaging times.
+/// Holds the deviation over averaging times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Allan {
     /// Averaging time, s, and deviation, rad/s.
     pub points: Vec<(f64, f64)>,
 }
 
-/// The figures of a gyro.
+/// Holds the figures of a gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Angular random walk, rad/s/sqrt(Hz) or, the same number, rad/sqrt(s).
@@ -65,8 +70,7 @@ impl Allan {
     pub fn noise(&self) -> Option<Noise> {
         // Below 0.1 s a sensor's own filter hides the noise.
         let white = self.points.iter().filter(|(tau, _)| (0.1..=1.0).contains(tau));
-        let mut walks: Vec<f64> = white.map(|(tau, deviation)| deviation * tau.sqrt()).collect();
-        walks.sort_unstable_by(f64::total_cmp);
+        let walks = sorted(white.map(|(tau, deviation)| deviation * tau.sqrt()));
         let random_walk = *walks.get(walks.len() / 2)?;
         let bottom = self.points.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
         // A curve that still falls at its end has not reached the bottom.
@@ -74,6 +78,36 @@ impl Allan {
         let instability = instability.map(|(_, (tau, deviation))| (deviation / FLAT, *tau));
         Some(Noise { random_walk, instability })
     }
+}
+
+/// Returns the curves about x, y and z; `None` where the standstill is too short.
+pub fn at_rest(rows: &Rows, standstill: Option<&Range<usize>>) -> Option<[Allan; 3]> {
+    let span = standstill.filter(|span| span.len() as f64 * DT >= LEAST_S)?.clone();
+    let rates = |axis: usize| rows.rate[span.clone()].iter().map(|rate| rate[axis]).collect::<Vec<f64>>();
+    Some([0, 1, 2].map(|axis| Allan::new(&rates(axis))))
+}
+
+pub fn finding(noise: Option<&[Option<Noise>; 3]>, standstill: Option<&Range<usize>>) -> Finding {
+    let Some([_, _, Some(Noise { random_walk, instability })]) = noise else {
+        let seconds = standstill.map_or(0.0, |span| span.len() as f64 * DT);
+        return Finding::note(
+            "gyro noise",
+            format!("Not read off: the longest standstill has {seconds:.0} s, it takes {LEAST_S:.0}."),
+        );
+    };
+    let walk = random_walk.to_degrees() * 60.0;
+    let bottom = match instability {
+        Some((rate, tau)) => {
+            format!("bias instability {:.2} deg/h at {tau:.0} s", rate.to_degrees() * 3_600.0)
+        }
+        None => "no bottom yet, so no bias instability: it takes a longer standstill".to_owned(),
+    };
+    Finding::note(
+        "gyro noise",
+        format!(
+            "About z: angular random walk {walk:.3} deg/sqrt(h), {bottom}; the engine's vibration included."
+        ),
+    )
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
-//! The page of an examined recording.
+//! This module writes the page of an examined recording.
 
-use super::allan::{Allan, Noise};
-use super::findings::{Doctor, Verdict};
+use super::{Allan, Doctor, Noise, Verdict};
 use crate::plot::page::chart::{Chart, Curve};
-use crate::plot::page::{document, escaped, table};
+use crate::plot::page::{HINT, document, escaped, table};
 
 /// Classes of the axes' curves in the style sheet.
 const AXES: [(&str, &str); 3] = [("static", "x"), ("prompt", "y"), ("default", "z")];
@@ -28,16 +27,17 @@ pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
         doctor.seconds,
         noise_facts(doctor)
     );
-    body += "<h2>Findings</h2>\n<div class=\"scroll\"><table class=\"costs\">\n<thead><tr><th>subject</th><th></th><th>finding</th></tr></thead>\n<tbody>\n";
+    body += "<h2>Findings</h2>\n<div class=\"scroll\"><table class=\"costs findings\">\n<thead><tr><th>subject</th><th></th><th>finding</th></tr></thead>\n<tbody>\n";
     for finding in &doctor.findings {
-        let (class, word) = match finding.verdict {
-            Verdict::Good => ("agrees", "good"),
-            Verdict::Note => ("note", "note"),
-            Verdict::Bad => ("differs", "cure"),
+        let class = match finding.verdict {
+            Verdict::Good => "agrees",
+            Verdict::Note => "note",
+            Verdict::Bad => "differs",
         };
         body += &format!(
-            "<tr><td>{}</td><td><span class=\"{class}\">{word}</span></td><td>{}</td></tr>\n",
+            "<tr><td>{}</td><td><span class=\"{class}\">{}</span></td><td>{}</td></tr>\n",
             finding.what,
+            finding.verdict.word(),
             escaped(&finding.text)
         );
     }
@@ -82,12 +82,14 @@ fn rates(doctor: &Doctor) -> String {
         points,
         in_scale: true,
     };
-    let mut curves = Vec::new();
+    // The reference is in front: a gyro that shakes would hide it.
+    let mut curves = vec![curve("static", "gyro", degrees(gyro))];
     if !reference.is_empty() {
         curves.push(curve("reference", "reference", degrees(reference)));
     }
-    curves.push(curve("static", "gyro", degrees(gyro)));
-    Chart { title: "Yaw rate", axes: "deg/s over s", same_scale: false, curves }.html()
+    let title = if reference.is_empty() { "By the gyro" } else { "By gyro and reference" };
+    let chart = Chart { title, axes: "deg/s, over time in s", same_scale: false, curves };
+    format!("{}<p class=\"note\">{HINT}</p>\n", chart.html())
 }
 
 fn allan_section(allan: &[Allan; 3], noise: &[Option<Noise>; 3]) -> String {
@@ -98,7 +100,7 @@ fn allan_section(allan: &[Allan; 3], noise: &[Option<Noise>; 3]) -> String {
     });
     let chart = Chart {
         title: "Allan deviation",
-        axes: "deg/h over s, powers of ten",
+        axes: "deg/h, over averaging time in s",
         same_scale: true,
         curves: curves.collect(),
     };
@@ -114,5 +116,5 @@ fn allan_section(allan: &[Allan; 3], noise: &[Option<Noise>; 3]) -> String {
         ]
     });
     let header = ["axis", "random walk, deg/√h", "bias instability, deg/h", "at, s"];
-    chart.html() + &table("methods", "", &header, rows)
+    chart.log_html() + &table("methods", "", &header, rows)
 }

@@ -2,9 +2,13 @@
 
 use crate::drive::error::DataError;
 use crate::drive::recording::{Reader, Row, WHEELS};
+use crate::drive::vehicle::Vehicle;
 use std::fs::File;
+use std::ops::Range;
 use std::path::Path;
 
+/// Rows of a second.
+pub const SECOND: usize = 100;
 /// Rows kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
 
@@ -25,6 +29,8 @@ pub struct Rows {
     /// Rows that could not be read, and why the first one could not.
     pub bad: u64,
     pub first_bad: Option<String>,
+    /// What the vehicle file beside it says.
+    pub vehicle: Vehicle,
 }
 
 impl Rows {
@@ -36,7 +42,9 @@ impl Rows {
         let shown = path.display().to_string();
         let file = File::open(path).map_err(|source| DataError::open(&shown, source))?;
         let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or(&shown).to_owned();
-        Self::parse(&name, Reader::new(&shown, std::io::BufReader::new(file))?)
+        let vehicle = Vehicle::of_drive(path)?;
+        let reader = Reader::new(&shown, std::io::BufReader::new(file))?.mounted(&vehicle);
+        Ok(Self { vehicle, ..Self::parse(&name, reader)? })
     }
 
     pub fn parse(
@@ -53,6 +61,7 @@ impl Rows {
             wheels: Default::default(),
             bad: 0,
             first_bad: None,
+            vehicle: Vehicle::default(),
         };
         let mut start = None;
         for row in reader {
@@ -84,4 +93,22 @@ impl Rows {
     pub fn len(&self) -> usize {
         self.seconds.len()
     }
+
+    /// Returns a value of each row, with its time, where it is known.
+    pub fn series(&self, of: impl Fn(usize) -> Option<f64>) -> Vec<(f64, f64)> {
+        (0..self.len()).filter_map(|row| Some((self.seconds[row], of(row)?))).collect()
+    }
+
+    /// Returns the mean of the gyro about z, rad/s.
+    pub fn mean_yaw_rate(&self, span: Range<usize>) -> f64 {
+        let rates = &self.rate[span];
+        rates.iter().map(|rate| rate[2]).sum::<f64>() / rates.len() as f64
+    }
+}
+
+/// Returns values from the least to the greatest.
+pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values
 }

@@ -1,36 +1,64 @@
 //! The wheels against the gyro: the difference of left and right, over the track, is the yaw rate.
 
-use super::recording::Rows;
+use super::finding::Finding;
+use super::recording::{Rows, SECOND};
 
 /// Least seconds of turning that say something.
 const LEAST_TURNING_S: usize = 5;
 /// A second turns from this rate on, rad/s.
 const TURNS: f64 = 0.05;
 
-/// The line through the differences of a pair of wheels over the yaw rates.
+/// Holds the line through the differences of a pair of wheels over the yaw rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pair {
+struct Pair {
     /// Difference, rad/s, of one rad/s of yaw rate: the track over the radius.
-    pub slope: f64,
-    pub correlation: f64,
+    slope: f64,
+    correlation: f64,
     /// Difference without a yaw rate, rad/s.
-    pub offset: f64,
+    offset: f64,
+}
+
+pub fn finding(rows: &Rows) -> Finding {
+    let what = "wheels";
+    let known = rows.wheels.iter().filter(|wheel| wheel.iter().any(Option::is_some)).count();
+    if known == 0 {
+        return Finding::note(what, "None: no zero-rate updates by wheels, no speed.");
+    }
+    let Some(Pair { slope, correlation, offset }) = compare(rows) else {
+        return Finding::note(
+            what,
+            format!("{known}; no axle with both wheels turns enough to be held against the gyro."),
+        );
+    };
+    let radius = rows.vehicle.radius_m();
+    let track = slope * radius;
+    let named = rows.vehicle.wheels.track_m.map(|track| format!(" ({track} m in the vehicle file)"));
+    let text = format!(
+        "{known}; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {radius} m{}, offset {offset:+.3} rad/s",
+        named.unwrap_or_default()
+    );
+    if correlation > 0.9 && (0.2..4.0).contains(&track) {
+        Finding::good(what, format!("{text}."))
+    } else if correlation < -0.9 {
+        Finding::bad(what, format!("{text}: left and right are swapped, or z is down."))
+    } else {
+        Finding::note(what, format!("{text}: good for standstill and speed, not for the yaw rate."))
+    }
 }
 
 /// Compares means over seconds; wheels 1 and 2 are right, 3 and 4 left, 1 and 3 at the front. `None` where no axle has both
 /// wheels or the drive hardly turns.
-pub fn compare(rows: &Rows) -> Option<Pair> {
+fn compare(rows: &Rows) -> Option<Pair> {
     for (right, left) in [(1, 3), (0, 2)] {
         let (right, left) = (&rows.wheels[right], &rows.wheels[left]);
-        let seconds = (0..rows.len()).step_by(100).filter_map(|from| {
-            let span = from..(from + 100).min(rows.len());
+        let seconds = (0..rows.len()).step_by(SECOND).filter_map(|from| {
+            let span = from..(from + SECOND).min(rows.len());
             let mean = |wheel: &[Option<f64>]| {
                 let known = || wheel.iter().flatten();
                 (known().count() >= 5).then(|| known().sum::<f64>() / known().count() as f64)
             };
             let (right, left) = (mean(&right[span.clone()])?, mean(&left[span.clone()])?);
-            let rate = rows.rate[span.clone()].iter().map(|rate| rate[2]).sum::<f64>() / span.len() as f64;
-            Some((rate, right - left))
+            Some((rows.mean_yaw_rate(span), right - left))
         });
         let seconds: Vec<(f64, f64)> = seconds.collect();
         if seconds.iter().filter(|(rate, _)| rate.abs() > TURNS).count() >= LEAST_TURNING_S {

@@ -143,6 +143,9 @@ pub enum DataFault {
     /// The request needs an inertial sensor, and the sequence has none.
     #[error("xsens_imu.csv has 8 columns: no gyro and no accelerometer")]
     NoGyro,
+    /// The vehicle file cannot be used.
+    #[error("no vehicle file: {reason}")]
+    Vehicle { reason: String },
     /// The note that a sequence is simulated cannot be parsed.
     #[error(transparent)]
     Marker(#[from] serde_json::Error),

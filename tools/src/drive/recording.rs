@@ -20,6 +20,7 @@ mod reader;
 pub use reader::Reader;
 
 use crate::drive::error::{DataError, DataFault};
+use crate::drive::vehicle::Vehicle;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
 use std::fs::File;
@@ -58,17 +59,19 @@ pub struct Recording {
     pub rows: Vec<Row>,
     /// Rows that are missing between others.
     pub missing: u64,
+    /// What the vehicle file beside it says; the rows are in the vehicle's axes.
+    pub vehicle: Vehicle,
 }
 
 impl Recording {
-    /// Reads a file.
+    /// Reads a file, and the vehicle file beside it.
     ///
     /// # Errors
     /// [`DataError`], which names the file and, where there is one, the line.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
-        Self::parse(&name, file)
+        Self::of(&name, file, Vehicle::of_drive(path)?)
     }
 
     /// Parses any input; errors name it `path`.
@@ -76,8 +79,12 @@ impl Recording {
     /// # Errors
     /// [`DataError`] with that path.
     pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, DataError> {
-        let rows = Reader::new(path, input)?.collect::<Result<Vec<Row>, _>>()?;
-        let mut recording = Self { path: path.to_owned(), rows, missing: 0 };
+        Self::of(path, input, Vehicle::default())
+    }
+
+    fn of(path: &str, input: impl std::io::Read, vehicle: Vehicle) -> Result<Self, DataError> {
+        let rows = Reader::new(path, input)?.mounted(&vehicle).collect::<Result<Vec<Row>, _>>()?;
+        let mut recording = Self { path: path.to_owned(), rows, missing: 0, vehicle };
         recording.check_length()?;
         recording.check_period()?;
         recording.check_wheels()?;

@@ -7,7 +7,7 @@ use gyronet::can::DataFrame;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::sample::WHEELS;
 
-/// A wheel of the recorded car has this radius, m.
+/// A wheel of the recorded car has this radius, m; another vehicle's stands in its vehicle file.
 pub const RADIUS: f64 = 0.289;
 /// Gives for each place of [`gyronet::sample::WheelSample::speeds`] the recorded wheel (front right, rear right, front
 /// left, rear left).
@@ -48,6 +48,8 @@ pub struct WheelFrames {
     /// The newest speed of each recorded wheel in km/h, and the row that it came with.
     newest: [Option<(f64, usize)>; WHEELS],
     row: usize,
+    /// Rolling radius, m.
+    radius: f64,
 }
 
 impl WheelFrames {
@@ -62,7 +64,7 @@ impl WheelFrames {
             let own = [wheel, axle[0], axle[1]].into_iter().find(recorded);
             source[*place] = own.unwrap_or(any);
         }
-        Some(Self { source, newest: [None; WHEELS], row: 0 })
+        Some(Self { source, newest: [None; WHEELS], row: 0, radius: recording.vehicle.radius_m() })
     }
 
     /// Takes a row and returns the known speed of each wheel in km/h. A wheel that turns too slowly to be distinguished
@@ -70,7 +72,7 @@ impl WheelFrames {
     pub fn speeds(&mut self, row: &Row) -> [Option<f64>; WHEELS] {
         for (newest, rate) in self.newest.iter_mut().zip(row.wheels) {
             let shown = |rate: f64| if rate.abs() > WHEEL_STANDS { rate.abs() } else { 0.0 };
-            *newest = rate.map(|rate| (shown(rate) * RADIUS * 3.6, self.row)).or(*newest);
+            *newest = rate.map(|rate| (shown(rate) * self.radius * 3.6, self.row)).or(*newest);
         }
         let now = self.row;
         self.row += 1;
@@ -103,12 +105,12 @@ impl Speeds {
         let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
         let axle = |axle: [usize; 2]| axle.into_iter().filter(recorded).collect::<Vec<usize>>();
         let wheels = [REAR, FRONT].map(axle).into_iter().find(|wheels| !wheels.is_empty())?;
-        let mut last = [0.0; WHEELS];
+        let (mut last, radius) = ([0.0; WHEELS], recording.vehicle.radius_m());
         let speed = |row: &Row| {
             for wheel in &wheels {
                 last[*wheel] = row.wheels[*wheel].unwrap_or(last[*wheel]);
             }
-            RADIUS * wheels.iter().map(|wheel| last[*wheel]).sum::<f64>() / wheels.len() as f64
+            radius * wheels.iter().map(|wheel| last[*wheel]).sum::<f64>() / wheels.len() as f64
         };
         let metre_per_sec = recording.rows.iter().map(speed).collect();
         Some(Self { wheels: wheels.len(), metre_per_sec })

@@ -4,12 +4,12 @@ use super::align::{self, Offset};
 use super::can::Bus;
 use super::course::{Course, courses};
 use super::error::ImportError;
-use super::format::read_file;
+use super::format::read_into;
 use super::grid::{self, resample};
-use super::select::{Channel, File, Selection, select};
-use super::vehicle::Vehicle;
+use super::log::Log;
+use super::select::{self, Channel, File, Selection, select};
 use crate::drive::DT;
-use crate::drive::wheel_frames::RADIUS;
+use crate::drive::vehicle::Vehicle;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -69,7 +69,8 @@ pub fn import(request: &Request) -> Result<Imported, ImportError> {
     let bus = request.vehicle.bus.dbc.as_deref().map(Bus::read).transpose()?;
     let mut files = Vec::new();
     for path in &request.files {
-        let log = read_file(path, bus.as_ref(), &request.vehicle.columns)?;
+        let log = Log { wanted: Some(select::numbers(&request.vehicle)), ..Log::default() };
+        let log = read_into(path, bus.as_ref(), &request.vehicle.columns, log)?;
         files.push(File { path: path.display().to_string(), log });
     }
     let mut report = Vec::new();
@@ -99,7 +100,7 @@ fn clocks(
 ) -> Result<Vec<f64>, ImportError> {
     let mut offsets = vec![0.0; files.len()];
     let main = selection.imu.file;
-    if request.same_clock {
+    if request.same_clock || files.len() == 1 {
         return Ok(offsets);
     }
     let imu = selection.imu.imu();
@@ -147,7 +148,7 @@ fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<
             continue;
         };
         let ((right, _), (left, is_rate)) = (right.speed(), left.speed());
-        let scale = if is_rate { vehicle.wheels.radius_m.unwrap_or(RADIUS) } else { 1.0 };
+        let scale = if is_rate { vehicle.radius_m() } else { 1.0 };
         let track = vehicle.wheels.track_m.unwrap_or(1.5);
         let start = right.first()?.0.max(left.first()?.0);
         let count = ((right.last()?.0.min(left.last()?.0) - start) / DT).clamp(0.0, LONGEST / DT) as usize;
@@ -247,7 +248,7 @@ fn wheels(
     (start, count): (f64, usize),
     report: &mut Vec<String>,
 ) -> [Grid; 4] {
-    let radius = vehicle.wheels.radius_m.unwrap_or(RADIUS);
+    let radius = vehicle.radius_m();
     let assumed = if vehicle.wheels.radius_m.is_some() { "" } else { ", assumed: name wheels.radius_m" };
     if let Some(channel) = &selection.odometry {
         let speed = shifted(channel.odometry(), offsets[channel.file]);

@@ -14,9 +14,6 @@ pub enum ImportError {
     /// The DBC file cannot be used.
     #[error("{path}: no DBC file: {reason}")]
     Dbc { path: String, reason: String },
-    /// The vehicle file cannot be used.
-    #[error("{path}: {reason}")]
-    Vehicle { path: String, reason: String },
     /// Nothing in the files is fit for what is needed.
     #[error("no {role} in the files{}", list(.candidates, "; there are "))]
     Missing { role: &'static str, candidates: Vec<String> },

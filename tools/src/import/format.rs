@@ -3,8 +3,8 @@
 use super::can::Bus;
 use super::error::ImportError;
 use super::log::Log;
-use super::vehicle::Columns;
 use super::{blf, candump, mcap, ros_bag, table, ulog};
+use crate::drive::vehicle::Columns;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -32,6 +32,11 @@ const REFUSED: [(&[u8], &str); 3] = [
 /// # Errors
 /// [`ImportError`]: the file cannot be read at all, or its format is not one of those that are.
 pub fn read_file(path: &Path, bus: Option<&Bus>, columns: &Columns) -> Result<Log, ImportError> {
+    read_into(path, bus, columns, Log::default())
+}
+
+/// Reads a file into a log that knows what is wanted.
+pub fn read_into(path: &Path, bus: Option<&Bus>, columns: &Columns, log: Log) -> Result<Log, ImportError> {
     let name = path.display().to_string();
     let io = |source| ImportError::Io { path: name.clone(), source };
     if path.is_dir() {
@@ -41,7 +46,7 @@ pub fn read_file(path: &Path, bus: Option<&Bus>, columns: &Columns) -> Result<Lo
         });
     }
     let file = File::open(path).map_err(io)?;
-    read(&name, &mut BufReader::with_capacity(1 << 16, file), bus, columns)
+    read(&name, &mut BufReader::with_capacity(1 << 16, file), bus, columns, log)
 }
 
 /// Reads bytes as a file of that name.
@@ -54,10 +59,16 @@ pub fn read_bytes(
     bus: Option<&Bus>,
     columns: &Columns,
 ) -> Result<Log, ImportError> {
-    read(name, &mut bytes, bus, columns)
+    read(name, &mut bytes, bus, columns, Log::default())
 }
 
-fn read(name: &str, input: &mut Input<'_>, bus: Option<&Bus>, columns: &Columns) -> Result<Log, ImportError> {
+fn read(
+    name: &str,
+    input: &mut Input<'_>,
+    bus: Option<&Bus>,
+    columns: &Columns,
+    mut log: Log,
+) -> Result<Log, ImportError> {
     let io = |source| ImportError::Io { path: name.to_owned(), source };
     let refuse = |reason: &str| ImportError::Format { path: name.to_owned(), reason: reason.to_owned() };
     // A file's buffer holds them all at the first look.
@@ -68,7 +79,6 @@ fn read(name: &str, input: &mut Input<'_>, bus: Option<&Bus>, columns: &Columns)
     if let Some((_, reason)) = REFUSED.iter().find(|(magic, _)| head.starts_with(magic)) {
         return Err(refuse(reason));
     }
-    let mut log = Log::default();
     if head.starts_with(mcap::MAGIC) {
         mcap::read(input, &mut log);
     } else if head.starts_with(ros_bag::MAGIC) {
@@ -95,11 +105,11 @@ pub fn read_up_to(input: &mut Input<'_>, len: usize) -> std::io::Result<Vec<u8>>
     Ok(bytes)
 }
 
-/// Reads a line without its end, of at most `most` bytes; what is beyond them is the next line.
+/// Reads a line without its end (fields of spaces stay), of at most `most` bytes; what is beyond them is the next line.
 pub fn read_line(input: &mut Input<'_>, most: u64) -> std::io::Result<Option<String>> {
     let mut bytes = Vec::new();
     if input.take(most).read_until(b'\n', &mut bytes)? == 0 {
         return Ok(None);
     }
-    Ok(Some(String::from_utf8_lossy(&bytes).trim_end().to_owned()))
+    Ok(Some(String::from_utf8_lossy(&bytes).trim_end_matches(['\r', '\n']).to_owned()))
 }

@@ -98,6 +98,11 @@ pub struct Log {
     pub dropped: BTreeMap<String, u64>,
     /// Records that have no use for a drive, by type.
     pub passed_over: BTreeMap<String, u64>,
+    /// Names of the plain numbers that a drive is made of; of any other only the first and the last sample stay, since a bus
+    /// has thousands. `None` keeps all.
+    pub wanted: Option<Vec<String>>,
+    /// The number of samples of the channels that were not wanted.
+    pub(super) unwanted: BTreeMap<String, usize>,
 }
 
 impl Log {
@@ -122,6 +127,15 @@ impl Log {
         if samples.last().is_some_and(|(last, _)| seconds <= *last) {
             return self.drop(format!("{channel}: time does not rise"));
         }
+        // A name may say the file too.
+        let is_wanted = |wanted: &Vec<String>| wanted.iter().any(|name| name.ends_with(channel));
+        if matches!(value, Value::Number(_)) && !self.wanted.as_ref().is_none_or(is_wanted) {
+            samples.truncate(1);
+            match self.unwanted.get_mut(channel) {
+                Some(count) => *count += 1,
+                None => drop(self.unwanted.insert(channel.to_owned(), 1)),
+            }
+        }
         samples.push((seconds, value));
     }
 
@@ -139,8 +153,9 @@ impl Log {
     pub fn catalogue(&self) -> impl Iterator<Item = (&str, Kind, usize, f64)> {
         self.channels.iter().filter_map(|(name, samples)| {
             let (first, last) = (samples.first()?, samples.last()?);
-            let rate = (samples.len() - 1) as f64 / (last.0 - first.0).max(1e-9);
-            Some((name.as_str(), first.1.kind(), samples.len(), rate))
+            let count = self.unwanted.get(name).copied().unwrap_or(samples.len());
+            let rate = (count - 1) as f64 / (last.0 - first.0).max(1e-9);
+            Some((name.as_str(), first.1.kind(), count, rate))
         })
     }
 }
@@ -156,6 +171,21 @@ fn count(counts: &mut BTreeMap<String, u64>, reason: String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_numbers_that_are_not_wanted_two_samples_stay() {
+        let mut log = Log { wanted: Some(vec!["bus.blf:A.RL".to_owned()]), ..Log::default() };
+        for k in 0..101 {
+            let seconds = 0.01 * f64::from(k);
+            log.add("A.RL", seconds, Value::Number(1.0));
+            log.add("A.RR", seconds, Value::Number(1.0));
+            log.add("odometry", seconds, Value::Odometry(1.0, 0.0));
+        }
+        assert_eq!(["A.RL", "A.RR", "odometry"].map(|name| log.channels[name].len()), [101, 2, 101]);
+        for (name, _, count, hz) in log.catalogue() {
+            assert!(count == 101 && (hz - 100.0).abs() < 1e-6, "{name} {count} {hz}");
+        }
+    }
 
     #[test]
     fn a_clock_that_jumps_back_costs_the_samples_until_it_has_caught_up() {

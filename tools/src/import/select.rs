@@ -2,10 +2,13 @@
 
 use super::error::ImportError;
 use super::log::{Fix, Kind, Log, Sample, Value};
-use super::vehicle::Vehicle;
+use crate::drive::vehicle::Vehicle;
 
 /// The name with which a role is left out.
 const NONE: &str = "none";
+/// The wheels of our own drives, in the order of their columns, and the reference yaw rate.
+pub const WHEELS: [&str; 4] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
+pub const REFERENCE: &str = "ref_gyr_z";
 
 /// A file that was read.
 #[derive(Debug)]
@@ -34,6 +37,14 @@ pub struct Selection<'a> {
     pub wheels: [Option<Channel<'a>>; 4],
 }
 
+/// Returns the names of the plain numbers that [`select`] may choose.
+pub fn numbers(vehicle: &Vehicle) -> Vec<String> {
+    let wheels = &vehicle.wheels;
+    let named = [&wheels.front_right, &wheels.rear_right, &wheels.front_left, &wheels.rear_left];
+    let named = named.into_iter().chain([&vehicle.signals.reference_rate]).flatten().cloned();
+    named.chain(WHEELS.into_iter().chain([REFERENCE]).map(str::to_owned)).collect()
+}
+
 /// Chooses the channels.
 ///
 /// # Errors
@@ -44,9 +55,13 @@ pub fn select<'a>(files: &'a [File], vehicle: &'a Vehicle) -> Result<Selection<'
     let imu = imu.ok_or_else(|| ImportError::Missing { role: "IMU", candidates: listed(files, |_| true) })?;
     let wheels = &vehicle.wheels;
     let names = [&wheels.front_right, &wheels.rear_right, &wheels.front_left, &wheels.rear_left];
-    let [fr, rr, fl, rl] = names.map(|name| {
-        name.as_deref().map(|name| by_name(files, "a wheel", name, Some(Kind::Number))).transpose()
-    });
+    let mut names = names.map(Option::as_deref);
+    let has = |name: &str| channels(files).any(|channel| channel.name == name);
+    if names == [None; 4] {
+        names = WHEELS.map(|name| has(name).then_some(name));
+    }
+    let [fr, rr, fl, rl] =
+        names.map(|name| name.map(|name| by_name(files, "a wheel", name, Some(Kind::Number))).transpose());
     let wheels = [fr?, rr?, fl?, rl?];
     let odometry = match (&signals.odometry, wheels.iter().flatten().next()) {
         // Wheels by name need no odometry.
@@ -60,6 +75,7 @@ pub fn select<'a>(files: &'a [File], vehicle: &'a Vehicle) -> Result<Selection<'
         reference_rate: signals
             .reference_rate
             .as_deref()
+            .or(has(REFERENCE).then_some(REFERENCE))
             .map(|name| by_name(files, "the reference rate", name, None))
             .transpose()?,
         wheels,

@@ -5,7 +5,8 @@
 
 use super::format::{Input, read_line};
 use super::log::{Fix, Log, Value};
-use super::vehicle::{Column, Columns};
+use super::select::{REFERENCE, WHEELS};
+use crate::drive::vehicle::{Column, Columns};
 
 /// Longest line.
 const MAX_LINE: u64 = 1 << 16;
@@ -29,7 +30,7 @@ const KNOWN: [(&str, &[&str]); 13] = [
     ("course_sigma", &[]),
 ];
 /// Units and what one of them is in SI.
-const UNITS: [(&str, f64); 13] = [
+const UNITS: [(&str, f64); 15] = [
     ("s", 1.0),
     ("ms", 1e-3),
     ("us", 1e-6),
@@ -43,7 +44,11 @@ const UNITS: [(&str, f64); 13] = [
     ("m", 1.0),
     ("m/s", 1.0),
     ("km/h", 1.0 / 3.6),
+    ("mph", 0.447_04),
+    ("rpm", std::f64::consts::TAU / 60.0),
 ];
+/// Units of angular rates, which are rad/s once they are read.
+const RATES: [&str; 3] = ["rad/s", "deg/s", "rpm"];
 
 /// The error of a table.
 #[derive(Debug, thiserror::Error)]
@@ -64,13 +69,21 @@ pub enum TableError {
     Dot,
 }
 
-/// Where the time comes from.
+/// A source of the time.
+#[derive(Clone, Copy)]
 enum Time {
     Column(usize, f64),
     /// A counter of 32 bits, in units of 0.1 ms.
     Fine(usize),
     /// A counter of 16 bits, and the samples of a second.
     Packets(usize, f64),
+}
+
+impl Time {
+    fn column(self) -> usize {
+        let (Self::Column(at, _) | Self::Fine(at) | Self::Packets(at, _)) = self;
+        at
+    }
 }
 
 /// Reads a table.
@@ -90,17 +103,18 @@ pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(
     };
     let names = split(&header.0);
     let find = |ours: &str| find(&names, columns, ours);
-    let time = match find("t_s")? {
-        Some((at, unit)) => Time::Column(at, unit),
+    let at = |name: &str| names.iter().position(|column| column == name);
+    let times = match find("t_s")? {
+        Some((at, unit)) => vec![Time::Column(at, unit)],
         None => {
-            let at = |name: &str| names.iter().position(|column| column == name);
-            match (at("SampleTimeFine"), at("PacketCounter"), rate) {
-                (Some(at), ..) => Time::Fine(at),
-                (None, Some(at), Some(rate)) => Time::Packets(at, rate),
-                _ => return Err(TableError::Time(names.join(", "))),
-            }
+            let fine = at("SampleTimeFine").map(Time::Fine);
+            let packets = at("PacketCounter").zip(rate).map(|(at, rate)| Time::Packets(at, rate));
+            fine.into_iter().chain(packets).collect()
         }
     };
+    if times.is_empty() {
+        return Err(TableError::Time(names.join(", ")));
+    }
     let mut places = Vec::new();
     for (ours, _) in &KNOWN[1..] {
         places.push(find(ours)?);
@@ -109,12 +123,19 @@ pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(
         return Err(TableError::Unknown);
     };
     let others = named_others(&names, columns, &places)?;
-    let mut clock = Clock { last: None, turns: 0.0 };
+    for (at, ..) in &others {
+        log.units.insert(names[*at].clone(), unit_of(&names[*at], columns).to_owned());
+    }
+    let mut clock = Clock { times, last: None, turns: 0.0 };
     while let Some(line) = read_line(input, MAX_LINE)? {
-        if line.is_empty() {
+        if line.trim().is_empty() {
             continue;
         }
-        let row = split(&line);
+        let mut row = split(&line);
+        // Some exports end each row, but not the header, with a separator.
+        if row.len() == names.len() + 1 {
+            row.pop_if(|last| last.is_empty());
+        }
         let number = |place: Option<(usize, f64)>| {
             let (at, unit) = place?;
             Some(unit * row.get(at)?.parse::<f64>().ok()?)
@@ -123,7 +144,7 @@ pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(
             log.drop("rows of another length than the header".to_owned());
             continue;
         }
-        let Some(seconds) = clock.seconds(&time, number) else {
+        let Some(seconds) = clock.seconds(number) else {
             log.drop("rows without a time".to_owned());
             continue;
         };
@@ -158,11 +179,11 @@ fn header(input: &mut Input<'_>) -> Result<Header, TableError> {
     let mut rate = None;
     for _ in 0..MAX_REMARKS {
         let Some(line) = read_line(input, MAX_LINE)? else { return Err(TableError::Unknown) };
-        let line = line.trim_start_matches('\u{feff}').trim();
+        let line = line.trim_start_matches('\u{feff}');
         if line.contains("DeviceTag") {
             return Err(TableError::Dot);
         }
-        if line.starts_with("//") || line.starts_with('#') || line.is_empty() {
+        if line.starts_with("//") || line.starts_with('#') || line.trim().is_empty() {
             if let Some((_, text)) = line.split_once("Update Rate:") {
                 rate = text.trim().trim_end_matches("Hz").parse().ok().filter(|rate| *rate > 0.0);
             }
@@ -223,15 +244,31 @@ fn named_others(
     Ok(others)
 }
 
+/// Returns the unit of a column once it is read. Our own drives have rates of wheels and of the reference.
+fn unit_of(name: &str, columns: &Columns) -> &'static str {
+    let given = columns.values().find(|column| column.name == name).and_then(|column| column.unit.as_deref());
+    match given {
+        Some(unit) if RATES.contains(&unit) => "rad/s",
+        None if WHEELS.contains(&name) || name == REFERENCE => "rad/s",
+        _ => "",
+    }
+}
+
 /// A clock whose counter wraps.
 struct Clock {
+    /// Its sources; once one has a value the others are forgotten. Exports have columns that are empty throughout.
+    times: Vec<Time>,
     last: Option<f64>,
     turns: f64,
 }
 
 impl Clock {
-    fn seconds(&mut self, time: &Time, number: impl Fn(Option<(usize, f64)>) -> Option<f64>) -> Option<f64> {
-        let (at, period, second) = match *time {
+    fn seconds(&mut self, number: impl Fn(Option<(usize, f64)>) -> Option<f64>) -> Option<f64> {
+        if self.times.len() > 1 {
+            let first = *self.times.iter().find(|time| number(Some((time.column(), 1.0))).is_some())?;
+            self.times = vec![first];
+        }
+        let (at, period, second) = match *self.times.first()? {
             Time::Column(at, unit) => return number(Some((at, unit))),
             Time::Fine(at) => (at, 4_294_967_296.0, 1e4),
             Time::Packets(at, rate) => (at, 65_536.0, rate),
@@ -266,6 +303,18 @@ mod tests {
         let imu = &log.channels["imu"];
         assert_eq!(imu[1], (655.36, Value::Imu([1.0, 2.0, 3.0], [0.1, 0.2, 0.3])));
         assert!((imu[1].0 - imu[0].0 - 0.01).abs() < 1e-9);
+    }
+
+    #[test]
+    fn columns_of_an_export_that_are_empty_throughout_do_no_harm() {
+        // As MT Manager 4.6 writes it for an MTw Awinda: the counter alone says when, and no row has a position.
+        let text = "// Update Rate: 40.0Hz\r\nPacketCounter\tSampleTimeFine\tYear\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\t\
+                    Latitude\tLongitude\r\n03583\t\t\t3.0\t5.2\t-7.7\t0.1\t0.2\t0.3\t\t\r\n\
+                    03584\t\t\t3.0\t5.2\t-7.7\t0.1\t0.2\t0.3\t\t\r\n";
+        let log = table(text, "").unwrap();
+        assert_eq!(log.channels.keys().collect::<Vec<_>>(), ["PacketCounter", "imu"]);
+        assert_eq!((log.channels["imu"].len(), log.channels["imu"][0].0), (2, 3_583.0 / 40.0));
+        assert!(log.dropped.is_empty(), "{log:?}");
     }
 
     #[test]

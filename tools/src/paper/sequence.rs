@@ -22,6 +22,7 @@ pub use summary::{Seen, Spread, StreamSummary};
 use crate::drive::DT;
 use crate::drive::error::{DataError, DataFault};
 use crate::drive::recording::{Recording, Row as RecordingRow};
+use crate::drive::vehicle::Vehicle;
 use crate::simulate::layout::{Layout, MARKER, Spec};
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
@@ -260,7 +261,8 @@ impl Sequence {
             let reference = Some(turn / DT);
             Some(RecordingRow { line: k as u64 + 1, sample, reference, course: None, wheels })
         });
-        Ok(Recording { path: self.path.display().to_string(), rows: rows.collect(), missing: 0 })
+        let path = self.path.display().to_string();
+        Ok(Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() })
     }
 
     /// Checks that the sequence has an inertial sensor.

@@ -7,6 +7,8 @@ use std::fmt::{Display, Write};
 
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/zoom.js");
+/// A page with charts says this once.
+pub const HINT: &str = "Drag over a chart, or press + and - on it, to zoom; tap a name to hide its curve.";
 
 /// Returns a whole page around its body.
 #[must_use]

@@ -2,7 +2,9 @@
 
 use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault, ValueError};
+use crate::drive::vehicle::Vehicle;
 use csv::StringRecord;
+use gyronet::mounting::Rotation;
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 use std::str::FromStr;
@@ -64,6 +66,7 @@ pub struct Reader<R> {
     records: csv::StringRecordsIntoIter<R>,
     fields: usize,
     last: Option<Micros>,
+    rotation: Option<Rotation>,
 }
 
 impl<R: std::io::Read> Reader<R> {
@@ -79,7 +82,20 @@ impl<R: std::io::Read> Reader<R> {
         }
         let columns = Columns::find(path, header)?;
         let fields = header.len();
-        Ok(Self { path: path.to_owned(), columns, records: csv.into_records(), fields, last: None })
+        Ok(Self {
+            path: path.to_owned(),
+            columns,
+            records: csv.into_records(),
+            fields,
+            last: None,
+            rotation: None,
+        })
+    }
+
+    /// Turns the rows into the vehicle's axes.
+    #[must_use]
+    pub fn mounted(self, vehicle: &Vehicle) -> Self {
+        Self { rotation: vehicle.mounting.rotation(), ..self }
     }
 
     fn row(&mut self, record: &StringRecord) -> Result<Row, DataError> {
@@ -105,6 +121,7 @@ impl<R: std::io::Read> Reader<R> {
             temperature: None,
             validity: Validity::Good,
         };
+        let sample = self.rotation.map_or(sample, |rotation| rotation.sample(&sample));
         let (reference, course) = (optional(reference)?, optional(course)?);
         let wheels = [w1?, w2?, w3?, w4?];
         self.last = Some(time);

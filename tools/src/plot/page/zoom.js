@@ -1,8 +1,14 @@
 // Drag over a chart to zoom in; a double click or "whole drive" goes back; a name in the legend
-// hides its curve. The charts over time move together.
+// hides its curve. On the keyboard + and - zoom, arrows move, Escape goes back. The charts over
+// time move together.
 'use strict';
 (() => {
   const SIDE = 10000, AIR = 0.06, LEAST = SIDE / 500;
+  // The width by which a key multiplies the view, and the shares of it to the right and down by which it moves.
+  const KEYS = {
+    '+': [0.5, 0, 0], '=': [0.5, 0, 0], '-': [2, 0, 0],
+    ArrowLeft: [1, -0.25, 0], ArrowRight: [1, 0.25, 0], ArrowUp: [1, 0, -0.25], ArrowDown: [1, 0, 0.25],
+  };
   const charts = [...document.querySelectorAll('.chart')].map(figure => {
     const svg = figure.querySelector('svg'), plot = figure.querySelector('.plot');
     const [x0, x1, y0, y1] = figure.dataset.range.split(' ').map(Number);
@@ -10,7 +16,8 @@
       line, free: line.classList.contains('free'),
       points: line.getAttribute('points').split(' ').map(pair => pair.split(',').map(Number)),
     }));
-    return { figure, svg, plot, curves, x0, x1, y0, y1, view: [0, SIDE, 0, SIDE], isMap: figure.classList.contains('map') };
+    return { figure, svg, plot, curves, x0, x1, y0, y1, view: [0, SIDE, 0, SIDE],
+      isMap: figure.classList.contains('map'), isLog: figure.classList.contains('log') };
   });
 
   const ticks = (from, to, most) => {
@@ -23,10 +30,10 @@
     }
     return all;
   };
-  const axis = (box, side, from, to, most) => box.replaceChildren(...ticks(from, to, most).map(([at, text]) => {
+  const axis = (box, side, from, to, most, isLog) => box.replaceChildren(...ticks(from, to, most).map(([at, text]) => {
     const line = document.createElement('i'), label = document.createElement('b');
     line.style[side] = 100 * (at - from) / (to - from) + '%';
-    label.textContent = text;
+    label.textContent = isLog ? Number((10 ** at).toPrecision(2)) : text;
     line.append(label);
     return line;
   }));
@@ -47,11 +54,11 @@
   };
   const draw = chart => {
     const [left, right, top, bottom] = chart.view;
-    const { figure, svg, plot, x0, x1, y0, y1 } = chart;
+    const { svg, plot, isLog, x0, x1, y0, y1 } = chart;
     svg.setAttribute('viewBox', `${left} ${top} ${right - left} ${bottom - top}`);
     const x = at => x0 + at / SIDE * (x1 - x0), y = at => y1 - at / SIDE * (y1 - y0);
-    axis(plot.querySelector('.x'), 'left', x(left), x(right), 9);
-    axis(plot.querySelector('.y'), 'bottom', y(bottom), y(top), 6);
+    axis(plot.querySelector('.x'), 'left', x(left), x(right), 9, isLog);
+    axis(plot.querySelector('.y'), 'bottom', y(bottom), y(top), 6, isLog);
     chart.whole.classList.toggle('hidden', left <= 0 && right >= SIDE);
   };
   const show = (chart, view) => {
@@ -80,6 +87,20 @@
         }
       };
     }
+    plot.tabIndex = 0;
+    plot.setAttribute('role', 'group');
+    plot.setAttribute('aria-label', `${chart.svg.getAttribute('aria-label')}: + and - zoom, arrows move, Escape goes back`);
+    plot.onkeydown = event => {
+      if (event.key === 'Escape') return back();
+      const [by, across, down] = KEYS[event.key] ?? [];
+      if (!by || event.ctrlKey || event.metaKey || event.altKey || (down && !chart.isMap)) return;
+      event.preventDefault();
+      const [left, right, top, bottom] = chart.view, side = Math.max(LEAST, by * (right - left));
+      if (side >= SIDE) return back();
+      const start = (middle, share) => Math.min(SIDE - side, Math.max(0, middle + (share - 0.5) * side));
+      const [x, y] = [start((left + right) / 2, across), start((top + bottom) / 2, down)];
+      show(chart, [x, x + side, y, y + side]);
+    };
     let from = null, brush = null;
     const at = event => {
       const box = plot.getBoundingClientRect();

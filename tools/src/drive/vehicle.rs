@@ -1,9 +1,11 @@
-//! The vehicle file: a small TOML file beside a drive that says how the sensor is mounted, what the wheels are, and which
-//! channels of the logs are which.
+//! A vehicle file is a small TOML file that says how the sensor is mounted, what the wheels are, and which channels of the
+//! logs are which. `gyronet import` reads one and writes it beside the drive, as `drive.toml` beside `drive.csv`, where
+//! every command that reads the drive finds it.
 //!
 //! ```toml
 //! [mounting]          # of the IMU: degrees about its axes, roll first
 //! yaw_deg = 90.0
+//! applied = false     # true: the rows of the drive are in the vehicle's axes already
 //! [wheels]
 //! radius_m = 0.31     # rolling radius
 //! track_m = 1.52      # distance between left and right
@@ -15,7 +17,9 @@
 //! t_s = { name = "timestamp", unit = "ms" }
 //! ```
 
-use super::error::ImportError;
+use super::error::{DataError, DataFault};
+use super::wheel_frames::RADIUS;
+use gyronet::mounting::Rotation;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -34,6 +38,9 @@ pub struct Vehicle {
     pub bus: BusFiles,
     /// The columns of a text table.
     pub columns: Columns,
+    /// The file that it was read from.
+    #[serde(skip)]
+    pub path: Option<PathBuf>,
 }
 
 /// Names of a table's columns, by ours.
@@ -59,6 +66,8 @@ pub struct Mounting {
     pub pitch_deg: f64,
     /// About z.
     pub yaw_deg: f64,
+    /// Says that the rows beside the file are in the vehicle's axes already.
+    pub applied: bool,
 }
 
 /// The wheels.
@@ -105,24 +114,53 @@ impl Vehicle {
     /// Reads a vehicle file.
     ///
     /// # Errors
-    /// [`ImportError`].
-    pub fn read(path: &Path) -> Result<Self, ImportError> {
+    /// [`DataError`].
+    pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).map_err(|source| ImportError::Io { path: name.clone(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
         let mut vehicle = Self::parse(&name, &text)?;
         if let (Some(dbc), Some(folder)) = (&mut vehicle.bus.dbc, path.parent()) {
             *dbc = folder.join(&*dbc);
         }
+        vehicle.path = Some(path.to_owned());
         Ok(vehicle)
+    }
+
+    /// Returns the place of the vehicle file of a drive.
+    #[must_use]
+    pub fn beside(drive: &Path) -> PathBuf {
+        drive.with_extension("toml")
+    }
+
+    /// Reads the vehicle file of a drive; without one nothing is known of the vehicle.
+    ///
+    /// # Errors
+    /// [`DataError`].
+    pub fn of_drive(drive: &Path) -> Result<Self, DataError> {
+        let path = Self::beside(drive);
+        if path.is_file() { Self::read(&path) } else { Ok(Self::default()) }
+    }
+
+    /// Forgets the names of channels, columns and files.
+    #[must_use]
+    pub fn without_names(self) -> Self {
+        let Wheels { radius_m, track_m, .. } = self.wheels;
+        let wheels = Wheels { radius_m, track_m, ..Wheels::default() };
+        Self { mounting: self.mounting, wheels, path: self.path, ..Self::default() }
+    }
+
+    /// Returns the rolling radius of the wheels, m; where none is known, that of the recorded car.
+    #[must_use]
+    pub fn radius_m(&self) -> f64 {
+        self.wheels.radius_m.unwrap_or(RADIUS)
     }
 
     /// Parses the text of a vehicle file.
     ///
     /// # Errors
-    /// [`ImportError`], for an unknown key too.
-    pub fn parse(path: &str, text: &str) -> Result<Self, ImportError> {
-        let error = |reason: String| ImportError::Vehicle { path: path.to_owned(), reason };
+    /// [`DataError`], for an unknown key too.
+    pub fn parse(path: &str, text: &str) -> Result<Self, DataError> {
+        let error = |reason: String| DataError::of(path, DataFault::Vehicle { reason });
         let vehicle: Self = toml::from_str(text).map_err(|cause| {
             let cause = cause.to_string();
             error(cause.lines().filter(|line| !line.trim().is_empty()).collect::<Vec<_>>().join(" "))
@@ -132,7 +170,7 @@ impl Vehicle {
                 return Err(error(format!("wheels.{name} should be 0.01 to 10 m")));
             }
         }
-        let Mounting { roll_deg, pitch_deg, yaw_deg } = vehicle.mounting;
+        let Mounting { roll_deg, pitch_deg, yaw_deg, .. } = vehicle.mounting;
         if [roll_deg, pitch_deg, yaw_deg].iter().any(|angle| angle.is_nan() || angle.abs() > 360.0) {
             return Err(error("mounting should be angles of at most 360 degrees".to_owned()));
         }
@@ -141,9 +179,20 @@ impl Vehicle {
 }
 
 impl Mounting {
-    /// Turns a vector from the sensor's axes to the vehicle's.
+    /// Returns the rotation that the rows of a drive still need, as the board computes it; `None` where they need none.
+    #[must_use]
+    pub fn rotation(&self) -> Option<Rotation> {
+        let [roll, pitch, yaw] = [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle as f32);
+        let rotation = Rotation::from_mounting(roll, pitch, yaw)?;
+        (!self.applied && rotation != Rotation::IDENTITY).then_some(rotation)
+    }
+
+    /// Turns a vector from the sensor's axes to the vehicle's, unless that is done.
     #[must_use]
     pub fn turn(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        if self.applied {
+            return [x, y, z];
+        }
         let [(sr, cr), (sp, cp), (sy, cy)] =
             [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle.to_radians().sin_cos());
         let (y, z) = (cr * y - sr * z, sr * y + cr * z);
@@ -155,14 +204,15 @@ impl Mounting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gyronet::mounting::Rotation;
     use gyronet::units::AngularRate;
 
     #[test]
     fn angles_mean_what_they_mean_on_the_board() {
         let (roll, pitch, yaw) = (12.0f32, -34.0f32, 56.0f32);
-        let board = Rotation::from_mounting(roll, pitch, yaw).unwrap();
-        let mounting = Mounting { roll_deg: roll.into(), pitch_deg: pitch.into(), yaw_deg: yaw.into() };
+        let mounting =
+            Mounting { roll_deg: roll.into(), pitch_deg: pitch.into(), yaw_deg: yaw.into(), applied: false };
+        let board = mounting.rotation().unwrap();
+        assert_eq!(Mounting { applied: true, ..mounting }.rotation(), None);
         for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
             let rate = axis.map(|w: f64| AngularRate::from_rad_per_sec(w as f32).unwrap());
             for (here, there) in mounting.turn(axis).iter().zip(board.rate(rate)) {
@@ -176,6 +226,6 @@ mod tests {
         let error = Vehicle::parse("car.toml", "[wheels]\nradius = 0.3\n").unwrap_err().to_string();
         assert!(error.starts_with("car.toml: ") && error.contains("unknown field `radius`"), "{error}");
         let error = Vehicle::parse("car.toml", "[wheels]\nradius_m = 30\n").unwrap_err().to_string();
-        assert_eq!(error, "car.toml: wheels.radius_m should be 0.01 to 10 m");
+        assert_eq!(error, "car.toml: no vehicle file: wheels.radius_m should be 0.01 to 10 m");
     }
 }

@@ -1,0 +1,73 @@
+//! This module examines the reference: a true yaw rate, or a course.
+
+use super::finding::{Finding, Verdict};
+use super::recording::{Rows, SECOND};
+use crate::drive::DT;
+use crate::import::align::{self, Offset};
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+const WHAT: &str = "reference";
+/// A yaw rate and a course may be late by this much, s.
+const LATE: (f64, f64) = (0.015, 0.5);
+/// Two courses further apart than this give no yaw rate, s.
+const COURSE_GAP: f64 = 2.0;
+
+pub fn finding(rows: &Rows, standstill: Option<&Range<usize>>) -> Finding {
+    let gyro = rows.series(|k| Some(rows.rate[k][2]));
+    let rate = rows.series(|k| rows.reference[k]);
+    let course = rows.series(|k| rows.course[k]);
+    if !rate.is_empty() {
+        let noise = standstill.map(|span| scatter(&rows.reference[span.clone()])).unwrap_or_default();
+        of_rate(&gyro, &rate, 100.0 * rate.len() as f64 / rows.len() as f64, &noise)
+    } else if !course.is_empty() {
+        of_course(&gyro, &course)
+    } else {
+        Finding::note(WHAT, "None: nothing can be judged on it, and nothing trained.")
+    }
+}
+
+fn of_rate(gyro: &align::Rate, rate: &align::Rate, percent: f64, noise: &str) -> Finding {
+    let rows = format!("A yaw rate in {percent:.0} % of the rows");
+    match align::offset(gyro, rate) {
+        Ok(Offset { seconds, coefficient }) => Finding {
+            what: WHAT,
+            verdict: if seconds.abs() < LATE.0 { Verdict::Good } else { Verdict::Bad },
+            text: format!(
+                "{rows}, correlation with the gyro {coefficient:.4}, {:+.1} ms late{noise}.",
+                -1e3 * seconds
+            ),
+        },
+        Err(reason) => Finding::bad(WHAT, format!("{rows} that does not fit the gyro: {reason}{noise}.")),
+    }
+}
+
+/// Says by how much the reference's angles of one second scatter at rest.
+fn scatter(reference: &[Option<f64>]) -> String {
+    let angles: Vec<f64> =
+        reference.chunks_exact(SECOND).map(|second| second.iter().flatten().sum::<f64>() * DT).collect();
+    let mean = angles.iter().sum::<f64>() / angles.len() as f64;
+    let variance = angles.iter().map(|angle| (angle - mean).powi(2)).sum::<f64>() / angles.len() as f64;
+    format!("; at rest it scatters by {:.6} rad in 1 s: smaller errors cannot be seen", variance.sqrt())
+}
+
+fn of_course(gyro: &align::Rate, course: &align::Rate) -> Finding {
+    let change = |pair: &[(f64, f64)]| {
+        let seconds = pair[1].0 - pair[0].0;
+        let turn = (pair[1].1 - pair[0].1 + PI).rem_euclid(TAU) - PI;
+        (seconds < COURSE_GAP).then(|| (0.5 * (pair[0].0 + pair[1].0), turn / seconds))
+    };
+    let change: Vec<(f64, f64)> = course.windows(2).filter_map(change).collect();
+    let values = format!("A course, {} values", course.len());
+    match align::offset(gyro, &change) {
+        Ok(Offset { seconds, coefficient }) => Finding {
+            what: WHAT,
+            verdict: if seconds.abs() < LATE.1 { Verdict::Good } else { Verdict::Note },
+            text: format!(
+                "{values}; its change agrees with the gyro (correlation {coefficient:.3}), {:.0} ms late.",
+                -1e3 * seconds
+            ),
+        },
+        Err(reason) => Finding::note(WHAT, format!("{values}; not laid on the gyro: {reason}.")),
+    }
+}

@@ -1,0 +1,50 @@
+//! This module says what can and cannot be judged on a recording, by its turns, stops and length.
+
+use super::finding::Finding;
+use super::recording::{Rows, SECOND};
+use crate::drive::DT;
+use std::ops::Range;
+
+/// A turn of more than this counts, rad.
+const TURN: f64 = std::f64::consts::FRAC_PI_4;
+/// A second that turns by less than this ends a turn, rad.
+const STRAIGHT: f64 = 0.02;
+/// Gain and mounting show in so many radians turned, the drift in so many seconds.
+const NEEDED: (f64, f64) = (6.0, 300.0);
+
+pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
+    let bias = standstills.first().map_or(0.0, |span| rows.mean_yaw_rate(span.clone()));
+    let (turns, turned) = turns(rows, bias);
+    let seconds = rows.len() as f64 * DT;
+    let stops = standstills.len().saturating_sub(1);
+    let lacks = [
+        (turned < NEEDED.0, "gain and mounting (few turns)"),
+        (stops == 0, "zero-rate updates (no later stop)"),
+        (seconds < NEEDED.1, "drift over minutes (too short)"),
+        (rows.reference.iter().all(Option::is_none), "errors of 1 s and 10 s (no reference rate)"),
+    ];
+    let lacks: Vec<&str> = lacks.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
+    let lacks = if lacks.is_empty() { "nothing".to_owned() } else { lacks.join(", ") };
+    Finding::note(
+        "what it can judge",
+        format!(
+            "Turns of more than 45 deg: {turns}; turned in all: {turned:.1} rad; later stops: {stops}; length: {seconds:.0} s. It cannot judge: {lacks}."
+        ),
+    )
+}
+
+/// Returns the number of turns and all angles together, rad; a turn goes on while its direction does.
+fn turns(rows: &Rows, bias: f64) -> (usize, f64) {
+    let (mut turned, mut turns, mut angle, mut last) = (0.0, 0, 0.0f64, 0.0f64);
+    for second in rows.rate.chunks(SECOND) {
+        let step = second.iter().map(|rate| rate[2] - bias).sum::<f64>() * DT;
+        turned += step.abs();
+        if step.abs() < STRAIGHT || step * last < 0.0 {
+            turns += usize::from(angle.abs() > TURN);
+            angle = 0.0;
+        }
+        angle += step;
+        last = step;
+    }
+    (turns + usize::from(angle.abs() > TURN), turned)
+}

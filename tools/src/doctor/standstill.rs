@@ -1,0 +1,68 @@
+//! This module finds the standstills of a recording: whole seconds that are quiet by the gyro, and by the wheels where
+//! there are any.
+
+use super::finding::Finding;
+use super::recording::{Rows, SECOND, sorted};
+use crate::drive::DT;
+use crate::drive::recording::WHEEL_STANDS;
+use std::ops::Range;
+
+/// A second is at rest where its gyro scatters by less than this many times its quietest second, and by at most as much,
+/// rad/s, as static initialisation takes on three axes.
+const QUIET: (f64, f64) = (2.5, 0.0866);
+/// The mean yaw rate of a second at rest may differ from that of most quiet seconds by this, rad/s.
+const RESTING_RATE: f64 = 0.01;
+
+/// Returns the standstills as ranges of rows.
+pub fn find(rows: &Rows) -> Vec<Range<usize>> {
+    let seconds = || (0..rows.len() / SECOND).map(|k| k * SECOND..(k + 1) * SECOND);
+    let spreads: Vec<f64> = seconds().map(|second| spread(&rows.rate[second])).collect();
+    let ranked = sorted(spreads.iter().copied());
+    let Some(quietest) = ranked.get(ranked.len() / 100) else { return Vec::new() };
+    let limit = (QUIET.0 * quietest).min(QUIET.1);
+    let quiet =
+        seconds().zip(&spreads).filter(|(second, spread)| **spread <= limit && wheels_rest(rows, second));
+    let quiet: Vec<(Range<usize>, f64)> =
+        quiet.map(|(second, _)| (second.clone(), rows.mean_yaw_rate(second))).collect();
+    // A slow turn is as quiet as a rest: its mean is not that of most quiet seconds.
+    let means = sorted(quiet.iter().map(|(_, mean)| *mean));
+    let bias = means.get(means.len() / 2).copied().unwrap_or_default();
+    let mut standstills: Vec<Range<usize>> = Vec::new();
+    for (second, _) in quiet.into_iter().filter(|(_, mean)| (mean - bias).abs() < RESTING_RATE) {
+        match standstills.last_mut() {
+            Some(last) if last.end == second.start => last.end = second.end,
+            _ => standstills.push(second),
+        }
+    }
+    standstills
+}
+
+/// Returns the root of the three axes' variances together.
+fn spread(rates: &[[f64; 3]]) -> f64 {
+    let variance = |axis: usize| {
+        let mean = rates.iter().map(|rate| rate[axis]).sum::<f64>() / rates.len() as f64;
+        rates.iter().map(|rate| (rate[axis] - mean).powi(2)).sum::<f64>() / rates.len() as f64
+    };
+    (variance(0) + variance(1) + variance(2)).sqrt()
+}
+
+fn wheels_rest(rows: &Rows, second: &Range<usize>) -> bool {
+    rows.wheels.iter().all(|wheel| {
+        let known = || wheel[second.clone()].iter().flatten();
+        known().sum::<f64>().abs() / known().count().max(1) as f64 <= WHEEL_STANDS
+    })
+}
+
+pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
+    let lengths = || standstills.iter().map(Range::len);
+    let [total, longest] =
+        [lengths().sum(), lengths().max().unwrap_or_default()].map(|rows: usize| rows as f64 * DT);
+    let by =
+        if rows.wheels.iter().flatten().any(Option::is_some) { "gyro and wheels" } else { "the gyro alone" };
+    let text = format!("{} by {by}, {total:.0} s together, the longest {longest:.0} s.", standstills.len());
+    if standstills.is_empty() {
+        Finding::note("standstills", text)
+    } else {
+        Finding::good("standstills", text)
+    }
+}

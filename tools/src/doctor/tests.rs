@@ -1,0 +1,103 @@
+//! These tests make recordings with one defect each.
+
+use super::*;
+use crate::drive::recording::Reader;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use std::fmt::Write;
+
+/// A car at rest for 20 s, in turns for 40 s, at rest again for 20 s; `edit` changes a row's time, force, rate, wheels
+/// 2 and 4, and reference.
+fn doctor(edit: impl Fn(usize, &mut [f64; 10]) -> bool) -> Doctor {
+    let (mut random, normal) = (ChaCha8Rng::seed_from_u64(1), Normal::new(0.0, 0.002).unwrap());
+    let mut text =
+        String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel2_rate,wheel4_rate,ref_gyr_z\n");
+    for k in 0..8_000 {
+        let time = 0.01 * k as f64;
+        let moves = (2_000..6_000).contains(&k);
+        let yaw = if moves { 0.4 * (0.21 * time).sin() * (0.05 * time + 0.4).cos() } else { 0.0 };
+        let speed = if moves { 20.0 } else { 0.0 };
+        let mut noise = || normal.sample(&mut random);
+        let shakes = if moves { 10.0 } else { 1.0 };
+        let mut row = [
+            time,
+            0.17 + noise(),
+            noise(),
+            9.8 + noise(),
+            shakes * noise(),
+            shakes * noise(),
+            yaw + 0.01 + shakes * noise(),
+            speed + 2.5 * yaw,
+            speed - 2.5 * yaw,
+            yaw,
+        ];
+        if edit(k, &mut row) {
+            writeln!(text, "{}", row.map(|value| format!("{value:.6}")).join(",")).unwrap();
+        }
+    }
+    let reader = Reader::new("made.csv", text.as_bytes()).unwrap();
+    Doctor::of(&Rows::parse("made", reader).unwrap())
+}
+
+fn found<'d>(doctor: &'d Doctor, what: &str) -> (Verdict, &'d str) {
+    let finding = doctor.finding(what).unwrap_or_else(|| panic!("{what}: {:?}", doctor.findings));
+    (finding.verdict, &finding.text)
+}
+
+#[test]
+fn a_good_recording_has_nothing_to_cure() {
+    let doctor = doctor(|_, _| true);
+    assert!(doctor.findings.iter().all(|finding| finding.verdict != Verdict::Bad), "{:?}", doctor.findings);
+    assert_eq!(doctor.standstills.len(), 2);
+    let Some(Mounting { pitch_deg, .. }) = doctor.mounting else { panic!() };
+    assert!((pitch_deg + 1.0).abs() < 0.05, "{pitch_deg}");
+    let Some([.., Some(noise)]) = doctor.noise else { panic!() };
+    // 0.002 rad/s at 100 Hz.
+    assert!((noise.random_walk / 2e-4 - 1.0).abs() < 0.15, "{noise:?}");
+    let (verdict, wheels) = found(&doctor, "wheels");
+    assert!(verdict == Verdict::Good && wheels.contains("track 1.44 m"), "{wheels}");
+    let (verdict, reference) = found(&doctor, "reference");
+    assert!(verdict == Verdict::Good && reference.contains("ms late"), "{reference}");
+}
+
+#[test]
+fn each_defect_is_found() {
+    let bad = |what: &str, text: &str, edit: &dyn Fn(usize, &mut [f64; 10]) -> bool| {
+        let doctor = doctor(edit);
+        let (verdict, found) = found(&doctor, what);
+        assert!(verdict == Verdict::Bad && found.contains(text), "{what}: {found}");
+    };
+    bad("gaps", "1 with 150 missing rows", &|k, _| !(3_000..3_150).contains(&k));
+    bad("gyro range", "samples at the limit of 11.5 deg/s", &|_, row| {
+        row[6] = row[6].clamp(-0.2, 0.2);
+        true
+    });
+    bad("stuck samples", "12 samples repeat", &|k, row| {
+        if (4_000..4_012).contains(&k) {
+            row[1..7].fill(0.5);
+        }
+        true
+    });
+    bad("rate", "50.00 Hz", &|k, _| k % 2 == 0);
+    bad("unreadable rows", "time goes backwards", &|k, row| {
+        row[0] -= if k == 500 { 1.0 } else { 0.0 };
+        true
+    });
+    bad("mounting", "z is not up", &|_, row| {
+        row[3] = -row[3];
+        true
+    });
+    bad("mounting", "is not m/s^2", &|_, row| {
+        row[1..4].iter_mut().for_each(|force| *force /= 9.8);
+        true
+    });
+    bad("wheels", "swapped", &|_, row| {
+        row.swap(7, 8);
+        true
+    });
+    bad("reference", "does not fit the gyro", &|k, row| {
+        row[9] = (0.3 * row[0] + 1e-4 * k as f64 * row[0]).sin();
+        true
+    });
+}

@@ -1,0 +1,108 @@
+//! The vehicle file beside a drive: `drive.toml` beside `drive.csv`, read by every command.
+
+use gyronet_tools::bundled::SIMULATED_DRIVE;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Runs a command in a folder, and returns whether it succeeded, and its standard error.
+fn gyronet(folder: &Path, arguments: &[&str]) -> (bool, String) {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_gyronet")).current_dir(folder).args(arguments).output().unwrap();
+    (output.status.success(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// Makes a folder with 25 s of the simulated drive as a sensor that hangs upside down records it, and its vehicle file.
+fn folder(name: &str, vehicle: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut lines = SIMULATED_DRIVE.lines().take(2_501);
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let turned = ["acc_y", "acc_z", "gyr_y", "gyr_z"];
+    let row = |line: &str| {
+        let fields = header.iter().zip(line.split(',')).map(|(name, field)| {
+            if turned.contains(name) {
+                (-field.parse::<f64>().unwrap()).to_string()
+            } else {
+                field.to_owned()
+            }
+        });
+        fields.collect::<Vec<_>>().join(",") + "\n"
+    };
+    std::fs::write(folder.join("drive.csv"), header.join(",") + "\n" + &lines.map(row).collect::<String>())
+        .unwrap();
+    std::fs::write(folder.join("drive.toml"), vehicle).unwrap();
+    folder
+}
+
+/// Reads numbers: one column of a table.
+fn column(path: &Path, separator: char, at: usize) -> Vec<f64> {
+    let text = std::fs::read_to_string(path).unwrap();
+    text.lines().filter_map(|line| line.split(separator).nth(at)?.parse().ok()).collect()
+}
+
+#[test]
+fn mounting_and_radius_are_used_and_named() {
+    let folder = folder("vehicle_file", "[mounting]\nroll_deg = 180\n[wheels]\nradius_m = 0.578\n");
+    std::fs::write(folder.join("plain.csv"), SIMULATED_DRIVE).unwrap();
+    let (good, err) = gyronet(&folder, &["replay", "drive.csv", "--csv", "rates.csv", "--tum", "path.tum"]);
+    assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
+    let (good, err) =
+        gyronet(&folder, &["replay", "plain.csv", "--csv", "plain_rates.csv", "--tum", "plain.tum"]);
+    assert!(good && !err.contains("vehicle file"), "{err}");
+    let [turned, plain] = ["rates.csv", "plain_rates.csv"].map(|name| column(&folder.join(name), ',', 2));
+    assert_eq!(turned.len(), 2_200);
+    for (turned, plain) in turned.iter().zip(&plain) {
+        // The turn by half a circle is rounded, and the network is not linear.
+        assert!((turned - plain).abs() < 5e-5, "{turned} {plain}");
+    }
+    // Twice the radius is twice the way.
+    let [turned, plain] = ["path.tum", "plain.tum"].map(|name| column(&folder.join(name), ' ', 1));
+    let (turned, plain) = (turned.last().unwrap(), plain[turned.len() - 1]);
+    assert!(plain > 10.0 && (turned / plain - 2.0).abs() < 1e-3, "{turned} {plain}");
+
+    for command in ["evaluate", "calibrate", "doctor"] {
+        let (_, err) = gyronet(&folder, &[command, "drive.csv"]);
+        assert!(err.contains("drive.csv: vehicle file drive.toml\n"), "{command}: {err}");
+    }
+    let (good, err) = gyronet(&folder, &["demo", "drive.csv", "--no-board", "--out", "demo"]);
+    assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
+    let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
+    assert!(page.contains("(radius 0.578 m)"), "the page says what the path rests on");
+}
+
+#[test]
+fn what_import_writes_is_not_turned_again() {
+    let folder = folder("vehicle_import", "[mounting]\nroll_deg = 180\n");
+    let import =
+        |out: &str| gyronet(&folder, &["import", "drive.csv", "--vehicle", "drive.toml", "--out", out]);
+    let (good, err) = import("drive.csv");
+    assert!(!good && err.contains("drive.toml: --out would overwrite it"), "{err}");
+    let (good, err) = import("level.csv");
+    assert!(good, "{err}");
+    let up = column(&folder.join("level.csv"), ',', 3);
+    assert!(up.len() == 2_500 && up.iter().all(|up| *up > 5.0));
+    let header = std::fs::read_to_string(folder.join("level.csv")).unwrap();
+    assert!(
+        header.starts_with("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel1_rate,wheel2_rate"),
+        "{header}"
+    );
+    let (good, err) = gyronet(&folder, &["replay", "level.csv", "--csv", "rates.csv"]);
+    assert!(good && err.contains("level.csv: vehicle file level.toml\n"), "{err}");
+
+    // Neither turned nor stripped of wheels and reference by another import.
+    let (good, err) = gyronet(&folder, &["import", "level.csv", "--from", "1", "--out", "later.csv"]);
+    assert!(good, "{err}");
+    let [level, later] =
+        ["level.csv", "later.csv"].map(|name| std::fs::read_to_string(folder.join(name)).unwrap());
+    assert_eq!(level.lines().next(), later.lines().next());
+    let values = |line: &str| line.split(',').skip(1).map(|text| text.parse().unwrap()).collect::<Vec<f64>>();
+    for (level, later) in level.lines().skip(101).zip(later.lines().skip(1)) {
+        let (level, later) = (values(level), values(later));
+        assert!(level.iter().zip(&later).all(|(a, b)| (a - b).abs() < 1e-6), "{level:?} {later:?}");
+    }
+
+    std::fs::write(folder.join("level.toml"), "[mounting]\nrol_deg = 180\n").unwrap();
+    let (good, err) = gyronet(&folder, &["replay", "level.csv"]);
+    assert!(!good && err.contains("level.toml: no vehicle file: "), "{err}");
+    assert!(err.contains("unknown field `rol_deg`"), "{err}");
+}
