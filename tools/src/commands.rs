@@ -8,6 +8,7 @@ pub mod completions;
 pub mod demo;
 pub mod device;
 pub mod doctor;
+mod drives;
 pub mod evaluate;
 pub mod import;
 pub mod keys;
@@ -21,6 +22,7 @@ pub mod simulate;
 pub mod size;
 pub mod soak;
 pub mod tables;
+pub mod train;
 mod weights;
 pub mod wheels;
 

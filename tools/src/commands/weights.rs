@@ -7,6 +7,8 @@ use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::rates::{self, Network, Networks, Rates};
 use gyronet_tools::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
 use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
+use indicatif::ProgressBar;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 /// Weights of the integer network.
@@ -51,7 +53,19 @@ impl Files {
     }
 
     /// The rates of a drive by every method. GyroNet and the linear window are those of the library, whatever is sent.
-    pub fn rates(&self, recording: &Recording, common: Common) -> Result<Rates, Box<dyn std::error::Error>> {
+    pub fn rates(&self, recording: &Recording, common: Common) -> Result<Rates, Box<dyn Error>> {
+        let bar = progress::bar(common, 0, recording.name());
+        let rates = self.rates_with(recording, &bar);
+        bar.finish_and_clear();
+        rates.map_err(|error| -> Box<dyn Error> { error })
+    }
+
+    /// The same with a bar of the caller's, for a thread.
+    pub fn rates_with(
+        &self,
+        recording: &Recording,
+        bar: &ProgressBar,
+    ) -> Result<Rates, Box<dyn Error + Send + Sync>> {
         let checkpoint = self.checkpoint()?;
         let (mut float, sent) = (checkpoint.network(), self.weights()?);
         let mut integer = model::GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
@@ -67,9 +81,7 @@ impl Files {
                 Network::new(sent, shape)
             }),
         };
-        let bar = progress::bar(common, rates::RUNS * recording.rows.len(), recording.name());
-        let rates = Rates::new(recording, &mut networks, || bar.inc(1));
-        bar.finish_and_clear();
-        Ok(rates?)
+        bar.set_length((rates::RUNS * recording.rows.len()) as u64);
+        Ok(Rates::new(recording, &mut networks, || bar.inc(1))?)
     }
 }

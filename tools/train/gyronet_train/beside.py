@@ -24,7 +24,7 @@ from .augment import turn
 from .export import export
 from .linear import HOP, PARTS, fit, ratio, rows, sums, window_error
 from .model import GyroNet
-from .recordings import STATIC_SAMPLES, WINDOW, Drive, load_drive, mean_1s_error, windows
+from .recordings import STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
 
 DIFFERENCES = ("low pass", "accelerometer")
 TILT = 0.5  # m/s^2, 1 sigma: 3 degrees of mounting or street
@@ -142,7 +142,7 @@ def report(drives: list[Drive], basis: np.ndarray, sizes: list[int], epochs: int
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train.beside", description=__doc__)
-    parser.add_argument("data", type=Path, help="folder of trialNN_100hz.csv drives")
+    parser.add_argument("data", type=Path, help="folder of drives")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
     parser.add_argument("--stem", default="default", help="name of the files")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
@@ -158,7 +158,7 @@ def arguments() -> argparse.Namespace:
 def main() -> None:
     args = arguments()
     started = time.monotonic()
-    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in args.train]
+    drives = [load_drive(find_drive(args.data, n)) for n in args.train]
     basis = np.concatenate([PARTS[part] for part in args.parts])
     found = report(drives, basis, args.report, args.epochs, args.seed) if args.report else {}
     for name, (mean, deviation) in found.items():

@@ -55,6 +55,17 @@ def load_drive(path: Path) -> Drive:
     )
 
 
+def find_drive(folder: Path, name: str) -> Path:
+    """The drive of that name, without .csv, or the only one whose name contains it (`02`). Raises ValueError."""
+    if (folder / f"{name}.csv").is_file():
+        return folder / f"{name}.csv"
+    found = sorted(path for path in folder.glob("*.csv") if name in path.stem)
+    if len(found) != 1:
+        names = ", ".join(path.stem for path in found) or "no drive"
+        raise ValueError(f"{folder}: {names} for the name {name}")
+    return found[0]
+
+
 def windows(series: np.ndarray, length: int = WINDOW) -> np.ndarray:
     """All overlapping windows of a series, step one sample: (T, ...) -> (T-length+1, length, ...)."""
     view = np.lib.stride_tricks.sliding_window_view(series, length, axis=0)
