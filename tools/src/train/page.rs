@@ -62,14 +62,14 @@ pub fn page(training: &Training<'_>) -> String {
 
 fn gains(gain: &Gain, validation: &Gain) -> String {
     let mut header = vec!["1 s error over static initialisation"];
-    header.extend(gain.drives.iter().map(String::as_str));
     header.extend(["mean", "deviation"]);
+    header.extend(gain.drives.iter().map(String::as_str));
     header.extend(validation.drives.iter().map(String::as_str));
     let rows = gain.over_static.iter().zip(&validation.over_static).map(|(ratio, chosen)| {
         let mut row = vec![ratio.method.to_owned()];
-        row.extend(ratio.drives.iter().map(|ratio| format!("{ratio:.3}")));
         row.push(format!("{:.3}", ratio.all.mean));
         row.push(ratio.all.deviation.map_or_else(|| "–".to_owned(), |deviation| format!("{deviation:.3}")));
+        row.extend(ratio.drives.iter().map(|ratio| format!("{ratio:.3}")));
         row.extend(chosen.drives.iter().map(|ratio| format!("{ratio:.3}")));
         row
     });
@@ -141,5 +141,5 @@ fn drives(roles: &Roles) -> String {
         let name = std::path::Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         vec![name, "left out".to_owned(), reason.to_owned()]
     }));
-    table("costs", "", &["drive", "", ""], rows)
+    table("costs", "", &["drive", "for", "length after 3 s at rest"], rows)
 }
