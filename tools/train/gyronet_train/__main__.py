@@ -1,6 +1,6 @@
 """python -m gyronet_train DATA --out FOLDER: train GyroNet on a folder of drives.
 
-Trains once for each seed, prints what each is worth on the validation drive with mean and spread,
+Trains once for each seed, prints what each is worth on the validation drives with mean and spread,
 and keeps the best of them there. Test drives are never read here. training.py says how it is
 trained and in what that departs from the paper. With --scale-of CHECKPOINT nothing is trained but
 that network's scale of its expected error (scale.py).
@@ -14,24 +14,26 @@ import datetime
 import statistics
 from pathlib import Path
 
+import numpy as np
 import torch
 from tqdm import tqdm
 
 from .export import export, load_gyronet
 from .model import GyroNet
-from .recordings import Drive, load_drive, mean_1s_error
+from .recordings import Drive, load_pieces, mean_1s_error
 from .scale import fit_scale
 from .training import Settings, Trained, calibrate, train
-from .validation import Validation, validate
+from .validation import Validation, validate_all
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train", description=__doc__)
-    parser.add_argument("data", type=Path, help="folder of trialNN_100hz.csv drives")
+    parser.add_argument("data", type=Path, help="folder of the drives")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
     parser.add_argument("--stem", default="gyronet", help="name of the files")
-    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NN")
-    parser.add_argument("--validate", default="08", metavar="NN")
+    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="DRIVE",
+        help="NN for trialNN_100hz.csv, or a file's name; drives with gaps are used in pieces")
+    parser.add_argument("--validate", nargs="+", default=["08"], metavar="DRIVE")
     parser.add_argument("--epochs", type=int, default=20)
     parser.add_argument("--batch", type=int, default=512, help="windows of a batch")
     parser.add_argument("--lr", type=float, default=0.0015)
@@ -57,10 +59,12 @@ def line(what: str, validation: Validation) -> str:
 def main() -> None:
     args = arguments()
     torch.set_num_threads(args.threads)
-    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in tqdm(args.train, "reading", disable=None)]
-    validation_drive = load_drive(args.data / f"trial{args.validate}_100hz.csv")
+    drives, validation = [
+        [piece for name in tqdm(names, "reading", disable=None) for piece in load_pieces(drive_path(args.data, name))]
+        for names in (args.train, args.validate)
+    ]
     make = with_scale if args.scale_of else best_of_seeds
-    model, provenance = make(args, drives, validation_drive)
+    model, provenance = make(args, drives, validation)
     if args.note:
         provenance["note"] = args.note
     args.out.mkdir(parents=True, exist_ok=True)
@@ -68,21 +72,27 @@ def main() -> None:
         print(path)
 
 
+def drive_path(folder: Path, name: str) -> Path:
+    """The file of a drive that is named by its number or by its file."""
+    return folder / (name if name.endswith(".csv") else f"trial{name}_100hz.csv")
+
+
 def best_of_seeds(
-    args: argparse.Namespace, drives: list[Drive], validation_drive: Drive
+    args: argparse.Namespace, drives: list[Drive], validation: list[Drive]
 ) -> tuple[GyroNet, dict]:
-    """Trains with each seed: the best network on the validation drive, and where it comes from."""
-    static = mean_1s_error(validation_drive.gyro_error)
+    """Trains with each seed: the best network on the validation drives, and where it comes from."""
+    weights = [len(drive.gyro_error) for drive in validation]
+    static = float(np.average([mean_1s_error(drive.gyro_error) for drive in validation], weights=weights))
     print(f"static initialisation: 1 s error {static:.6f} rad")
     settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units, args.windows)
     networks: dict[int, Trained] = {}
     for seed in args.seeds:
         networks[seed] = train(
             drives,
-            validation_drive,
+            validation,
             settings,
             seed,
-            lambda epoch, validation: tqdm.write(line(f"seed {seed} epoch {epoch}", validation)),
+            lambda epoch, errors: tqdm.write(line(f"seed {seed} epoch {epoch}", errors)),
         )
         print(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
     errors = [network.validation.mean_1s_rad for network in networks.values()]
@@ -96,9 +106,9 @@ def best_of_seeds(
     chosen = networks[seed]
     provenance = {
         "network": "gyronet",
-        "train": [d.name for d in drives],
-        "validate": validation_drive.name,
-        "sha256": {d.name: d.sha256 for d in [*drives, validation_drive]},
+        "train": names(drives),
+        "validate": ", ".join(names(validation)),
+        "sha256": {d.name: d.sha256 for d in [*drives, *validation]},
         "validation_mean_1s_rad": round(chosen.validation.mean_1s_rad, 7),
         "validation_static_mean_1s_rad": round(static, 7),
         "validation_mean_1s_rad_of_seeds": {s: round(e, 7) for s, e in zip(networks, errors)},
@@ -112,17 +122,22 @@ def best_of_seeds(
     return chosen.model, provenance
 
 
+def names(drives: list[Drive]) -> list[str]:
+    """The names of drives, each once, however many pieces it has."""
+    return list(dict.fromkeys(drive.name for drive in drives))
+
+
 def with_scale(
-    args: argparse.Namespace, drives: list[Drive], validation_drive: Drive
+    args: argparse.Namespace, drives: list[Drive], validation: list[Drive]
 ) -> tuple[GyroNet, dict]:
     """The checkpoint's network, its scale fitted again to the drives that it was trained on."""
     model, provenance = load_gyronet(args.scale_of)
-    if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, validation_drive]}:
+    if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, *validation]}:
         raise ValueError(f"{args.scale_of}: trained or validated on other drives than these")
-    print(line("before", validate(model, validation_drive)))
+    print(line("before", validate_all(model, validation)))
     fit_scale(model, drives)
-    calibrate(model, validate(model, validation_drive).scale_ratio)
-    print(line("after", validate(model, validation_drive)))
+    calibrate(model, validate_all(model, validation).scale_ratio)
+    print(line("after", validate_all(model, validation)))
     provenance["scale"] = f"fitted alone on {datetime.date.today()}"
     return model, provenance
 

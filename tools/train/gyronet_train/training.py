@@ -23,7 +23,7 @@ from .loss import span_loss
 from .model import GyroNet
 from .recordings import Drive
 from .spans import Spans, cut
-from .validation import Validation, validate
+from .validation import Validation, validate_all
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ class Trained:
     model: GyroNet
     validation: Validation
     epoch: int
-    """The one whose mean weights these are: the best on the validation drive."""
+    """The one whose mean weights these are: the best on the validation drives."""
     seconds: float
     """Wall time."""
 
 
 def train(
     drives: list[Drive],
-    validation_drive: Drive,
+    validation: list[Drive],
     settings: Settings,
     seed: int,
     on_epoch: Callable[[int, Validation], None],
@@ -97,13 +97,13 @@ def train(
             schedule.step()
             step += 1
             update_mean(mean, model, min(settings.memory, step / (step + 10)))
-        validation = validate(mean, validation_drive)
-        on_epoch(epoch, validation)
-        if best is None or validation.any_1s_rad < best.validation.any_1s_rad:
-            best = Trained(copy.deepcopy(mean), validation, epoch, 0.0)
+        errors = validate_all(mean, validation)
+        on_epoch(epoch, errors)
+        if best is None or errors.any_1s_rad < best.validation.any_1s_rad:
+            best = Trained(copy.deepcopy(mean), errors, epoch, 0.0)
     calibrate(best.model, best.validation.scale_ratio)
     seconds = time.monotonic() - started
-    return Trained(best.model, validate(best.model, validation_drive), best.epoch, seconds)
+    return Trained(best.model, validate_all(best.model, validation), best.epoch, seconds)
 
 
 @torch.no_grad()
