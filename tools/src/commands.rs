@@ -13,6 +13,7 @@ pub mod import;
 pub mod keys;
 pub mod monitor;
 mod paint;
+pub mod paper;
 mod progress;
 pub mod quantize;
 pub mod replay;

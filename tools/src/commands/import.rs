@@ -63,6 +63,10 @@ pub struct Args {
     /// Leave out this many seconds at the start.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     from: f64,
+    /// Write a drive to train with, of a sequence: without the steps in a gap of any file. One that starts moving is an
+    /// error.
+    #[arg(long, requires = "out")]
+    training: bool,
     /// Write a picture of the times between stamps of each file of a sequence (the paper's Fig. 11).
     #[arg(long, value_name = "FILE.svg")]
     stamps: Option<PathBuf>,
@@ -82,6 +86,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 fn run_logs(args: &Args, common: Common) -> super::Result {
     if args.stamps.is_some() {
         return Err("--stamps draws the files of a sequence of KAIST Urban or NCLT".into());
+    }
+    if args.training {
+        return Err("--training is for sequences of KAIST Urban or NCLT".into());
     }
     if !(0.0..1e6).contains(&args.from) {
         return Err("--from should be seconds from the first sample on".into());
@@ -180,9 +187,18 @@ fn run_sequence(args: &Args, layout: Layout, folder: &Path, common: Common) -> s
 fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
     if let Some(path) = &args.out {
         sequence.needs_gyro()?;
+        if args.training {
+            sequence.needs_standstill()?;
+        }
         let error = WriteError::to(path);
         let file = File::create(path).map_err(&error)?;
-        let rows = sequence::write_csv(sequence, BufWriter::new(file)).map_err(&error)?;
+        let out = BufWriter::new(file);
+        let rows = if args.training {
+            sequence::write_whole(sequence, out)
+        } else {
+            sequence::write_csv(sequence, out)
+        };
+        let rows = rows.map_err(&error)?;
         remark(common, format_args!("{}: {rows} rows", path.display()))?;
     }
     if let Some(path) = &args.stamps {

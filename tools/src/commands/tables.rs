@@ -121,13 +121,15 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         args.methods.iter().for_each(|given| estimates.add_given(&sequence, given));
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
+        remark(common, format_args!("{}: {:.0} s of driving", errors.name, errors.seconds))?;
         if args.out.is_some() {
             drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)?));
         }
         all.push(errors);
     }
     let results = Results::new(all);
-    let tables = table::tables(&results);
+    let files = [args.weights.as_deref(), args.fog_weights.as_deref()];
+    let tables: Vec<_> = table::tables(&results).into_iter().map(|table| table.with_weights(files)).collect();
     let mut out = std::io::stdout().lock();
     if common.json {
         print_json(&mut out, &results)?;
