@@ -134,6 +134,8 @@ def main() -> None:
     parameters = [p for p in model.parameters() if p.requires_grad]
     optimiser = torch.optim.AdamW(parameters, lr=args.lr, weight_decay=args.weight_decay)
     batches = min(args.windows, len(data.full)) // args.batch
+    if batches == 0:
+        raise SystemExit(f"{len(data.full)} whole windows to train on, fewer than a batch of {args.batch}")
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, args.lr, total_steps=batches * args.epochs)
     average = copy.deepcopy(model)
     scale = model.correction_scale.item()
