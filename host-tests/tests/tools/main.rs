@@ -13,6 +13,7 @@ mod fognet_simulated;
 mod gyronet_golden;
 mod import_logs;
 mod mounting;
+mod python_seconds;
 mod recordings_bad_input;
 mod replay_mcap;
 mod replay_via;
