@@ -1,4 +1,4 @@
-//! The coprocessor on a Cortex-M0 with 16 KiB of RAM, whose network is a linear part alone.
+//! The coprocessor on a Cortex-M0 with 16 KiB of RAM, with the default model.
 //!
 //! `cargo run -p gyronet --release --example cortex_m0 --features microbit --target thumbv6m-none-eabi` runs it in QEMU:
 //! a parked car and a turn; the exit status says whether the last rate is that of the turn.
@@ -13,20 +13,24 @@ fn main() {
 mod firmware {
     use cortex_m_semihosting::{debug, hprintln};
     use gyronet::health::{Source, Status};
-    use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::gyronet::{GyroNetState, recurrent_words};
     use gyronet::sample::Validity;
     use gyronet::units::SpecificForce;
     use gyronet::{AngularRate, Blob, Coprocessor, GyroNet, ImuSample, Micros, WindowNetwork, weights};
     use panic_semihosting as _;
 
-    /// A network of a linear part alone.
-    type Linear = GyroNet<'static, GyroNetState<0, 0, 0>, 0, 0, 0>;
+    /// Units of the default model's Bi-LSTM.
+    const UNITS: usize = 4;
+    const HALF: usize = UNITS / 2;
+    const RECURRENT: usize = recurrent_words(UNITS);
+    /// The default model, without room for a larger one.
+    type Model = GyroNet<'static, GyroNetState<UNITS, HALF, RECURRENT>, UNITS, HALF, RECURRENT>;
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
         let coprocessor = cortex_m::singleton!(: Coprocessor = Coprocessor::START);
-        let blob = Blob::new_checked(&weights::LINEAR_WINDOW.0);
-        let network = blob.and_then(|blob| Linear::with_state(blob, GyroNetState::ZERO));
+        let blob = Blob::new_checked(&weights::DEFAULT.0);
+        let network = blob.and_then(|blob| Model::with_state(blob, GyroNetState::ZERO));
         let passed =
             coprocessor.zip(network.ok()).is_some_and(|(coprocessor, network)| run(coprocessor, network));
         debug::exit(if passed { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
@@ -36,7 +40,7 @@ mod firmware {
     }
 
     /// Corrects five seconds of samples. Returns whether the last rate is the network's, and within 1 % of the turn's.
-    fn run(coprocessor: &mut Coprocessor, mut network: Linear) -> bool {
+    fn run(coprocessor: &mut Coprocessor, mut network: Model) -> bool {
         let mut last = None;
         for number in 0..500 {
             let now = Micros(10_000 * u64::from(number));

@@ -4,7 +4,7 @@
 //! some samples later, so two rates are sent for every sample:
 //!
 //! - the **prompt** one at once, for a receiver that steers by it. No window has seen the sample yet, so of its
-//!   correction only the steady part is known ([`SteadyGain`]: mounting and gain of the unit).
+//!   correction only the steady part is known ([`SteadyGain`]: the mounting).
 //! - the **navigation** one [`CompensateConfig::lag`] samples later, for a receiver that sums it
 //!   up to a heading. Most of what there is to know is known by then.
 //!
@@ -15,8 +15,8 @@
 //! The prompt rate carries an eighth of its outstanding revisions with each sample. A revision mostly concerns the
 //! noise of past samples, which the newest sample does not have; carried at once, it would add that noise to it.
 //!
-//! No window of 0.1 s can know a constant error, and one that a network was trained to is wrong on another vehicle.
-//! The mean of the corrections beyond their steady part is taken out of them: standstill finds the bias.
+//! No window of 0.1 s can know a constant error, and one that a model was trained to is wrong on another vehicle.
+//! The slow mean of the corrections is taken out of them: standstill finds the bias, and `calibrate` the gain.
 //!
 //! | when | prompt | navigation |
 //! |---|---|---|
@@ -95,9 +95,7 @@ struct Entry {
     held: bool,
     sum: i64,
     count: i32,
-    /// The steady part of the correction, known with the sample.
-    steady: i32,
-    /// The estimate; the steady part where `count` is 0.
+    /// The estimate; the steady part, which is known with the sample, where `count` is 0.
     estimate: i32,
 }
 
@@ -157,7 +155,7 @@ pub struct Compensator {
     kept: [Option<Entry>; KEPT],
     /// The steady gain of the newest estimate's model; none without an estimate.
     steady_gain: SteadyGain,
-    /// The mean of the corrections beyond their steady part.
+    /// The mean of the corrections.
     slow_mean: SlowMean,
     /// Revisions not yet in the prompt rate, and in the navigation rate.
     prompt_carry: i64,
@@ -209,8 +207,8 @@ impl Compensator {
         let used = mode.used();
         let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
         let window = self.kept.iter().skip(oldest).zip(corrections).take(used.end).skip(used.start);
-        let beyond = window.filter_map(|(entry, c)| Some(i64::from(c.0) - i64::from(entry.as_ref()?.steady)));
-        self.slow_mean.observe(beyond.sum::<i64>() / used.len() as i64, mode.hop());
+        let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|_| i64::from(c.0)));
+        self.slow_mean.observe(seen.sum::<i64>() / used.len() as i64, mode.hop());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
@@ -233,9 +231,12 @@ impl Compensator {
     /// Takes in a sample: its gyro rates less static bias.
     pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity) {
         self.kept.rotate_left(1);
-        let steady = self.steady_gain.correction(rates).0;
+        let steady = match self.steady_gain {
+            SteadyGain::NONE => 0,
+            gain => gain.correction(rates).0.saturating_sub(self.slow_mean.get() as i32),
+        };
         let [.., AngularRate(rate)] = rates;
-        let entry = Entry { tick, rate, validity, held: false, sum: 0, count: 0, steady, estimate: steady };
+        let entry = Entry { tick, rate, validity, held: false, sum: 0, count: 0, estimate: steady };
         self.kept[KEPT - 1] = Some(entry);
     }
 

@@ -39,7 +39,7 @@ fn measure<T>(name: &str, mut run: impl FnMut() -> T) {
 
 fn main() {
     let window = window();
-    let mut integer = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
+    let mut integer = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("the weights are good"));
     measure("gyronet/window", || integer.estimate(black_box(&window)));
     measure("gyronet/newest", || integer.estimate_newest(black_box(&window)));
     let checkpoint = gyronet_tools::bundled::checkpoint().expect("the checkpoint is good");

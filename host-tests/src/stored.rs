@@ -50,7 +50,7 @@ pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), 
 /// checksum that fits.
 #[must_use]
 pub fn other_weights(bits: u8) -> Vec<u8> {
-    let mut file = weights::DEFAULT.0.to_vec();
+    let mut file = weights::GYRONET.0.to_vec();
     let end = file.len() - 4;
     // After that byte come two more bytes of the bias, the multiplier, the other row (120 weights, 8 bytes) and the
     // unit.

@@ -9,8 +9,9 @@
 //!   average out during a stop: without this state, a minute at a traffic light would make the filter
 //!   too certain of a bias that does not hold on the road.
 //!
-//! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread within that
-//! second. A second counts only if the vehicle also stands in the next one, because wheel sensors show late
+//! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread of the ten means of
+//! [`BATCH`] samples in it: an engine's vibration averages out faster than white noise, and a correction that is a low
+//! pass makes samples alike, neither of which the spread of single samples would show. A second counts only if the vehicle also stands in the next one, because wheel sensors show late
 //! that a car pulls away.
 
 use super::spread::Spread;
@@ -54,6 +55,9 @@ impl ZeroRateConfig {
         max_bias: 0.02,
     };
 }
+
+/// Samples of a mean whose spread is taken.
+const BATCH: u32 = 10;
 
 /// Low-order bits that are dropped when the turn at standstill is summed.
 const TURNED_SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
@@ -106,7 +110,9 @@ pub struct ZeroRate {
     offset: f32,
     covariance: Covariance,
     source: StandstillSource,
+    /// The means of a second so far, and the sum and number of the samples of the next one.
     block: Spread,
+    batch: (i64, u32),
     waiting: Option<Measurement>,
     refused: bool,
     /// 2^-20 rad/s x samples turned while standing, by the newest samples: in this quarter of a second
@@ -130,7 +136,8 @@ impl ZeroRate {
             offset: 0.0,
             covariance,
             source: StandstillSource::None,
-            block: Spread::default(),
+            block: Spread::EMPTY,
+            batch: (0, 0),
             waiting: None,
             refused: false,
             turned: [0; 5],
@@ -165,8 +172,15 @@ impl ZeroRate {
             self.restart();
             return None;
         };
-        self.block.add(left, left as f32 / AngularRate::PER_RAD_PER_SEC);
-        if self.block.count() < RATE_HZ {
+        let (sum, count) = (self.batch.0 + i64::from(left), self.batch.1 + 1);
+        self.batch = (sum, count);
+        if count < BATCH {
+            return None;
+        }
+        self.batch = (0, 0);
+        let mean = (sum / i64::from(BATCH)) as i32;
+        self.block.add(mean, mean as f32 / AngularRate::PER_RAD_PER_SEC);
+        if self.block.count() < RATE_HZ / BATCH {
             return None;
         }
         let block = core::mem::take(&mut self.block);
@@ -219,7 +233,8 @@ impl ZeroRate {
 
     /// Drops the second under way, which a gap has cut short.
     pub fn restart(&mut self) {
-        self.block = Spread::default();
+        self.block = Spread::EMPTY;
+        self.batch = (0, 0);
         self.waiting = None;
     }
 
@@ -270,7 +285,7 @@ impl ZeroRate {
         let noise = self.config.noise;
         let measured = Measurement {
             mean: block.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC,
-            variance: (block.variance() / block.count() as f32).max(noise * noise),
+            variance: (block.variance() / (block.count() - 1) as f32).max(noise * noise),
         };
         let step = measured.mean - self.bias - self.offset;
         let Covariance { bias, both, offset } = self.covariance;

@@ -74,11 +74,11 @@ mod firmware {
         crate::parsers::run(meter);
         signature(meter);
         hprintln!("gyronet/state bytes={}", size_of::<GyroNetState>());
-        hprintln!("gyronet/weights bytes={}", weights::DEFAULT.0.len());
+        hprintln!("gyronet/weights bytes={}", weights::GYRONET.0.len());
     }
 
     fn gyronet(meter: &mut Meter) {
-        let Ok(blob) = Blob::new_checked(&weights::DEFAULT.0) else {
+        let Ok(blob) = Blob::new_checked(&weights::GYRONET.0) else {
             hprintln!("FAILED: the weight file is refused");
             return;
         };
@@ -132,8 +132,9 @@ mod firmware {
             }};
         }
         // The flash has no room for a second one of the paper's size.
-        let paper = ("units_60/window", weights::DEFAULT.0.as_slice());
-        let models = [model!(0), model!(8), model!(16), model!(32), paper];
+        let paper = ("units_60/window", weights::GYRONET.0.as_slice());
+        let default = ("default/window", weights::DEFAULT.0.as_slice());
+        let models = [model!(0), model!(8), model!(16), model!(32), paper, default];
         let window = random_model::window(&mut Numbers::new(19), 0);
         for (name, file) in models {
             let network = Blob::new_checked(file).and_then(|blob| GyroNet::with_state(blob, &mut *state));

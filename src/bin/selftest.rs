@@ -132,7 +132,7 @@ mod firmware {
     fn hash() -> Option<u32> {
         // Too large for the stack.
         let state = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO)?;
-        let mut network = GyroNet::with_state(Blob::new_checked(&weights::DEFAULT.0).ok()?, state).ok()?;
+        let mut network = GyroNet::with_state(Blob::new_checked(&weights::GYRONET.0).ok()?, state).ok()?;
         let mut numbers = Numbers::new(7);
         let mut digest = gyronet::model::blob::CRC.digest();
         for _ in 0..16 {

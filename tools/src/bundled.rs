@@ -1,5 +1,5 @@
-//! The data that the binary carries, so that it works from anywhere: the simulated drive and the f32 checkpoints of the
-//! default weights.
+//! The data that the binary carries, so that it works from anywhere: the simulated drive and the f32 checkpoints of
+//! GyroNet and FoGNet.
 
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
@@ -11,12 +11,12 @@ use gyronet::model::weights::FOGNET;
 /// The drive that `gyronet simulate --seconds 90 --seed 1` writes.
 pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
 
-/// The checkpoint that [`gyronet::model::weights::DEFAULT`] was made from.
+/// The checkpoint that [`gyronet::model::weights::GYRONET`] was made from.
 const CHECKPOINT: &[u8] = include_bytes!("../weights/gyronet.safetensors");
 
-/// The checkpoint that [`gyronet::model::weights::LINEAR_WINDOW`] was made from.
+/// The checkpoint that [`gyronet::model::weights::DEFAULT`] was made from.
 #[cfg(test)]
-const LINEAR_CHECKPOINT: &[u8] = include_bytes!("../weights/linear_window.safetensors");
+const DEFAULT_CHECKPOINT: &[u8] = include_bytes!("../weights/default.safetensors");
 
 /// The checkpoint that [`gyronet::model::weights::FOGNET`] was made from.
 const FOG_CHECKPOINT: &[u8] = include_bytes!("../weights/fognet.safetensors");
@@ -78,10 +78,10 @@ mod tests {
     #[test]
     fn weights_are_what_quantize_makes() {
         let (bytes, _) = crate::network::quantize::quantize(&checkpoint().unwrap()).unwrap();
+        assert!(bytes == gyronet::model::weights::GYRONET.0, "run: gyronet quantize");
+        let default = Checkpoint::parse("default.safetensors", DEFAULT_CHECKPOINT).unwrap();
+        let (bytes, _) = crate::network::quantize::quantize(&default).unwrap();
         assert!(bytes == gyronet::model::weights::DEFAULT.0, "run: gyronet quantize");
-        let linear = Checkpoint::parse("linear_window.safetensors", LINEAR_CHECKPOINT).unwrap();
-        let (bytes, _) = crate::network::quantize::quantize(&linear).unwrap();
-        assert!(bytes == gyronet::model::weights::LINEAR_WINDOW.0, "run: gyronet quantize");
         let (bytes, _) = crate::network::quantize::fognet::quantize(&fog_checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::FOGNET.0, "run: gyronet quantize");
     }

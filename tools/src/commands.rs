@@ -8,11 +8,13 @@ pub mod completions;
 pub mod demo;
 pub mod device;
 pub mod doctor;
+mod drives;
 pub mod evaluate;
 pub mod import;
 pub mod keys;
 pub mod monitor;
 mod paint;
+pub mod paper;
 mod progress;
 pub mod quantize;
 pub mod replay;
@@ -21,6 +23,7 @@ pub mod simulate;
 pub mod size;
 pub mod soak;
 pub mod tables;
+pub mod train;
 mod weights;
 pub mod wheels;
 
@@ -48,10 +51,16 @@ fn read_drive(
     common: Common,
 ) -> std::result::Result<Recording, Box<dyn std::error::Error>> {
     let recording = Recording::read(path)?;
+    remark_vehicle(&recording, common)?;
+    Ok(recording)
+}
+
+/// Names the vehicle file beside a drive.
+fn remark_vehicle(recording: &Recording, common: Common) -> std::io::Result<()> {
     if let Some(vehicle) = &recording.vehicle.path {
         remark(common, format_args!("{}: vehicle file {}", recording.path, vehicle.display()))?;
     }
-    Ok(recording)
+    Ok(())
 }
 
 /// The options of all subcommands.

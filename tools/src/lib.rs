@@ -10,6 +10,7 @@
 //! drive <- import -> wheels
 //! drive <- doctor -> import, plot
 //! drive <- evaluate <- paper -> plot, simulate
+//! train -> evaluate, plot      python
 //! target -> simulate      network      client      wheels
 //! demo -> everything above
 //! ```
@@ -27,8 +28,10 @@ pub mod network;
 pub mod paper;
 pub mod parts;
 pub mod plot;
+pub mod python;
 mod random;
 pub mod signing;
 pub mod simulate;
 pub mod target;
+pub mod train;
 pub mod wheels;

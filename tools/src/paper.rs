@@ -1,7 +1,8 @@
 //! These modules repeat the paper's evaluation: [`sequence`] reads the data sets, [`trajectory`] those of other methods,
-//! [`fog_replay`] runs FoGNet, and [`tables`] computes the paper's tables and figures.
+//! [`fog_replay`] runs FoGNet, [`tables`] computes the paper's tables and figures, and [`rerun`] does all of it, training included.
 
 pub mod fog_replay;
+pub mod rerun;
 pub mod sequence;
 pub mod tables;
 pub mod trajectory;

@@ -71,6 +71,7 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["import", "kaist", "/nowhere"],
         &["tables", "/nowhere"],
         &["tables", "urban14", "--method", "mine=/nowhere"],
+        &["paper", "/nowhere", "--out", "/nowhere/out"],
         &["quantize", "/nowhere/a.safetensors", "--out", "/nowhere/a.blob"],
         &["monitor", "/nowhere/can.log"],
         &["size", "--elf", "/nowhere/image"],

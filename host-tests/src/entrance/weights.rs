@@ -45,7 +45,7 @@ static SMALL_FILE: [u8; SMALL.file_len(0)] = models::file(SMALL, 5);
 pub fn gyronet(data: &[u8]) {
     let file: &[u8] = match data {
         [first, ..] if first & 2 > 0 => &SMALL_FILE,
-        _ => &weights::DEFAULT.0,
+        _ => &weights::GYRONET.0,
     };
     match patched(data, file) {
         None => {
@@ -80,7 +80,7 @@ pub fn fognet(data: &[u8]) {
 }
 
 pub fn seeds() -> Vec<Seed> {
-    let header = &weights::DEFAULT.0[..HEADER_LEN];
+    let header = &weights::GYRONET.0[..HEADER_LEN];
     let change = |at: usize, content: &[u8]| {
         let [a, b, c, ..] = at.to_le_bytes();
         [&[a, b, c, content.len() as u8], content].concat()

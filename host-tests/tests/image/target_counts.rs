@@ -125,7 +125,7 @@ fn kernels_on_the_target_equal_the_hosts() {
 
 /// Returns the CRC-32 that the self-test prints: over the corrections and scales of sixteen random windows.
 fn hash() -> u32 {
-    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the weights are good"));
+    let mut network = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("the weights are good"));
     let mut digest = gyronet::model::blob::CRC.digest();
     let mut numbers = Xorshift(7);
     for _ in 0..16 {

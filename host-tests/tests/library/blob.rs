@@ -16,8 +16,8 @@ struct File {
 
 impl File {
     fn new() -> Self {
-        let mut file = Self { memory: Box::new(Aligned([0; _])), len: weights::DEFAULT.0.len() };
-        file.bytes_mut().copy_from_slice(&weights::DEFAULT.0);
+        let mut file = Self { memory: Box::new(Aligned([0; _])), len: weights::GYRONET.0.len() };
+        file.bytes_mut().copy_from_slice(&weights::GYRONET.0);
         file
     }
 
@@ -44,7 +44,7 @@ impl File {
 }
 
 fn provenance_len() -> usize {
-    weights::DEFAULT.0.len() - Shape::PAPER.file_len(0)
+    weights::GYRONET.0.len() - Shape::PAPER.file_len(0)
 }
 
 /// Offset of the first record of a layer's direction (0 forward, 1 backward).
@@ -71,7 +71,7 @@ fn the_default_is_good_and_says_where_it_comes_from() {
 
 #[test]
 fn each_header_field_is_checked() {
-    let len = weights::DEFAULT.0.len();
+    let len = weights::GYRONET.0.len();
     let topology = |found| BlobError::Topology { found, expected: Shape::LARGEST.topology() };
     let length = |expected, found| BlobError::Length { expected, found };
     let (window, features, hidden) = (WINDOW as u16, FEATURES as u16, HIDDEN as u16);

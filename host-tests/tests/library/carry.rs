@@ -52,6 +52,14 @@ impl Ledger {
         self.samples.values().map(|sample| sample.gyro - sample.estimate()).sum()
     }
 
+    /// The part of a sample's correction that is known with it.
+    fn steady(&self, rates: [AngularRate; 3]) -> i64 {
+        match self.steady_gain {
+            SteadyGain::NONE => 0,
+            gain => i64::from(gain.correction(rates).0) - (self.constant.0 >> 16),
+        }
+    }
+
     fn break_window(&mut self) {
         self.out = None;
         self.steady_gain = SteadyGain::NONE;
@@ -69,10 +77,10 @@ impl Ledger {
         let mut window: Vec<(&mut Sample, i64)> = covered.map(|(_, sample)| sample).zip(estimate).collect();
         assert_eq!(window.len(), WINDOW, "windows cover samples that went out");
         let used = &window[mode.used()];
-        let beyond: i64 = used.iter().map(|(sample, estimate)| estimate - sample.steady).sum();
+        let sum: i64 = used.iter().map(|(_, estimate)| estimate).sum();
         let (constant, windows) = &mut self.constant;
         *windows = (*windows + 1).min(1_280 / i64::from(mode.hop()));
-        *constant += ((beyond / used.len() as i64 * 65_536) - *constant) / *windows;
+        *constant += ((sum / used.len() as i64 * 65_536) - *constant) / *windows;
         for (sample, estimate) in &mut window[mode.used()] {
             sample.estimates.push(*estimate - (*constant >> 16));
         }
@@ -120,7 +128,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
         ledger.take_estimate(prompt.tick, mode, max_mean.0.into());
         let rates: [AngularRate; 3] =
             std::array::from_fn(|k| AngularRate(sample.angular_rate[k].0 - bias[k].0));
-        let (gyro, steady) = (i64::from(rates[2].0), i64::from(ledger.steady_gain.correction(rates).0));
+        let (gyro, steady) = (i64::from(rates[2].0), ledger.steady(rates));
         ledger.samples.insert(prompt.tick, Sample { gyro, clipped, steady, estimates: Vec::new() });
         ledger.prompt += i64::from(prompt.rate.0);
         if navigation.status != Status::Init {

@@ -45,7 +45,7 @@ fn the_default_is_good_and_says_where_it_comes_from() {
 fn each_network_refuses_the_others_file() {
     let error = Blob::new_checked(&weights::FOGNET.0).expect_err("it is FoGNet's");
     assert_eq!(error, BlobError::Topology { found: TOPOLOGY, expected: blob::Shape::LARGEST.topology() });
-    let error = FogBlob::new_checked(&weights::DEFAULT.0).expect_err("it is GyroNet's");
+    let error = FogBlob::new_checked(&weights::GYRONET.0).expect_err("it is GyroNet's");
     assert_eq!(error, BlobError::Topology { found: blob::Shape::PAPER.topology(), expected: TOPOLOGY });
     assert_eq!(
         error.to_string(),

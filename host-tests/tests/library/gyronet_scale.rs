@@ -9,7 +9,7 @@ use gyronet::nn::dense::Dense;
 use gyronet::nn::exp2::{FRACTION_BITS, times_exp2};
 use gyronet_host_tests::noise::Noise;
 
-const LEN: usize = weights::DEFAULT.0.len();
+const LEN: usize = weights::GYRONET.0.len();
 
 #[test]
 fn the_power_of_two_is_within_its_bound() {
@@ -40,7 +40,7 @@ fn powers_beyond_the_range_saturate() {
 /// The scale of a window when the log's row has no weights and its bias alone speaks: a log2 of
 /// `log` in units of `unit` (rate code), in codes.
 fn scale_of(unit: u32, log: f64) -> i32 {
-    let mut file = Box::new(Aligned(weights::DEFAULT.0));
+    let mut file = Box::new(Aligned(weights::GYRONET.0));
     let row = LEN - 4 - 4 - 8 - 4 * HIDDEN;
     // The steps' codes are summed; an accumulator's LSB is 2^-20 of a unit.
     let multiplier = 1i32 << (Dense::SHIFT + FRACTION_BITS - 20);
@@ -78,7 +78,7 @@ fn a_scale_stays_in_its_range() {
 
 #[test]
 fn any_window_has_a_scale_in_its_range() {
-    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they are good"));
+    let mut network = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they are good"));
     let mut noise = Noise::new(3);
     for round in 0..200 {
         let size = [1 << 16, 1 << 24, i64::from(i32::MAX)][round % 3];

@@ -311,7 +311,7 @@ proptest! {
 fn slots_are_checked() {
     let mut flash = F405::default();
     let start = layout::SLOTS.start as usize;
-    let built_in = &gyronet::model::weights::DEFAULT.0;
+    let built_in = &gyronet::model::weights::GYRONET.0;
     let slots = |flash: &F405| -> [Vec<u8>; 2] {
         [0, SLOT_SIZE].map(|offset| flash.bytes()[start + offset..][..SLOT_SIZE].to_vec())
     };

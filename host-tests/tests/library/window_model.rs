@@ -29,7 +29,7 @@ fn digest(network: &mut impl WindowNetwork) -> u32 {
 /// The digest of the network that comes with the library, as the code for the paper's shape alone computed it.
 #[test]
 fn the_papers_shape_keeps_its_outputs() {
-    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights");
+    let blob = Blob::new_checked(&weights::GYRONET.0).expect("the built-in weights");
     assert_eq!(digest(&mut GyroNet::new(blob)), 3_891_058_405);
 }
 
@@ -43,7 +43,7 @@ fn check<const LEN: usize, const U: usize, const W: usize, const R: usize>(shape
     let blob = Blob::new_checked(&file.0).expect("a random model");
     assert_eq!((blob.shape, usize::from(shape.units)), (shape, U));
     let mut used: GyroNetState = GyroNetState::ZERO;
-    let paper = Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights");
+    let paper = Blob::new_checked(&weights::GYRONET.0).expect("the built-in weights");
     digest(&mut GyroNet::with_state(paper, &mut used).expect("it is the largest"));
     let mut large = GyroNet::with_state(blob, &mut used).expect("it is smaller");
     let mut own = GyroNet::with_state(blob, Memory::<U, W, R>::ZERO).expect("it is of this size");
@@ -87,7 +87,7 @@ fn a_model_gives_the_same_in_any_memory_that_holds_it() {
 
 #[test]
 fn a_model_that_the_memory_does_not_hold_is_refused() {
-    let paper = Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights");
+    let paper = Blob::new_checked(&weights::GYRONET.0).expect("the built-in weights");
     let error = GyroNet::with_state(paper, Memory::<16, 8, { recurrent_words(16) }>::ZERO).map(|_| ());
     assert_eq!(error, Err(BlobError::Units { found: 60, largest: 16 }));
     assert_eq!(

@@ -34,17 +34,17 @@ impl Trial {
     fn new(number: u32, path: &Path) -> Self {
         let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
         let recording = Recording::read(path).expect("a recording");
-        let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+        let blob = Blob::new_checked(&weights::GYRONET.0).expect("they come with the library");
         let (mut integer, mut float, mut beside) =
             (GyroNet::new(blob), checkpoint.network(), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut beside);
-        let blob = Blob::new_checked(&weights::LINEAR_WINDOW.0).expect("they come with the library");
-        let mut linear = GyroNet::new(blob);
-        let of_linear = linear.blob().shape;
+        let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+        let mut default = GyroNet::new(blob);
+        let of_default = default.blob().shape;
         let mut networks = Networks {
             float: Network::new(&mut float, checkpoint.shape()),
             integer: Network::new(&mut both, checkpoint.shape()),
-            linear: Network::new(&mut linear, of_linear),
+            default: Network::new(&mut default, of_default),
             sent: None,
         };
         let rates = Rates::new(&recording, &mut networks, || {}).expect("it stands still first");

@@ -53,7 +53,7 @@ fn rates(recording: &Recording) -> Rates {
     let mut networks = Networks {
         float: Network::new(&mut float, Shape::PAPER),
         integer: Network::new(&mut integer, Shape::PAPER),
-        linear: Network::new(&mut linear, Shape { units: 0, linear: true }),
+        default: Network::new(&mut linear, Shape { units: 0, linear: true }),
         sent: None,
     };
     Rates::new(recording, &mut networks, || {}).expect("it stands first, or has a course")

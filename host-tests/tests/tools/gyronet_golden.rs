@@ -54,7 +54,7 @@ fn the_integer_network_equals_pytorch() {
     let (windows, _) = input.as_chunks::<FEATURES>().0.as_chunks::<WINDOW>();
     let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
     let mut float = checkpoint.network();
-    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights"));
+    let mut network = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("the built-in weights"));
     let (mut difference, mut size, mut compared) = (0.0, 0.0, 0);
     for (window, due) in windows.iter().zip(error.as_chunks::<WINDOW>().0) {
         let features = window.each_ref().map(codes);

@@ -15,6 +15,7 @@ mod import_converted;
 mod import_logs;
 mod mounting;
 mod pages;
+mod python_seconds;
 mod recordings_bad_input;
 mod replay_mcap;
 mod replay_via;

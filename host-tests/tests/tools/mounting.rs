@@ -42,7 +42,7 @@ fn turned(recording: &Recording) -> Recording {
 fn yaw_rates(recording: &Recording, mounting: Rotation, levelling: Levelling) -> Vec<f64> {
     let config = PipelineConfig { mounting, levelling, ..PipelineConfig::DEFAULT };
     let mut network =
-        GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
+        GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
     let drive = Replay::run(recording, &config, WheelFrames::new(recording), &mut network, || {});
     drive.expect("it stands still first").navigation().map(|rate| rate.rate.rad_per_sec()).collect()
 }

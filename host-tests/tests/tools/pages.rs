@@ -34,13 +34,13 @@ const USABLE: &str = "[...document.querySelectorAll('button, .plot')].filter(e =
 fn demo(recording: &Recording) -> String {
     let checkpoint = bundled::checkpoint().unwrap();
     let mut float = checkpoint.network();
-    let blobs = [&weights::DEFAULT.0[..], &weights::LINEAR_WINDOW.0[..]];
-    let [mut integer, mut linear] = blobs.map(|blob| GyroNet::new(Blob::new_checked(blob).unwrap()));
-    let [of_integer, of_linear] = [&integer, &linear].map(|network| network.blob().shape);
+    let blobs = [&weights::GYRONET.0[..], &weights::DEFAULT.0[..]];
+    let [mut integer, mut default] = blobs.map(|blob| GyroNet::new(Blob::new_checked(blob).unwrap()));
+    let [of_integer, of_default] = [&integer, &default].map(|network| network.blob().shape);
     let mut networks = Networks {
         float: Network::new(&mut float, checkpoint.shape()),
         integer: Network::new(&mut integer, of_integer),
-        linear: Network::new(&mut linear, of_linear),
+        default: Network::new(&mut default, of_default),
         sent: None,
     };
     let rates = Rates::new(recording, &mut networks, || {}).unwrap();

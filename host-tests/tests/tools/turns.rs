@@ -47,7 +47,7 @@ fn mean_correction(network: &mut GyroNet<'_>, windows: &[[Features; WINDOW]], ya
 
 fn check(recording: &Recording) {
     let mut network =
-        GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
+        GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
     let windows = windows(recording);
     assert!(windows.len() > 50, "{} windows", windows.len());
     let straight = mean_correction(&mut network, &windows, 0.0);

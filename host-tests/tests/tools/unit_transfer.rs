@@ -139,7 +139,7 @@ impl Rates {
 }
 
 fn replay(recording: &Recording, seen: Unit, gyro_map: GyroMap) -> Replay {
-    let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
+    let network = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
     let config = PipelineConfig { gyro_map, ..PipelineConfig::DEFAULT };
     Replay::run(recording, &config, None, &mut Seen(network, seen), || {}).expect("it stands still first")
 }

@@ -14,7 +14,7 @@ const SEED: u64 = 1;
 
 #[test]
 fn a_flipped_bit_is_refused_or_bounded() {
-    let file = &weights::DEFAULT.0;
+    let file = &weights::GYRONET.0;
     let blob = Blob::new_checked(file).expect("they come with the library");
     let drive = Drive::new(&bundled::simulated_drive().expect("it comes with the tools"));
     let scene = Scene::new(&drive, Part::Xsens, &mut Integer::new(blob));

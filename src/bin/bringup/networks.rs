@@ -20,7 +20,7 @@ pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
 }
 
 fn gyronet(report: &mut Report) {
-    let Ok(blob) = Blob::new_checked(&weights::DEFAULT.0) else {
+    let Ok(blob) = Blob::new_checked(&weights::GYRONET.0) else {
         return report.fail("GyroNet", format_args!("the weight file is refused"));
     };
     let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return };

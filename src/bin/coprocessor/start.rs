@@ -25,6 +25,11 @@ const DRIVES: SupportedHardware = SupportedHardware {
     fogs: &[FogPart::Dsp1760],
     bits_per_second: &[BITS_PER_SECOND],
 };
+
+/// The weights that run where no slot has any that are good.
+const BUILT_IN: &[u8] =
+    if cfg!(feature = "paper-weights") { &weights::GYRONET.0 } else { &weights::DEFAULT.0 };
+
 /// Has CAN receive the frames that the configuration names.
 fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings, config: &Config) {
     let wheels = wheels.frames.into_iter().flatten().map(|frame| frame.id);
@@ -58,7 +63,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
     device.begin(Some(Records(flash)), Some(Slots(flash)), flash.writable(), board.identity);
     // Without good weights the pipeline still runs: the status says degraded, and the rate is
     // the gyro's less its static bias.
-    let blob = device.weights(Some(regions::slots_at_start()), &weights::DEFAULT.0);
+    let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
     let check = blob.as_ref().map(BackgroundCheck::new);
     let configuration = device.configuration();
     let weights = blob.map_or(0, |blob| blob.crc);

@@ -46,7 +46,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let image = bench::build(&workspace, "coprocessor", &folder)?;
     let coprocessor = ImageSize::read(&image)?;
-    let tasks = if counts.exact() { Some(schedule(&workspace, &image, &counts)?) } else { None };
+    let tasks = if counts.exact() {
+        let image = bench::build_with_largest_model(&workspace, &folder)?;
+        Some(schedule(&workspace, &image, &counts)?)
+    } else {
+        None
+    };
     let out = &mut io::stdout().lock();
     let written = if common.json {
         writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))
@@ -90,7 +95,7 @@ fn policies(workspace: &Path, folder: &Path) -> super::Result {
 /// The costs of the image's handlers, and their response times.
 type Timing = (Tasks, Schedule);
 
-/// The tasks of the image that is flashed, counted while it runs.
+/// The tasks of the image that is flashed, counted while it runs with the largest model.
 fn schedule(workspace: &Path, image: &Path, counts: &Counts) -> Result<Timing, Box<dyn std::error::Error>> {
     let plugin = bench::plugin(workspace).ok_or("the instruction counter cannot be built")?;
     let tasks = tasks::measure(image, &plugin)?;

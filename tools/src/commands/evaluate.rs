@@ -1,11 +1,13 @@
 //! `gyronet evaluate`: heading errors of each method on recorded drives.
 
-use super::{Common, paint, print_json, progress, read_drive, weights};
+use super::{Common, drives, paint, print_json, progress, remark_vehicle, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::report::{DriveErrors, Report};
+use indicatif::ProgressBar;
+use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -48,8 +50,9 @@ pub struct Args {
 
 impl Args {
     /// Reads a drive, calibrated if that is asked for.
-    fn recording(&self, file: &Path, common: Common) -> Result<Recording, Box<dyn std::error::Error>> {
-        let mut recording = read_drive(file, common)?;
+    fn recording(&self, file: &Path, common: Common) -> Result<Recording, Box<dyn Error + Send + Sync>> {
+        let mut recording = Recording::read(file)?;
+        remark_vehicle(&recording, common)?;
         if let Some(path) = &self.calibration {
             let map = unit_file::read_for(path, self.networks.weights()?.blob()?.crc)?;
             for row in &mut recording.rows {
@@ -68,13 +71,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if args.lags {
         return compare(args, common, &ablation::lags());
     }
-    let mut drives = Vec::new();
-    for file in &args.files {
+    let judge = |file: &Path, bar: &ProgressBar| {
         let recording = args.recording(file, common)?;
-        let rates = args.networks.rates(&recording, common)?;
-        drives.push(DriveErrors::new(&recording, &rates)?);
-    }
-    let report = Report::new(drives);
+        let rates = args.networks.rates_with(&recording, bar)?;
+        Ok(DriveErrors::new(&recording, &rates)?)
+    };
+    let report = Report::new(drives::errors(&args.files, common, judge)?);
     let mut out = std::io::stdout().lock();
     if common.json {
         return print_json(&mut out, &report);
@@ -96,7 +98,7 @@ fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
     for file in &args.files {
-        let recording = args.recording(file, common)?;
+        let recording = args.recording(file, common).map_err(|error| -> Box<dyn Error> { error })?;
         let bar = progress::bar(common, variants.len() * recording.rows.len(), recording.name());
         let scores = ablation::run(&recording, &mut network, variants, || bar.inc(1));
         bar.finish_and_clear();

@@ -64,6 +64,10 @@ pub struct Args {
     /// Leave out this many seconds at the start.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     from: f64,
+    /// Write a drive to train with, of a sequence: without the steps in a gap of any file. One that starts moving is an
+    /// error.
+    #[arg(long, requires = "out")]
+    training: bool,
     /// Write a picture of the times between stamps of each file of a sequence (the paper's Fig. 11).
     #[arg(long, value_name = "FILE.svg")]
     stamps: Option<PathBuf>,
@@ -84,10 +88,13 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
     if args.stamps.is_some() {
         return Err("--stamps draws the files of a sequence of KAIST Urban or NCLT".into());
     }
+    if args.training {
+        return Err("--training is for sequences of KAIST Urban or NCLT".into());
+    }
     if !(0.0..1e6).contains(&args.from) {
         return Err("--from should be seconds from the first sample on".into());
     }
-    let mut vehicle = vehicle(args)?;
+    let vehicle = vehicle(args)?;
     let Imported { rows, mut report, dropped } = import(&Request {
         files: args.files.clone(),
         vehicle: vehicle.clone(),
@@ -97,9 +104,7 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
     if let Some(path) = &args.out {
         let error = WriteError::to(path);
         write_csv(&rows, BufWriter::new(File::create(path).map_err(&error)?)).map_err(&error)?;
-        let beside = Vehicle::beside(path);
-        vehicle.mounting.applied = true;
-        std::fs::write(&beside, toml::to_string(&vehicle)?).map_err(WriteError::to(&beside))?;
+        let beside = write_vehicle(vehicle, path)?;
         report.push(format!("{}: {} rows; {} beside it", path.display(), rows.len(), beside.display()));
         // Read as all others will read it, so that its faults are known now.
         if let Err(error) = Recording::read(path) {
@@ -119,6 +124,14 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
         writeln!(out, "  {line}")?;
     }
     Ok(())
+}
+
+/// Writes the vehicle file of a drive whose rows are in the vehicle's axes, and returns its place.
+fn write_vehicle(mut vehicle: Vehicle, drive: &Path) -> Result<PathBuf, Box<dyn std::error::Error>> {
+    vehicle.mounting.applied = true;
+    let beside = Vehicle::beside(drive);
+    std::fs::write(&beside, toml::to_string(&vehicle)?).map_err(WriteError::to(&beside))?;
+    Ok(beside)
 }
 
 /// The vehicle file, and what the arguments put in its place.
@@ -196,10 +209,22 @@ fn run_sequence(args: &Args, layout: Layout, folder: &Path, common: Common) -> s
 fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
     if let Some(path) = &args.out {
         sequence.needs_gyro()?;
+        if args.training {
+            sequence.needs_standstill()?;
+        }
         let error = WriteError::to(path);
         let file = File::create(path).map_err(&error)?;
-        let rows = sequence::write_csv(sequence, BufWriter::new(file)).map_err(&error)?;
-        remark(common, format_args!("{}: {rows} rows", path.display()))?;
+        let out = BufWriter::new(file);
+        let rows = if args.training {
+            sequence::write_whole(sequence, out)
+        } else {
+            sequence::write_csv(sequence, out)
+        };
+        let rows = rows.map_err(&error)?;
+        let mut vehicle = Vehicle::default();
+        vehicle.wheels.radius_m = Some(sequence.layout.vehicle().world.car.wheel_radius);
+        let beside = write_vehicle(vehicle, path)?;
+        remark(common, format_args!("{}: {rows} rows; {} beside it", path.display(), beside.display()))?;
     }
     if let Some(path) = &args.stamps {
         std::fs::write(path, pictures::stamps(sequence)?).map_err(WriteError::to(path))?;

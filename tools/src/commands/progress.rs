@@ -1,14 +1,22 @@
 //! A progress bar on stderr, where that is a terminal.
 
 use super::Common;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::time::Duration;
+
+fn target(common: Common) -> ProgressDrawTarget {
+    if common.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() }
+}
+
+/// Bars below each other, for [`bar`]s of several threads.
+pub fn bars(common: Common) -> MultiProgress {
+    MultiProgress::with_draw_target(target(common))
+}
 
 /// A bar of so many samples; invisible with `--quiet` and where nobody watches.
 pub fn bar(common: Common, samples: usize, doing: &str) -> ProgressBar {
-    let target = if common.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{msg} [{bar:40}] {percent}% {eta}");
-    let bar = ProgressBar::with_draw_target(Some(samples as u64), target)
+    let bar = ProgressBar::with_draw_target(Some(samples as u64), target(common))
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
     bar.set_message(doing.to_owned());
     bar

@@ -95,7 +95,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         // A folder without a sequence's trajectory is no error, a folder that is not there is.
         fs::read_dir(&given.folder).map_err(|source| DataError::open(given.folder.display(), source))?;
     }
-    let weights = Weights::open(args.weights.as_deref())?;
+    let weights = Weights::of_the_paper(args.weights.as_deref())?;
     let mut network = GyroNet::new(weights.blob()?);
     let fog_weights = args.fog_weights.as_deref().map(WeightFile::read_fognet).transpose()?;
     let fog_blob = match &fog_weights {
@@ -121,13 +121,15 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         args.methods.iter().for_each(|given| estimates.add_given(&sequence, given));
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
+        remark(common, format_args!("{}: {:.0} s of driving", errors.name, errors.seconds))?;
         if args.out.is_some() {
             drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)?));
         }
         all.push(errors);
     }
     let results = Results::new(all);
-    let tables = table::tables(&results);
+    let files = [args.weights.as_deref(), args.fog_weights.as_deref()];
+    let tables: Vec<_> = table::tables(&results).into_iter().map(|table| table.with_weights(files)).collect();
     let mut out = std::io::stdout().lock();
     if common.json {
         print_json(&mut out, &results)?;

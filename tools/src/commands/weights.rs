@@ -7,22 +7,33 @@ use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::rates::{self, Network, Networks, Rates};
 use gyronet_tools::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
 use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
+use indicatif::ProgressBar;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 /// Weights of the integer network.
-pub struct Weights(Option<WeightFile>);
+pub struct Weights {
+    file: Option<WeightFile>,
+    built_in: &'static [u8],
+}
 
 impl Weights {
-    /// Opens a file, or chooses the bundled weights.
+    /// Opens a file, or chooses the default weights.
     pub fn open(path: Option<&Path>) -> Result<Self, WeightFileError> {
-        path.map(WeightFile::read).transpose().map(Self)
+        let file = path.map(WeightFile::read).transpose()?;
+        Ok(Self { file, built_in: &weights::DEFAULT.0 })
+    }
+
+    /// Opens a file, or chooses the weights of the paper's GyroNet.
+    pub fn of_the_paper(path: Option<&Path>) -> Result<Self, WeightFileError> {
+        Ok(Self { built_in: &weights::GYRONET.0, ..Self::open(path)? })
     }
 
     /// The checked weights.
     pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
-        match &self.0 {
+        match &self.file {
             Some(file) => file.blob(),
-            None => Blob::new_checked(&weights::DEFAULT.0)
+            None => Blob::new_checked(self.built_in)
                 .map_err(|source| WeightFileError::Blob { path: String::from("built-in weights"), source }),
         }
     }
@@ -50,26 +61,36 @@ impl Files {
         self.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read)
     }
 
-    /// The rates of a drive by every method. GyroNet and the linear window are those of the library, whatever is sent.
-    pub fn rates(&self, recording: &Recording, common: Common) -> Result<Rates, Box<dyn std::error::Error>> {
+    /// The rates of a drive by every method. GyroNet and the linear part are those of the library, whatever is sent.
+    pub fn rates(&self, recording: &Recording, common: Common) -> Result<Rates, Box<dyn Error>> {
+        let bar = progress::bar(common, 0, recording.name());
+        let rates = self.rates_with(recording, &bar);
+        bar.finish_and_clear();
+        rates.map_err(|error| -> Box<dyn Error> { error })
+    }
+
+    /// The same with a bar of the caller's, for a thread.
+    pub fn rates_with(
+        &self,
+        recording: &Recording,
+        bar: &ProgressBar,
+    ) -> Result<Rates, Box<dyn Error + Send + Sync>> {
         let checkpoint = self.checkpoint()?;
         let (mut float, sent) = (checkpoint.network(), self.weights()?);
-        let mut integer = model::GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
-        let mut linear = model::GyroNet::new(Blob::new_checked(&weights::LINEAR_WINDOW.0)?);
+        let mut integer = model::GyroNet::new(Blob::new_checked(&weights::GYRONET.0)?);
+        let mut default = model::GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
         let mut sent = self.weights.as_ref().map(|_| sent.blob().map(model::GyroNet::new)).transpose()?;
-        let [of_integer, of_linear] = [&integer, &linear].map(|network| network.blob().shape);
+        let [of_integer, of_default] = [&integer, &default].map(|network| network.blob().shape);
         let mut networks = Networks {
             float: Network::new(&mut float, checkpoint.shape()),
             integer: Network::new(&mut integer, of_integer),
-            linear: Network::new(&mut linear, of_linear),
+            default: Network::new(&mut default, of_default),
             sent: sent.as_mut().map(|sent| {
                 let shape = sent.blob().shape;
                 Network::new(sent, shape)
             }),
         };
-        let bar = progress::bar(common, rates::RUNS * recording.rows.len(), recording.name());
-        let rates = Rates::new(recording, &mut networks, || bar.inc(1));
-        bar.finish_and_clear();
-        Ok(rates?)
+        bar.set_length((rates::RUNS * recording.rows.len()) as u64);
+        Ok(Rates::new(recording, &mut networks, || bar.inc(1))?)
     }
 }

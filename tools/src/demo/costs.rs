@@ -62,7 +62,7 @@ pub fn all(recording: &Recording, rates: &Rates, config: &Config, board: &Outcom
         },
         Cost {
             what: "GyroNet, weights",
-            figure: bytes(weights::DEFAULT.0.len()),
+            figure: bytes(weights::GYRONET.0.len()),
             how: "size of the file".into(),
         },
         Cost {

@@ -120,6 +120,9 @@ pub enum DataFault {
     /// A wheel, 1 to 4, turns during static initialisation; its mean rate over a second is in rad/s.
     #[error("starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s")]
     Moving { line: u64, wheel: usize, rate: f64 },
+    /// The wheels of a sequence turn during static initialisation.
+    #[error("starts moving: its wheels roll {metres:.2} m in the first 3 s, at most {most} m are standing")]
+    Rolling { metres: f64, most: f64 },
     /// The calibration lacks a parameter, or the parameter is not a positive number.
     #[error("no usable parameter {0:?}")]
     Parameter(&'static str),

@@ -25,11 +25,12 @@ pub struct Shapes {
     pub float: Shape,
     /// GyroNet in integers.
     pub integer: Shape,
-    /// The linear window.
-    pub linear: Shape,
     /// The model of the rates that are sent.
     pub sent: Shape,
 }
+
+/// The linear part alone.
+const LINEAR: Shape = Shape { units: 0, linear: true };
 
 impl Cost {
     /// Returns the cost of a method of [`Method::ON_A_DRIVE`].
@@ -42,7 +43,7 @@ impl Cost {
         let (multiplications_per_sample, samples) = match method {
             Method::FIR | Method::FIR_ZERO_RATE => (low_pass.multiplications() as f64, low_pass.delay()),
             Method::VQF => (vqf::MULTIPLICATIONS as f64, 0),
-            Method::LINEAR => (windows(shapes.linear), settled),
+            Method::LINEAR => (windows(LINEAR), settled),
             Method::GYRONET_F32 => (windows(shapes.float), settled),
             Method::GYRONET_INT => (windows(shapes.integer), settled),
             Method::PROMPT => (windows(shapes.sent), 0),
@@ -69,7 +70,7 @@ mod tests {
 
     #[test]
     fn multiplications_follow_from_the_shape() {
-        assert_eq!(multiplications(Shape { units: 0, linear: true }), 600);
+        assert_eq!(multiplications(LINEAR), 600);
         // Two directions, four gates of 6 + 60 and of 120 + 60 inputs, 120 on top.
         let step = 2 * (4 * 60 * 66) + 2 * (4 * 60 * 180) + 120;
         assert_eq!(multiplications(Shape::PAPER), 10 * step);
@@ -79,7 +80,7 @@ mod tests {
     #[test]
     fn delays_are_those_of_the_pipeline() {
         let shape = Shape::PAPER;
-        let shapes = Shapes { float: shape, integer: shape, linear: shape, sent: shape };
+        let shapes = Shapes { float: shape, integer: shape, sent: shape };
         let delays = Method::ON_A_DRIVE.map(|method| Cost::new(method, &shapes).delay_ms);
         assert_eq!(delays, [0, 0, 0, 50, 50, 0, 110, 110, 110, 0, 70]);
     }

@@ -53,7 +53,7 @@ impl Method {
     pub const FIR: Self = mems("fir", "FIR low pass");
     /// Static initialisation, zero-rate updates and the same low pass.
     pub const FIR_ZERO_RATE: Self = mems("fir_zero_rate", "FIR, zero-rate updates");
-    /// Static initialisation and the linear window ([`gyronet::model::weights::LINEAR_WINDOW`]): the mean of both
+    /// Static initialisation and the linear window ([`gyronet::model::weights::DEFAULT`]): the mean of both
     /// windows over each sample, which is known 110 ms later.
     pub const LINEAR: Self = mems("linear", "linear window");
     /// The same with the paper's GyroNet in f32.

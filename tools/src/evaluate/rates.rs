@@ -42,9 +42,9 @@ pub struct Networks<'a> {
     pub float: Network<'a>,
     /// GyroNet in integers.
     pub integer: Network<'a>,
-    /// The linear window.
-    pub linear: Network<'a>,
-    /// The model of the rates that are sent, where that is not GyroNet in integers.
+    /// The model of the default weights: its linear part corrects.
+    pub default: Network<'a>,
+    /// The model of the rates that are sent, where that is not the default.
     pub sent: Option<Network<'a>>,
 }
 
@@ -95,23 +95,22 @@ impl Rates {
         let mut run = |network: &mut Network<'_>| {
             Replay::run(&recording, &PipelineConfig::DEFAULT, wheels.clone(), network, &mut tick)
         };
-        let [float, linear] = [run(&mut networks.float)?, run(&mut networks.linear)?];
+        let [float, integer] = [run(&mut networks.float)?, run(&mut networks.integer)?];
         let mut start = Instant::now();
-        let integer = run(&mut networks.integer)?;
+        let default = run(&mut networks.default)?;
         let settled = |drive: &Replay| drive.settled().map(|rate| rate.rad_per_sec()).collect::<Vec<f64>>();
-        let gyronet = settled(&integer);
+        let linear = settled(&default);
         let shapes = Shapes {
             float: networks.float.shape,
             integer: networks.integer.shape,
-            linear: networks.linear.shape,
-            sent: networks.sent.as_ref().map_or(networks.integer.shape, |sent| sent.shape),
+            sent: networks.sent.as_ref().unwrap_or(&networks.default).shape,
         };
         let drive = match &mut networks.sent {
             Some(sent) => {
                 start = Instant::now();
                 run(sent)?
             }
-            None => integer,
+            None => default,
         };
         let run_time = start.elapsed();
 
@@ -139,8 +138,8 @@ impl Rates {
                 vqf::rates(vqf::on_a_vehicle(), samples)[drive.compared()].to_vec()
             }
             Method::GYRONET_F32 => settled(&float),
-            Method::GYRONET_INT => gyronet.clone(),
-            Method::LINEAR => settled(&linear),
+            Method::GYRONET_INT => settled(&integer),
+            Method::LINEAR => linear.clone(),
             Method::PROMPT => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
             // The last one is `Method::NAVIGATION`.
             _ => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),

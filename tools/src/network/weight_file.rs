@@ -109,18 +109,18 @@ fn bytes(path: &Path) -> Result<Vec<u8>, WeightFileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gyronet::model::weights::DEFAULT;
+    use gyronet::model::weights::GYRONET;
 
     fn refused(edit: impl Fn(&mut Vec<u8>)) -> String {
-        let mut bytes = DEFAULT.0.to_vec();
+        let mut bytes = GYRONET.0.to_vec();
         edit(&mut bytes);
         WeightFile::parse("w.blob", &bytes).unwrap_err().to_string()
     }
 
     #[test]
     fn the_default_weights_pass() {
-        let file = WeightFile::parse("w.blob", &DEFAULT.0).unwrap();
-        assert_eq!(file.blob().unwrap().crc, Blob::new_checked(&DEFAULT.0).unwrap().crc);
+        let file = WeightFile::parse("w.blob", &GYRONET.0).unwrap();
+        assert_eq!(file.blob().unwrap().crc, Blob::new_checked(&GYRONET.0).unwrap().crc);
     }
 
     #[test]

@@ -15,7 +15,7 @@ mod summary;
 mod track;
 mod utm;
 
-pub use export::{HEADER, write_csv};
+pub use export::{HEADER, write_csv, write_whole};
 pub(super) use kaist::yaw;
 pub use summary::{Seen, Spread, StreamSummary};
 
@@ -24,6 +24,7 @@ use crate::drive::error::{DataError, DataFault};
 use crate::drive::recording::{Recording, Row as RecordingRow};
 use crate::drive::vehicle::Vehicle;
 use crate::simulate::layout::{Layout, MARKER, Spec};
+use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 use std::cell::Cell;
@@ -34,6 +35,8 @@ use track::Stream;
 
 /// A value interpolated across a longer gap than this is marked, s.
 pub const MAX_GAP: f64 = 0.1;
+/// The wheels may turn by this much during static initialisation, m.
+const STANDING: f64 = 0.01;
 /// A sequence must last at least this long: static initialisation and a second, s.
 const NEEDED: f64 = 4.0;
 
@@ -46,6 +49,8 @@ pub struct Step {
     pub angular_rate: [f32; 3],
     /// The inertial sensor was silent around here for longer than [`MAX_GAP`].
     pub imu_gap: bool,
+    /// The gyro, the wheels or the truth were silent around here for longer than [`MAX_GAP`].
+    pub other_gap: bool,
     /// The turn of the fibre-optic gyro since the step before, rad.
     pub fog: f64,
     /// Way of the left and the right wheel since the step before, m.
@@ -135,12 +140,20 @@ pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     if found.is_empty() { Err(error(DataFault::UnknownLayout)) } else { Ok(found) }
 }
 
+/// Returns the files of a sequence of either layout that are there.
+#[must_use]
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut paths: Vec<PathBuf> = kaist::PATHS.iter().chain(&nclt::PATHS).map(|p| folder.join(p)).collect();
+    paths.push(folder.join(kaist::CALIBRATION));
+    paths.extend(nclt::truth(folder));
+    paths.retain(|path| path.is_file());
+    paths
+}
+
 /// Returns the number of bytes that reading a sequence will read; missing files count 0.
 #[must_use]
 pub fn size(folder: &Path) -> u64 {
-    let mut paths: Vec<PathBuf> = kaist::PATHS.iter().chain(&nclt::PATHS).map(|p| folder.join(p)).collect();
-    paths.extend(nclt::truth(folder));
-    paths.iter().filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum()
+    files(folder).iter().filter_map(|path| fs::metadata(path).ok()).map(|data| data.len()).sum()
 }
 
 impl Sequence {
@@ -166,7 +179,7 @@ impl Sequence {
             for (count, gap) in in_gap.iter_mut().zip(gaps) {
                 *count += u64::from(gap);
             }
-            steps.push(now.step(last.as_ref().unwrap_or(&now), gaps[0]));
+            steps.push(now.step(last.as_ref().unwrap_or(&now), gaps));
             last = Some(now);
             if steps.len() % 1024 == 0 {
                 watch(progress.get());
@@ -265,6 +278,17 @@ impl Sequence {
         Ok(Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() })
     }
 
+    /// Checks that the wheels stand during static initialisation.
+    ///
+    /// # Errors
+    /// [`DataFault::Rolling`].
+    pub fn needs_standstill(&self) -> Result<(), DataError> {
+        let steps = self.steps.iter().take(STATIC_SAMPLES as usize);
+        let metres = steps.map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum::<f64>().abs();
+        let fault = DataFault::Rolling { metres, most: STANDING };
+        if metres > STANDING { Err(DataError::of(self.path.display(), fault)) } else { Ok(()) }
+    }
+
     /// Checks that the sequence has an inertial sensor.
     ///
     /// # Errors
@@ -284,13 +308,14 @@ struct Values {
 }
 
 impl Values {
-    fn step(&self, last: &Self, imu_gap: bool) -> Step {
+    fn step(&self, last: &Self, [imu_gap, others @ ..]: [bool; 4]) -> Step {
         let [fx, fy, fz, wx, wy, wz, vendor_yaw] = self.imu;
         let [x, y, yaw] = self.truth;
         Step {
             specific_force: [fx, fy, fz].map(|value| value as f32),
             angular_rate: [wx, wy, wz].map(|value| value as f32),
             imu_gap,
+            other_gap: others.contains(&true),
             fog: self.fog - last.fog,
             wheels: [self.wheels[0] - last.wheels[0], self.wheels[1] - last.wheels[1]],
             position: [x, y],

@@ -1,9 +1,11 @@
 """python -m gyronet_train DATA --out FOLDER: train GyroNet on a folder of drives.
 
-Trains once for each seed, prints what each is worth on the validation drive with mean and spread,
+Trains once for each seed, prints what each is worth on the validation drives with mean and spread,
 and keeps the best of them there. Test drives are never read here. training.py says how it is
-trained and in what that departs from the paper. With --scale-of CHECKPOINT nothing is trained but
-that network's scale of its expected error (scale.py).
+trained and in what that departs from the paper. A training that was killed goes on where the files
+STEM.seedN.state in --out are; STEM.history.json has every epoch. Training drives can come as Parquet
+shards (shards.py), and several processes train together under torchrun. With --scale-of CHECKPOINT
+nothing is trained but that network's scale of its expected error (scale.py).
 """
 
 from __future__ import annotations
@@ -11,28 +13,34 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import datetime
+import json
 import statistics
 from pathlib import Path
 
+import numpy as np
 import torch
 from tqdm import tqdm
 
+from . import processes
 from .export import export, load_gyronet
 from .model import GyroNet
-from .recordings import Drive, load_drive, mean_1s_error
+from .recordings import Drive, find_drive, load_pieces, mean_1s_error
 from .scale import fit_scale
-from .training import Settings, Trained, calibrate, train
-from .validation import Validation, validate
+from .spans import Spans
+from .training import Epoch, Settings, Trained, calibrate, train
+from .validation import Validation, validate_all
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train", description=__doc__)
-    parser.add_argument("data", type=Path, help="folder of trialNN_100hz.csv drives")
+    parser.add_argument("data", type=Path, help="folder of drives (CSV)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
     parser.add_argument("--stem", default="gyronet", help="name of the files")
-    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NN")
-    parser.add_argument("--validate", default="08", metavar="NN")
+    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NAME")
+    parser.add_argument("--shards", type=Path, metavar="FOLDER", help="train on these shards instead (pyarrow)")
+    parser.add_argument("--validate", nargs="+", default=["08"], metavar="NAME")
     parser.add_argument("--epochs", type=int, default=20)
+    parser.add_argument("--patience", type=int, default=6, help="stop after so many epochs without a better one")
     parser.add_argument("--batch", type=int, default=512, help="windows of a batch")
     parser.add_argument("--lr", type=float, default=0.0015)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], metavar="N")
@@ -57,54 +65,107 @@ def line(what: str, validation: Validation) -> str:
 def main() -> None:
     args = arguments()
     torch.set_num_threads(args.threads)
-    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in tqdm(args.train, "reading", disable=None)]
-    validation_drive = load_drive(args.data / f"trial{args.validate}_100hz.csv")
-    make = with_scale if args.scale_of else best_of_seeds
-    model, provenance = make(args, drives, validation_drive)
+    processes.join()
+    try:
+        run(args)
+    except ValueError as error:
+        raise SystemExit(str(error)) from error
+    except KeyboardInterrupt:
+        raise SystemExit("stopped; the same command goes on after the last whole epoch") from None
+    finally:
+        processes.leave()
+
+
+def run(args: argparse.Namespace) -> None:
+    """Trains and writes the files; the first of several processes alone writes and prints."""
+    first = processes.part()[0] == 0
+    say = print if first else lambda *_, **__: None
+    args.out.mkdir(parents=True, exist_ok=True)
+    validation = pieces(args.data, args.validate)
+    if args.scale_of:
+        model, provenance = with_scale(args, csv_drives(args), validation)
+    else:
+        model, provenance = best_of_seeds(args, validation, say)
     if args.note:
         provenance["note"] = args.note
-    args.out.mkdir(parents=True, exist_ok=True)
-    for path in export(model, provenance, args.out, args.stem):
-        print(path)
+    if first:
+        for path in export(model, provenance, args.out, args.stem):
+            print(path)
 
 
-def best_of_seeds(
-    args: argparse.Namespace, drives: list[Drive], validation_drive: Drive
-) -> tuple[GyroNet, dict]:
-    """Trains with each seed: the best network on the validation drive, and where it comes from."""
-    static = mean_1s_error(validation_drive.gyro_error)
-    print(f"static initialisation: 1 s error {static:.6f} rad")
-    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units, args.windows)
+def csv_drives(args: argparse.Namespace) -> list[Drive]:
+    """The training drives."""
+    return pieces(args.data, args.train)
+
+
+def pieces(folder: Path, names: list[str]) -> list[Drive]:
+    """The drives of some names, each in the pieces between its gaps."""
+    return [piece for name in tqdm(names, "reading", disable=None) for piece in load_pieces(find_drive(folder, name))]
+
+
+def data(args: argparse.Namespace):
+    """What is trained on: the drives in memory, or the shards' as a stream."""
+    if args.shards is None:
+        return Spans(csv_drives(args), args.windows, processes.part())
+    try:
+        from .shards import Stream
+    except ImportError as error:
+        raise ValueError(f"--shards wants pyarrow: {error}") from error
+    return Stream(args.shards, args.windows, processes.part())
+
+
+def best_of_seeds(args: argparse.Namespace, validation: list[Drive], say) -> tuple[GyroNet, dict]:
+    """Trains with each seed: the best network on the validation drives, and where it comes from."""
+    weights = [len(drive.gyro_error) for drive in validation]
+    static = float(np.average([mean_1s_error(drive.gyro_error) for drive in validation], weights=weights))
+    say(f"static initialisation: 1 s error {static:.6f} rad")
+    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units, args.windows, args.patience)
+    spans = data(args)
     networks: dict[int, Trained] = {}
     for seed in args.seeds:
-        networks[seed] = train(
-            drives,
-            validation_drive,
-            settings,
-            seed,
-            lambda epoch, validation: tqdm.write(line(f"seed {seed} epoch {epoch}", validation)),
-        )
-        print(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
+
+        def on_epoch(epoch: Epoch) -> None:
+            say(line(f"seed {seed} epoch {epoch.epoch}, loss {epoch.loss:.4f}", epoch.validation), flush=True)
+
+        state = args.out / f"{args.stem}.seed{seed}.state"
+        networks[seed] = train(spans, validation, settings, seed, on_epoch, state)
+        say(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
     errors = [network.validation.mean_1s_rad for network in networks.values()]
-    spread = statistics.stdev(errors) if len(errors) > 1 else 0.0
     seconds = sum(network.seconds for network in networks.values())
-    print(
-        f"{len(errors)} seeds in {seconds:.0f} s: 1 s error {statistics.mean(errors):.6f} rad, "
-        f"standard deviation {spread:.6f}"
-    )
+    if len(errors) > 1:
+        say(
+            f"{len(errors)} seeds in {seconds:.0f} s: 1 s error {statistics.mean(errors):.6f} rad, "
+            f"standard deviation {statistics.stdev(errors):.6f}"
+        )
     seed = min(networks, key=lambda seed: networks[seed].validation.any_1s_rad)
     chosen = networks[seed]
+    if processes.part()[0] == 0:
+        history = {
+            "static_1s_rad": static,
+            "seed": seed,
+            "seeds": {
+                s: {
+                    "best": n.epoch,
+                    "seconds": n.seconds,
+                    "loss": [e.loss for e in n.epochs],
+                    "mean_1s_rad": [e.validation.mean_1s_rad for e in n.epochs],
+                }
+                for s, n in networks.items()
+            },
+        }
+        (args.out / f"{args.stem}.history.json").write_text(json.dumps(history))
     provenance = {
         "network": "gyronet",
-        "train": [d.name for d in drives],
-        "validate": validation_drive.name,
-        "sha256": {d.name: d.sha256 for d in [*drives, validation_drive]},
+        "train": list(spans.names),
+        "validate": ", ".join(names(validation)),
+        "sha256": {**spans.names, **{d.name: d.sha256 for d in validation}},
         "validation_mean_1s_rad": round(chosen.validation.mean_1s_rad, 7),
         "validation_static_mean_1s_rad": round(static, 7),
         "validation_mean_1s_rad_of_seeds": {s: round(e, 7) for s, e in zip(networks, errors)},
         "epoch": chosen.epoch,
         "seed": seed,
         "seconds": round(seconds),
+        "processes": processes.part()[1],
         **dataclasses.asdict(settings),
         "torch": torch.__version__.split("+")[0],
         "date": datetime.date.today().isoformat(),
@@ -112,17 +173,22 @@ def best_of_seeds(
     return chosen.model, provenance
 
 
+def names(drives: list[Drive]) -> list[str]:
+    """The names of drives, each once, however many pieces it has."""
+    return list(dict.fromkeys(drive.name for drive in drives))
+
+
 def with_scale(
-    args: argparse.Namespace, drives: list[Drive], validation_drive: Drive
+    args: argparse.Namespace, drives: list[Drive], validation: list[Drive]
 ) -> tuple[GyroNet, dict]:
     """The checkpoint's network, its scale fitted again to the drives that it was trained on."""
     model, provenance = load_gyronet(args.scale_of)
-    if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, validation_drive]}:
+    if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, *validation]}:
         raise ValueError(f"{args.scale_of}: trained or validated on other drives than these")
-    print(line("before", validate(model, validation_drive)))
+    print(line("before", validate_all(model, validation)))
     fit_scale(model, drives)
-    calibrate(model, validate(model, validation_drive).scale_ratio)
-    print(line("after", validate(model, validation_drive)))
+    calibrate(model, validate_all(model, validation).scale_ratio)
+    print(line("after", validate_all(model, validation)))
     provenance["scale"] = f"fitted alone on {datetime.date.today()}"
     return model, provenance
 

@@ -23,7 +23,7 @@ from torch import nn
 from tqdm import tqdm
 
 from .model import INPUTS, overlap_mean
-from .recordings import Drive, load_drive, mean_1s_error, windows
+from .recordings import Drive, find_drive, load_drive, mean_1s_error, windows
 from .spans import HOP, Spans
 
 matplotlib.use("Agg")
@@ -126,7 +126,7 @@ def plot(networks: dict[str, dict], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="gyronet_train.compare", description=__doc__)
-    parser.add_argument("data", type=Path, help="folder of trialNN_100hz.csv drives")
+    parser.add_argument("data", type=Path, help="folder of drives")
     parser.add_argument("--out", type=Path, required=True, help="files to write, without .json and .png")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NN")
     parser.add_argument("--test", nargs="+", default=["09", "11"], metavar="NN")
@@ -137,8 +137,8 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="CPU threads")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
-    train = [load_drive(args.data / f"trial{n}_100hz.csv") for n in args.train]
-    test = [load_drive(args.data / f"trial{n}_100hz.csv") for n in args.test]
+    train = [load_drive(find_drive(args.data, n)) for n in args.train]
+    test = [load_drive(find_drive(args.data, n)) for n in args.test]
     spans = Spans(train, 1)
     networks = {name: run(name, spans, test, args) for name in NETWORKS}
     for name, result in networks.items():

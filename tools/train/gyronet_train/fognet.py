@@ -8,7 +8,8 @@ padded ones (Fig. 8), labelled with the truth of the rows that they repeat. The 
 cycle, weights are averaged over the last steps, and the epoch that does best on the validation
 drive is kept. Test drives are never read here.
 
-LAYOUT kaist: folders in the KAIST Urban layout, real or simulated. LAYOUT kingston: the Kingston
+LAYOUT kaist: folders in the KAIST Urban layout, real or simulated. LAYOUT drives: files that `gyronet
+import kaist` or `nclt` wrote, used in pieces where they have gaps. LAYOUT kingston: the Kingston
 2008 recording, of which only the first 60 % are read, the last sixth of these to validate.
 """
 
@@ -25,8 +26,9 @@ from safetensors.torch import load_file
 from tqdm import tqdm
 
 from .export import export
-from .fognet_model import FOG, STEPS, FoGNet
-from .seconds import Seconds, load_kaist, load_kingston, window_rows
+from .fognet_loss import fognet_losses
+from .fognet_model import FoGNet
+from .seconds import FOG, STEPS, Seconds, load_grid, load_kaist, load_kingston, window_rows
 
 ADAPT_SHARE, VALIDATE_SHARE = 0.6, 1 / 6
 AVERAGE = 0.995  # of the weights, a step
@@ -35,9 +37,9 @@ SETTINGS = ("epochs", "windows", "batch", "lr", "alpha", "padded", "weight_decay
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train.fognet", description=__doc__)
-    parser.add_argument("layout", choices=["kaist", "kingston"])
-    parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="DIR")
-    parser.add_argument("--validate", type=Path, metavar="DIR", help="kaist: the drive to validate with")
+    parser.add_argument("layout", choices=["kaist", "drives", "kingston"])
+    parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="PATH")
+    parser.add_argument("--validate", type=Path, nargs="+", metavar="PATH", help="the drives to validate with")
     parser.add_argument("--simulated", action="store_true", help="say in the provenance that the drives are")
     parser.add_argument("--init", type=Path, metavar="FILE", help="checkpoint to go on from")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
@@ -54,13 +56,16 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def load(args: argparse.Namespace) -> tuple[list[Seconds], Seconds]:
-    if args.layout == "kaist":
-        return [load_kaist(d) for d in tqdm(args.train, "reading", disable=None)], load_kaist(args.validate)
+def load(args: argparse.Namespace) -> tuple[list[Seconds], list[Seconds]]:
+    """The drives to train on and to validate with; pieces of a drive count as drives."""
+    if args.layout != "kingston":
+        pieces = load_grid if args.layout == "drives" else lambda folder: [load_kaist(folder)]
+        train = [piece for path in tqdm(args.train, "reading", disable=None) for piece in pieces(path)]
+        return train, [piece for path in args.validate or [] for piece in pieces(path)]
     drive = load_kingston(args.train[0])
     adapt = int(ADAPT_SHARE * len(drive.turn))
     split = int((1 - VALIDATE_SHARE) * adapt)
-    return [drive.part(0, split)], drive.part(split, adapt)
+    return [drive.part(0, split)], [drive.part(split, adapt)]
 
 
 class Windows:
@@ -115,7 +120,10 @@ def main() -> None:
     args = arguments()
     torch.manual_seed(args.seed)
     train, validate = load(args)
-    data, held_out = Windows(train, "repeat"), Windows([validate], "none")
+    data, held_out = Windows(train, "repeat"), Windows(validate, "none")
+    for what, windows in (("training", data), ("validation", held_out)):
+        if len(windows.full) == 0:
+            raise SystemExit(f"no {what} drive has a minute without a gap")
     model = FoGNet(*normalisation(data))
     if args.init:
         # Another device's units are not these drives'.
@@ -126,6 +134,8 @@ def main() -> None:
     parameters = [p for p in model.parameters() if p.requires_grad]
     optimiser = torch.optim.AdamW(parameters, lr=args.lr, weight_decay=args.weight_decay)
     batches = min(args.windows, len(data.full)) // args.batch
+    if batches == 0:
+        raise SystemExit(f"{len(data.full)} whole windows to train on, fewer than a batch of {args.batch}")
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, args.lr, total_steps=batches * args.epochs)
     average = copy.deepcopy(model)
     scale = model.correction_scale.item()
@@ -142,10 +152,9 @@ def main() -> None:
         for rows in tqdm(rows_of_epoch.split(args.batch), f"epoch {epoch}/{args.epochs}", disable=None):
             x, label = data.take(rows)
             correction, f1, fog = model(x)
-            loss1 = (correction - label).abs().mean() / scale  # Eq. 14
-            loss2 = (f1 - fog).abs().mean()  # Eq. 15
+            loss1, loss2, loss = fognet_losses(correction, label, f1, fog, scale, args.alpha)
             optimiser.zero_grad()
-            (loss1 + args.alpha * loss2).backward()  # Eq. 16
+            loss.backward()
             torch.nn.utils.clip_grad_norm_(parameters, 1.0)
             optimiser.step()
             schedule.step()
@@ -160,10 +169,10 @@ def main() -> None:
     model.eval()
     provenance = {
         "network": "fognet",
-        "train": [d.name for d in train],
-        "validate": validate.name,
+        "train": list(dict.fromkeys(d.name for d in train)),
+        "validate": ", ".join(dict.fromkeys(d.name for d in validate)),
         "simulated": args.simulated,
-        "sha256": {d.name: d.sha256 for d in [*train, validate]},
+        "sha256": {d.name: d.sha256 for d in [*train, *validate]},
         "validation_mean_60s_rad": round(best[0], 8),
         "validation_uncorrected_mean_60s_rad": round(none, 8),
         "init": args.init.name if args.init else None,

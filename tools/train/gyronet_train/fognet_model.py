@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import nn
 
-STEPS = 60
+from .seconds import FOG, STEPS
+
 INPUTS = 9
-FOG = 8  # column of the gyro increment
 HIDDEN1 = 90
 HIDDEN2 = STEPS
 PARAMETERS = 387_006

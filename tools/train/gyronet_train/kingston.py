@@ -15,8 +15,8 @@ import torch
 from safetensors.torch import load_file
 
 from .fognet import ADAPT_SHARE
-from .fognet_model import FOG, FoGNet
-from .seconds import Seconds, load_kingston, window_rows
+from .fognet_model import FoGNet
+from .seconds import FOG, Seconds, load_kingston, window_rows
 
 EARTH_RATE = 7.292115e-5  # rad/s
 LATITUDE_DEG = 44.23

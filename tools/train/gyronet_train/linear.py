@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save_file
 
-from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, load_drive, mean_1s_error, windows
+from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
 
 HOP = 5
 REACH = 5
@@ -164,7 +164,7 @@ def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train.linear", description=__doc__)
-    parser.add_argument("data", type=Path, help="folder of trialNN_100hz.csv drives")
+    parser.add_argument("data", type=Path, help="folder of drives")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors file")
     parser.add_argument("--stem", default="linear_window", help="name of the file")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
@@ -173,7 +173,7 @@ def arguments() -> argparse.Namespace:
 
 def main() -> None:
     args = arguments()
-    drives = [load_drive(args.data / f"trial{n}_100hz.csv") for n in args.train]
+    drives = [load_drive(find_drive(args.data, n)) for n in args.train]
     print("1 s error over static initialisation's, each drive by the filter of the others: mean, standard deviation")
     report = {}
     for count in range(1, len(PARTS) + 1):

@@ -26,7 +26,7 @@ from .lwoi_motion import inertial_errors, odometry_errors
 from .lwoi_process import Settings, Trained, inertial_features, odometry_features, train
 from .lwoi_run import MODES, Expected, run
 from .results import mean_numbers, run_mode, test_all
-from .sequence import STEPS, Sequence, load_sequence
+from .sequence import STEPS, Sequence, SequenceError, load_pieces
 from .trajectory import Track, trajectory_error
 
 JITTER = {"odometry": 1e-3, "inertial": 1e-4}
@@ -115,7 +115,10 @@ def test(drive: Sequence, model: Model, out: Path) -> dict:
 def main() -> None:
     args = arguments()
     torch.set_num_threads(args.threads)
-    drives = [load_sequence(folder) for folder in args.train]
+    try:
+        drives = load_pieces(args.train)
+    except SequenceError as error:
+        raise SystemExit(str(error)) from error
     processes = {what: fit(what, drives, args) for what in JITTER}
     errors = np.concatenate([odometry_errors(drive) for drive in drives])
     model = Model(processes, speed_variance(drives), errors.mean(axis=0), (errors**2).mean(axis=0))

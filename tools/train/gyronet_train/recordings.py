@@ -15,6 +15,7 @@ import numpy as np
 
 RATE_HZ = 100
 STATIC_SAMPLES = 3 * RATE_HZ
+LEAST_SAMPLES = STATIC_SAMPLES + 2 * RATE_HZ  # of a piece between two gaps: a shorter one is left out
 WINDOW = 10
 COLUMNS = ("t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z", "ref_gyr_z")
 
@@ -31,7 +32,16 @@ class Drive:
 
 
 def load_drive(path: Path) -> Drive:
-    """Read one CSV. Raises ValueError that names the file and what is wrong with it."""
+    """Read one CSV without gaps. Raises ValueError that names the file and what is wrong with it."""
+    drives = load_pieces(path)
+    if len(drives) > 1:
+        raise ValueError(f"{path}: wants an unbroken 100 Hz recording of more than 3 s")
+    return drives[0]
+
+
+def load_pieces(path: Path) -> list[Drive]:
+    """Read the pieces of one CSV between its gaps; static initialisation is that of the first. Raises ValueError that
+    names the file and what is wrong with it."""
     raw = path.read_bytes()
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in COLUMNS if name not in (table.dtype.names or ())]
@@ -41,18 +51,37 @@ def load_drive(path: Path) -> Drive:
     if not np.isfinite(values).all():
         row = int(np.argwhere(~np.isfinite(values).all(axis=1))[0, 0])
         raise ValueError(f"{path}: line {row + 2}: a value is empty or not a number")
-    step = np.diff(values[:, 0])
-    if len(step) < STATIC_SAMPLES or (abs(step - 1 / RATE_HZ) > 1e-3).any():
+    broken = np.flatnonzero(abs(np.diff(values[:, 0]) - 1 / RATE_HZ) > 1e-3) + 1
+    pieces = np.split(np.arange(len(values)), broken)
+    if len(pieces[0]) <= STATIC_SAMPLES:
         raise ValueError(f"{path}: wants an unbroken 100 Hz recording of more than 3 s")
     force, gyro, reference = values[:, 1:4], values[:, 4:7], values[:, 7]
     gyro = gyro - gyro[:STATIC_SAMPLES].mean(axis=0)
-    return Drive(
-        name=path.stem,
-        sha256=hashlib.sha256(raw).hexdigest(),
-        features=np.concatenate([force, gyro], axis=1).astype(np.float32),
-        gyro_error=(gyro[:, 2] - reference).astype(np.float32),
-        reference_rate=reference.astype(np.float32),
-    )
+    kept = [rows for rows in pieces if len(rows) >= LEAST_SAMPLES] if len(pieces) > 1 else pieces
+    if not kept:
+        raise ValueError(f"{path}: no piece of {LEAST_SAMPLES / RATE_HZ:.0f} s without a gap")
+    return [
+        Drive(
+            name=path.stem,
+            sha256=hashlib.sha256(raw).hexdigest(),
+            features=np.concatenate([force[rows], gyro[rows]], axis=1).astype(np.float32),
+            gyro_error=(gyro[rows, 2] - reference[rows]).astype(np.float32),
+            reference_rate=reference[rows].astype(np.float32),
+        )
+        for rows in kept
+    ]
+
+
+def find_drive(folder: Path, name: str) -> Path:
+    """The drive of that name, or the only one whose name contains it (`02`). Raises ValueError."""
+    name = name.removesuffix(".csv")
+    if (folder / f"{name}.csv").is_file():
+        return folder / f"{name}.csv"
+    found = sorted(path for path in folder.glob("*.csv") if name in path.stem)
+    if len(found) != 1:
+        names = ", ".join(path.stem for path in found) or "no drive"
+        raise ValueError(f"{folder}: {names} for the name {name}")
+    return found[0]
 
 
 def windows(series: np.ndarray, length: int = WINDOW) -> np.ndarray:

@@ -25,7 +25,7 @@ from .rinsw_detector import THRESHOLDS, DetectorError, Detectors, Settings, load
 from .rinsw_filter import Noise
 from .rinsw_profiles import PROFILES, Limits, agreement, label
 from .rinsw_run import MODES, gates, run, samples_of
-from .sequence import Sequence, SequenceError, load_sequence
+from .sequence import Sequence, SequenceError, load_pieces
 
 
 def arguments() -> argparse.Namespace:
@@ -46,7 +46,7 @@ def arguments() -> argparse.Namespace:
 
 def fit(args: argparse.Namespace) -> tuple[Detectors, dict]:
     """Trains the detectors and writes them; returns what the report says of it."""
-    drives = [load_sequence(folder) for folder in args.train]
+    drives = load_pieces(args.train)
     settings = Settings(units=args.units, steps=args.steps, rate=args.rate, seed=args.seed)
 
     def report(profile: str, step: int, loss: float) -> None:

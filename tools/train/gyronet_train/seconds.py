@@ -7,14 +7,17 @@ taken less its mean over the first three seconds, which stand still.
 from __future__ import annotations
 
 import hashlib
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from .fognet_model import STEPS
-
+STEPS = 60  # of a window
+FOG = 8  # column of the gyro increment
 STATIC_S = 3.0
+RATE_HZ = 100
+DRIVE = ("t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z", "left_m", "right_m", "fog_rad", "ref_gyr_z")
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,29 @@ def load_kaist(folder: Path) -> Seconds:
     )
 
 
+def load_grid(path: Path) -> list[Seconds]:
+    """Read a drive that `gyronet import kaist` or `nclt` wrote: the pieces of whole seconds between its gaps, on the grid
+    of seconds from its first row. Raises ValueError that names what is wrong."""
+    digest = hashlib.sha256(path.read_bytes())
+    table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
+    missing = [name for name in DRIVE if name not in (table.dtype.names or ())]
+    if missing:
+        raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
+    values = np.stack([table[name] for name in DRIVE], axis=1)
+    second = np.round((values[:, 0] - values[0, 0]) * RATE_HZ).astype(int) // RATE_HZ
+    values[:, 4:7] -= values[second < STATIC_S, 4:7].mean(axis=0)
+    values[:, 10] /= RATE_HZ
+    whole = np.flatnonzero(np.bincount(second) == RATE_HZ)
+    rows = values[np.isin(second, whole)].reshape(-1, RATE_HZ, len(DRIVE))
+    features = np.concatenate([rows[:, :, 1:7].mean(axis=1), rows[:, :, 7:10].sum(axis=1)], axis=1)
+    turn = rows[:, :, 10].sum(axis=1)
+    edges = [0, *np.flatnonzero(np.diff(whole) > 1) + 1, len(whole)]
+    return [
+        Seconds(path.stem, digest.hexdigest(), features[begin:end], turn[begin:end])
+        for begin, end in zip(edges, edges[1:])
+    ]
+
+
 def load_kingston(folder: Path) -> Seconds:
     """Read the Kingston 2008 recording: its gyro stands in for the fibre-optic one, and both
     wheels go at the speed of the car. Its azimuth grows clockwise."""
@@ -125,7 +151,7 @@ def second_means(times: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np
 
 def table(path: Path, columns: int, digest, header: int = 0) -> np.ndarray:
     """A CSV of that many columns. Stamps of 1.5e18 ns are rounded to 256 ns, which is finer than
-    anything that is done with them here."""
+    anything that is done with them here. Rows that are not finite or repeat a stamp are left out and counted."""
     digest.update(path.read_bytes())
     try:
         values = np.loadtxt(path, delimiter=",", skiprows=header, dtype=np.float64, ndmin=2)
@@ -133,12 +159,19 @@ def table(path: Path, columns: int, digest, header: int = 0) -> np.ndarray:
         raise ValueError(f"{path}: {error}") from error
     if values.shape[1] != columns:
         raise ValueError(f"{path}: wants {columns} columns")
-    if not np.isfinite(values).all():
-        row = int(np.argwhere(~np.isfinite(values).all(axis=1))[0, 0])
-        raise ValueError(f"{path}: line {row + 1 + header}: a value is empty or not a number")
-    if (np.diff(values[:, 0]) <= 0).any():
-        row = int(np.argwhere(np.diff(values[:, 0]) <= 0)[0, 0])
-        raise ValueError(f"{path}: line {row + 2 + header}: time does not go forward")
+    lines = np.arange(len(values)) + 1 + header
+    finite = np.isfinite(values).all(axis=1)
+    values, lines = values[finite], lines[finite]
+    new = np.diff(values[:, 0], prepend=-np.inf) != 0
+    left_out = int((~finite).sum() + (~new).sum())
+    if left_out:
+        print(f"{path}: {left_out} rows left out, not finite or with the stamp before", file=sys.stderr)
+    values, lines = values[new], lines[new]
+    backwards = np.flatnonzero(np.diff(values[:, 0]) < 0)
+    if len(backwards):
+        raise ValueError(f"{path}: line {lines[backwards[0] + 1]}: time goes backwards")
+    if len(values) == 0:
+        raise ValueError(f"{path}: holds no samples")
     return values
 
 

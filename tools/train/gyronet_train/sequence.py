@@ -8,7 +8,7 @@ taken less its mean over the first three seconds, which stand still.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,8 @@ from .seconds import STATIC_S, kaist_files
 STEPS = 100  # of a window
 DT = 0.01  # s
 PERIOD_NS = 10_000_000
+MAX_GAP_NS = 100_000_000  # a longer one between two rows of a file is a gap
+LEAST = 5  # windows of a piece between two gaps: the detectors of RINS-W train on four
 STANDING_M = 0.01  # the most that wheels may turn while the gyro's mean is taken
 
 
@@ -37,9 +39,29 @@ class Sequence:
     inertial: np.ndarray  # (N, 100, 6): gyro, accelerometer
     attitude: Rotation
     position: np.ndarray  # (N * 100 + 1, 3)
+    whole: np.ndarray  # (N,): no file has a gap in the window
 
     def __len__(self) -> int:
         return len(self.odometry)
+
+    def part(self, begin: int, end: int) -> Sequence:
+        """The windows from `begin` to `end`."""
+        windows, steps = slice(begin, end), slice(begin * STEPS, end * STEPS + 1)
+        return replace(
+            self,
+            start_ns=self.start_ns + begin * STEPS * PERIOD_NS,
+            odometry=self.odometry[windows],
+            inertial=self.inertial[windows],
+            attitude=self.attitude[steps],
+            position=self.position[steps],
+            whole=self.whole[windows],
+        )
+
+    def pieces(self) -> list[Sequence]:
+        """The pieces between gaps, to train on."""
+        inside = np.concatenate([[0], self.whole.astype(int), [0]])
+        edges = np.flatnonzero(np.diff(inside)).reshape(-1, 2)
+        return [self.part(begin, end) for begin, end in edges if end - begin >= LEAST]
 
     @property
     def edges(self) -> slice:
@@ -70,6 +92,14 @@ def load_sequence(folder: Path) -> Sequence:
         raise SequenceError(f"{folder}: {error}") from error
 
 
+def load_pieces(folders: list[Path]) -> list[Sequence]:
+    """Read folders in the KAIST Urban layout, in pieces between gaps. Raises SequenceError that names what is wrong."""
+    pieces = [piece for folder in folders for piece in load_sequence(folder).pieces()]
+    if not pieces:
+        raise SequenceError(f"no piece of {LEAST} s without a gap in {', '.join(map(str, folders))}")
+    return pieces
+
+
 def read(folder: Path) -> Sequence:
     """Reads the four files and the encoder's calibration, and puts them on the grid."""
     files, scale, digest = kaist_files(folder)
@@ -92,6 +122,11 @@ def read(folder: Path) -> Sequence:
     if abs(wheels[0][:standing].sum() + wheels[1][:standing].sum()) > 2 * STANDING_M:
         raise SequenceError(f"it moves in its first {STATIC_S:.0f} s, in which the gyro's mean is taken")
     inertial[:, :3] -= inertial[:standing, :3].mean(axis=0)
+    whole = np.ones(count, bool)
+    for times in (table[:, 0] for table in files):
+        for gap in np.flatnonzero(np.diff(times) > MAX_GAP_NS):
+            first, last = ((times[gap : gap + 2] - start) // 10**9).astype(int)
+            whole[max(first, 0) : max(last + 1, 0)] = False
     matrices = pose[:, [1, 2, 3, 5, 6, 7, 9, 10, 11]].reshape(-1, 3, 3)
     times = (pose[:, 0] - start) / 1e9
     return Sequence(
@@ -102,4 +137,5 @@ def read(folder: Path) -> Sequence:
         inertial=inertial.reshape(count, STEPS, 6),
         attitude=Slerp(times, Rotation.from_matrix(matrices))(np.clip(grid, times[0], times[-1])),
         position=np.stack([on_grid(pose[:, 0], pose[:, k]) for k in (4, 8, 12)], axis=1),
+        whole=whole,
     )

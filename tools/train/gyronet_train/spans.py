@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
+from .moments import Moments
 from .recordings import WINDOW, Drive
 
 HOP = 5
@@ -19,14 +20,25 @@ HOP = 5
 class Spans:
     """Every span of `windows` windows in some drives, wherever it begins."""
 
-    def __init__(self, drives: list[Drive], windows: int):
+    def __init__(self, drives: list[Drive], windows: int, part: tuple[int, int] = (0, 1)):
+        """`part` (k, n) is the k-th process of n: it gets every n-th span."""
+        self.names = {drive.name: drive.sha256 for drive in drives}
+        self.moments = Moments.added([Moments.of(drive) for drive in drives])
         self.windows = windows
         self.length = WINDOW + (windows - 1) * HOP
         self.features = torch.from_numpy(np.concatenate([d.features for d in drives]))
         self.gyro_error = torch.from_numpy(np.concatenate([d.gyro_error for d in drives]))
         ends = np.cumsum([len(d.gyro_error) for d in drives])
         starts = [np.arange(end - len(d.gyro_error), end - self.length + 1) for d, end in zip(drives, ends)]
-        self.starts = torch.from_numpy(np.concatenate(starts))
+        every = torch.from_numpy(np.concatenate(starts))
+        rank, ranks = part
+        # As many for each process.
+        self.starts = every[rank::ranks][: len(every) // ranks]
+
+    @staticmethod
+    def count(samples: int, windows: int) -> int:
+        """Spans of a drive of so many samples."""
+        return max(0, samples - (WINDOW + (windows - 1) * HOP) + 1)
 
     def batches(self, windows: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
         """Shuffled batches of about `windows` windows: features (S, L, 6), gyro error (S, L).

@@ -1,29 +1,40 @@
-"""Training of one network with one seed.
+"""Training of one network with one seed, by one process or several.
 
 As in the paper: Adam with an initial rate of 0.0015 and mean absolute error over shuffled windows
 of 0.1 s. Other than there, turns are added (augment.py), the rate follows one cycle, what is kept is
 the running mean of the weights, and a scale is trained (loss.py). Windows can come in spans as the
 firmware overlaps them, and as other units of the part would give them; the defaults do without, for
 on the validation drive neither the 1 s error nor the windows' mean error was better with them.
+
+Random numbers start anew with each epoch, from seed, epoch and process, so that a training that goes on from its
+state is the one that was not broken off.
 """
 
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import torch
 from tqdm import tqdm
 
+from . import processes
 from .augment import other_unit, turn
 from .loss import span_loss
 from .model import GyroNet
 from .recordings import Drive
 from .spans import Spans, cut
-from .validation import Validation, validate
+from .state import load_state, save_state
+from .validation import Validation, validate_all
+
+if TYPE_CHECKING:
+    from .shards import Stream
 
 
 @dataclass(frozen=True)
@@ -33,7 +44,7 @@ class Settings:
     epochs: int
     """Passes; in each, as many windows as the training drives have samples."""
     batch: int
-    """Windows of a batch, about."""
+    """Windows of a batch, about, of all processes together."""
     lr: float
     """Largest learning rate."""
     turns: bool
@@ -42,8 +53,20 @@ class Settings:
     """Add other units."""
     windows: int
     """Windows of a span; with one, the overlap has no part in the loss."""
+    patience: int
+    """Epochs without a better one after which it stops."""
     memory: float = 0.999
     """Of the running mean of the weights, a batch."""
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """What an epoch came to."""
+
+    epoch: int
+    loss: float
+    """Mean over its batches."""
+    validation: Validation
 
 
 @dataclass(frozen=True)
@@ -53,57 +76,89 @@ class Trained:
     model: GyroNet
     validation: Validation
     epoch: int
-    """The one whose mean weights these are: the best on the validation drive."""
+    """The one whose mean weights these are: the best on the validation drives."""
     seconds: float
     """Wall time."""
+    epochs: list[Epoch]
+    """All that were run."""
 
 
 def train(
-    drives: list[Drive],
-    validation_drive: Drive,
+    data: Spans | Stream,
+    validation: list[Drive],
     settings: Settings,
     seed: int,
-    on_epoch: Callable[[int, Validation], None],
+    on_epoch: Callable[[Epoch], None],
+    state: Path | None = None,
 ) -> Trained:
-    """Trains GyroNet; `on_epoch` hears of each epoch. Reads no other drives."""
-    started = time.monotonic()
+    """Trains GyroNet; `on_epoch` hears of each epoch. Goes on from the file `state`, where it exists, and keeps it."""
+    of = {"settings": dataclasses.asdict(settings), "seed": seed, "drives": data.names}
+    of["validation drives"] = [drive.sha256 for drive in validation]
     torch.manual_seed(seed)
-    spans = Spans(drives, settings.windows)
-    unit = spans.gyro_error.std().item()
-    model = GyroNet(spans.features.mean(0), spans.features.std(0), unit)
-    mean = copy.deepcopy(model)
+    deviations = data.moments.deviations()
+    unit = deviations[-1].item()
+    model = GyroNet(data.moments.mean(), deviations[:-1], unit)
+    mean, best = copy.deepcopy(model), copy.deepcopy(model)
+    rank, ranks = processes.part()
+    batch = settings.batch // ranks
     optimiser = torch.optim.Adam(model.parameters(), lr=settings.lr)
-    steps = spans.epoch(settings.batch) * settings.epochs
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, settings.lr, total_steps=steps)
-    best = None
-    step = 0
-    for epoch in range(1, settings.epochs + 1):
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, settings.lr, total_steps=data.epoch(batch) * settings.epochs
+    )
+    parts = {"model": model, "mean": mean, "best": best, "optimiser": optimiser, "schedule": schedule}
+    epochs: list[Epoch] = []
+    seconds = 0.0
+    saved = load_state(state, of) if state else None
+    if saved:
+        for name, part in parts.items():
+            part.load_state_dict(saved[name])
+        epochs = [Epoch(e["epoch"], e["loss"], Validation(**e["validation"])) for e in saved["epochs"]]
+        seconds = saved["seconds"]
+    parallel = processes.together(model)
+    started = time.monotonic() - seconds
+    while not finished(epochs, settings):
+        epoch = len(epochs) + 1
+        torch.manual_seed((seed << 32) + (epoch << 16) + rank)
         model.train()
         batches = tqdm(
-            spans.batches(settings.batch),
-            f"epoch {epoch}/{settings.epochs}",
-            spans.epoch(settings.batch),
-            disable=None,
+            data.batches(batch), f"epoch {epoch}/{settings.epochs}", data.epoch(batch), disable=True if rank else None
         )
+        total = 0.0
         for x, gyro_error in batches:
             x = turn(x) if settings.turns else x
             x = other_unit(x) if settings.units else x
-            correction, scale = model(cut(x).flatten(0, 1))
+            correction, scale = parallel(cut(x).flatten(0, 1))
             shape = (len(x), settings.windows)
             loss = span_loss(correction.unflatten(0, shape), scale.view(shape), gyro_error, unit)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
             schedule.step()
-            step += 1
-            update_mean(mean, model, min(settings.memory, step / (step + 10)))
-        validation = validate(mean, validation_drive)
-        on_epoch(epoch, validation)
-        if best is None or validation.any_1s_rad < best.validation.any_1s_rad:
-            best = Trained(copy.deepcopy(mean), validation, epoch, 0.0)
-    calibrate(best.model, best.validation.scale_ratio)
-    seconds = time.monotonic() - started
-    return Trained(best.model, validate(best.model, validation_drive), best.epoch, seconds)
+            total += loss.item()
+            update_mean(mean, model, min(settings.memory, schedule.last_epoch / (schedule.last_epoch + 10)))
+        errors = processes.of_first(validate_all(mean, validation))
+        epochs.append(Epoch(epoch, processes.mean(total / data.epoch(batch)), errors))
+        if best_of(epochs).epoch == epoch:
+            best.load_state_dict(mean.state_dict())
+        on_epoch(epochs[-1])
+        seconds = time.monotonic() - started
+        if state and rank == 0:
+            told = {"epochs": [dataclasses.asdict(e) for e in epochs], "seconds": seconds}
+            save_state(state, of, {name: part.state_dict() for name, part in parts.items()} | told)
+    chosen = best_of(epochs)
+    calibrate(best, chosen.validation.scale_ratio)
+    return Trained(best, validate_all(best, validation), chosen.epoch, seconds, epochs)
+
+
+def best_of(epochs: list[Epoch]) -> Epoch:
+    """The epoch with the least error on the validation drives."""
+    return min(epochs, key=lambda epoch: epoch.validation.any_1s_rad)
+
+
+def finished(epochs: list[Epoch], settings: Settings) -> bool:
+    """Whether all epochs are run, or none was better than the best for too long."""
+    waited = len(epochs) - best_of(epochs).epoch if epochs else 0
+    return len(epochs) >= settings.epochs or waited >= settings.patience
 
 
 @torch.no_grad()

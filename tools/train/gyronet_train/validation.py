@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 import torch
@@ -26,6 +26,12 @@ class Validation:
     """That error over the scale that the network gives: 1 where it is calibrated."""
     log_loss: float
     """Mean Laplace log loss of the windows' errors, scale in rad/s."""
+
+
+def validate_all(model: GyroNet, drives: list[Drive]) -> Validation:
+    """Runs the network over some drives: the means of their errors, each by its length."""
+    errors = [astuple(validate(model, drive)) for drive in drives]
+    return Validation(*np.average(errors, axis=0, weights=[len(d.gyro_error) for d in drives]).tolist())
 
 
 @torch.no_grad()

@@ -29,6 +29,7 @@ def make_drive(speed, yaw_rate):
         inertial=np.concatenate([gyro, force], axis=1).reshape(-1, STEPS, 6),
         attitude=Rotation.from_euler("z", yaw[:, None]),
         position=position,
+        whole=np.ones(len(speed) // STEPS, bool),
     )
 
 

@@ -29,6 +29,18 @@ class Files(unittest.TestCase):
         np.testing.assert_allclose(read.edge_speed[[2, 6, -1]], [0.0, SPEED, SPEED], atol=0.01)
         np.testing.assert_allclose(np.linalg.norm(read.edge_velocity[[2, 6, -1]], axis=1), [0, SPEED, SPEED], atol=1e-3)
 
+    def test_rows_that_are_odd_are_left_out_and_a_gap_parts_a_drive(self):
+        path = self.folder / "sensor_data" / "encoder.csv"
+        rows = path.read_text().splitlines()
+        odd = rows[500].split(",")[0] + ",nan,nan"
+        # From 5.0 to 5.5 s there are no rows; the stamp of row 300 is there twice.
+        path.write_text("\n".join([*rows[:300], rows[300], rows[300], *rows[301:500], odd, *rows[550:]]) + "\n")
+        read = load_sequence(self.folder)
+        self.assertEqual(np.flatnonzero(~read.whole).tolist(), [4, 5])
+        [piece] = read.pieces()
+        self.assertEqual((len(piece), piece.start_ns - read.start_ns), (6, 6 * 10**9))
+        np.testing.assert_array_equal(piece.position, read.position[600:])
+
     def test_a_missing_file_is_named(self):
         (self.folder / "sensor_data" / "fog.csv").unlink()
         with self.assertRaisesRegex(SequenceError, "made.*fog.csv"):

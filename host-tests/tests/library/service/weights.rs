@@ -15,7 +15,7 @@ use std::rc::Rc;
 #[test]
 fn weights_are_replaced() {
     let flash = Rc::new(RefCell::new(F405::default()));
-    let file = &weights::DEFAULT.0;
+    let file = &weights::GYRONET.0;
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     for (round, slot) in [Slot::A, Slot::B, Slot::A].into_iter().enumerate() {
         let mut board = start(&flash);

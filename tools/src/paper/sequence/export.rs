@@ -1,7 +1,7 @@
 //! This module writes a sequence as one CSV: the columns of [`crate::drive::recording`], and further columns that only
 //! a sequence has.
 
-use super::Sequence;
+use super::{Sequence, Step};
 use crate::drive::DT;
 use std::io::{self, Write};
 
@@ -14,12 +14,24 @@ pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,whee
 ///
 /// # Errors
 /// The writer's error.
-pub fn write_csv(sequence: &Sequence, mut out: impl Write) -> io::Result<u64> {
+pub fn write_csv(sequence: &Sequence, out: impl Write) -> io::Result<u64> {
+    write(sequence, out, |step| !step.imu_gap)
+}
+
+/// Writes the steps that no file has a gap around.
+///
+/// # Errors
+/// The writer's error.
+pub fn write_whole(sequence: &Sequence, out: impl Write) -> io::Result<u64> {
+    write(sequence, out, |step| !step.imu_gap && !step.other_gap)
+}
+
+fn write(sequence: &Sequence, mut out: impl Write, kept: impl Fn(&Step) -> bool) -> io::Result<u64> {
     writeln!(out, "{HEADER}")?;
     let mut rows = 0;
     let mut buffer = ryu::Buffer::new();
     for (k, (step, turn)) in sequence.steps.iter().zip(sequence.turns()).enumerate() {
-        if step.imu_gap {
+        if !kept(step) {
             continue;
         }
         // The time is printed in whole hundredths, because 0.01 times a count would show rounding.

@@ -36,13 +36,15 @@ const POSE: Format<4> =
 /// A faster wheel than this means that its counter was reset, m/s.
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
-/// These files are read.
+/// The calibration of the encoders.
+pub(super) const CALIBRATION: &str = "calibration/EncoderParameter.txt";
+/// These files are read beside it.
 pub(super) const PATHS: [&str; 4] =
     ["sensor_data/xsens_imu.csv", "sensor_data/fog.csv", "sensor_data/encoder.csv", "global_pose.csv"];
 
 pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataError> {
     let [imu, fog, encoder, pose] = PATHS.map(|path| folder.join(path));
-    let parameters = EncoderParameters::read(&folder.join("calibration/EncoderParameter.txt"))?;
+    let parameters = EncoderParameters::read(&folder.join(CALIBRATION))?;
     let has_gyro = columns(&imu)? != ORIENTATION.columns;
     let (imu, first) = if has_gyro { whole(&imu, progress)? } else { orientation(&imu, progress)? };
     let epoch = Some(first);

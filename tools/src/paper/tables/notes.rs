@@ -5,11 +5,17 @@ use super::results::{ByMethod, SequenceErrors};
 use crate::evaluate::methods::{Gyro, Method};
 use std::collections::BTreeSet;
 
+/// The remarks on the bundled weights.
+pub const BUNDLED: [&str; 2] = [
+    "GyroNet's bundled weights were trained on real drives of another car with another sensor.",
+    "FoGNet's bundled weights were trained on simulated sequences of KAIST's layout.",
+];
+
 /// The remarks on every table with FoGNet in it.
 const FOGNET: [&str; 2] = [
     "Our FoGNet gives what the gyro has erred by, which is taken off; the paper's gives the prediction less the \
      measurement, which is added.",
-    "FoGNet's bundled weights were trained on simulated sequences of KAIST's layout.",
+    BUNDLED[1],
 ];
 
 /// Adds the remarks on FoGNet, on what was fitted and on the trajectories left out.
@@ -24,7 +30,7 @@ pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
     let mut notes: Vec<String> = [
         "The paper's figures are for KAIST Urban. Its errors are against the FoG, ours against the data set's truth.",
         "Unlike the paper's, our GyroNet and our FIR get readings less the mean of static initialisation.",
-        "GyroNet's bundled weights were trained on real drives of another car with another sensor.",
+        BUNDLED[0],
     ]
     .map(String::from)
     .into();

@@ -7,6 +7,7 @@ use super::paper::{self, Line};
 use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
 use crate::evaluate::methods::{Gyro, Method};
 use crate::simulate::layout::Layout;
+use std::path::Path;
 
 /// Holds a row: a name and figures; `None` for a missing one.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,20 @@ pub struct Table {
     pub paper_rows: Vec<Row>,
     /// Remarks below the table.
     pub notes: Vec<String>,
+}
+
+impl Table {
+    /// Puts the names of the weight files of GyroNet and FoGNet into the remarks, which speak of the bundled ones.
+    #[must_use]
+    pub fn with_weights(mut self, files: [Option<&Path>; 2]) -> Self {
+        for ((bundled, network), file) in notes::BUNDLED.iter().zip(["GyroNet", "FoGNet"]).zip(files) {
+            let Some(file) = file else { continue };
+            for note in self.notes.iter_mut().filter(|note| note == bundled) {
+                *note = format!("{network}'s weights are {}.", file.display());
+            }
+        }
+        self
+    }
 }
 
 /// Returns all tables that the sequences have figures for.

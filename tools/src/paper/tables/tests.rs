@@ -46,6 +46,7 @@ fn exact() -> Sequence {
             specific_force: [10.0 * noise, 10.0 * noise, 9.8 + 10.0 * noise],
             angular_rate: [noise, noise, (turned / 0.01 + 0.002) as f32 + noise],
             imu_gap: false,
+            other_gap: false,
             fog: turned,
             wheels: [way; 2],
             position: track.position,

@@ -1,0 +1,182 @@
+//! `gyronet train`: weights of a folder of drives, and what they gain.
+
+use super::weights::Files;
+use super::{Common, WriteError, drives, print_json, remark};
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::evaluate::report::DriveErrors;
+use gyronet_tools::network::checkpoint::{Checkpoint, GyroNet};
+use gyronet_tools::network::quantize::quantize;
+use gyronet_tools::python;
+use gyronet_tools::target::bench;
+use gyronet_tools::train::examine::Examined;
+use gyronet_tools::train::gain::Gain;
+use gyronet_tools::train::history::History;
+use gyronet_tools::train::roles::Roles;
+use gyronet_tools::train::{Training, page};
+use std::error::Error;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Train weights on a folder of drives, and show what they gain.
+///
+/// The drives of FOLDER (CSV, any name, with ref_gyr_z) train GyroNet in PyTorch, which is installed into .venv of the
+/// workspace the first time. Of the drives in the order of their names the last quarter is held out, and the one before
+/// it chooses the epoch; --hold-out and --validate choose others. Then come the weight file, the error on the drives held
+/// out over that of static initialisation and of the best classical method, with the spread between drives, and a page.
+/// A drive that cannot be used is left out with the reason, and a folder that cannot carry a training is refused.
+///
+/// A training that was stopped or killed goes on when the same command is given again.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet train drives
+  gyronet train drives --hold-out monday friday --validate sunday --out mine
+  gyronet train drives --seeds 1 2 3 --python /usr/bin/python3
+  gyronet train drives --shards fleet --processes 4    # shards: python -m gyronet_train.shards")]
+pub struct Args {
+    /// Folder of drives.
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// Folder for gyronet.blob, gyronet.safetensors, train.html and the state to go on from [default: target/train].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Drives that are judged at the end and choose nothing, by name or an unmistakable part of it.
+    #[arg(long, num_args = 1.., value_name = "NAME")]
+    hold_out: Vec<String>,
+    /// Drive that chooses epoch and seed.
+    #[arg(long, value_name = "NAME")]
+    validate: Option<String>,
+    /// Passes over the training drives, at most.
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    epochs: u32,
+    /// Stop after so many epochs without a better one.
+    #[arg(long, default_value_t = 6, value_name = "N")]
+    patience: u32,
+    /// Seeds; the best on the drive that chooses is kept.
+    #[arg(long, num_args = 1.., default_values_t = [1], value_name = "N")]
+    seeds: Vec<u64>,
+    /// Train on the Parquet shards of this folder; FOLDER's drives validate and are held out.
+    #[arg(long, value_name = "DIR")]
+    shards: Option<PathBuf>,
+    /// Processes that train together on this machine.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    processes: u32,
+    /// Python with the packages of tools/train/requirements.txt [default: .venv of the workspace, made if need be].
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let roles = Roles::choose(&args.folder, args.shards.is_some(), args.validate.as_deref(), &args.hold_out)?;
+    for refusal in &roles.refused {
+        remark(common, format_args!("left out: {refusal}"))?;
+    }
+    let names = |drives: &[Examined]| drives.iter().map(|drive| drive.name.clone()).collect::<Vec<_>>();
+    remark(
+        common,
+        format_args!(
+            "trains: {}; chooses: {}; held out: {}",
+            args.shards
+                .as_ref()
+                .map_or_else(|| names(&roles.train).join(" "), |path| path.display().to_string()),
+            roles.validate.name,
+            names(&roles.held_out).join(" ")
+        ),
+    )?;
+    let out = args.out.clone().unwrap_or_else(|| bench::workspace().join("target/train"));
+    std::fs::create_dir_all(&out).map_err(WriteError::to(&out))?;
+    python_training(args, common, &roles, &out)?;
+
+    let [checkpoint, blob, history, report] =
+        ["gyronet.safetensors", "gyronet.blob", "gyronet.history.json", "train.html"]
+            .map(|name| out.join(name));
+    let (bytes, _) = quantize(&Checkpoint::<GyroNet>::read(&checkpoint)?)?;
+    std::fs::write(&blob, &bytes).map_err(WriteError::to(&blob))?;
+    let history = History::read(&history)?;
+    let networks = Files { weights: Some(blob.clone()), checkpoint: Some(checkpoint) };
+    let gain = |drives: &[Examined]| gain(drives, &networks, common);
+    let (held_out, validation) = (gain(&roles.held_out)?, gain(std::slice::from_ref(&roles.validate))?);
+    let name = args.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let training = Training {
+        name,
+        roles: &roles,
+        history: &history,
+        gain: &held_out,
+        validation: &validation,
+        bytes: bytes.len(),
+    };
+    std::fs::write(&report, page(&training)).map_err(WriteError::to(&report))?;
+    let mut stdout = std::io::stdout().lock();
+    if common.json {
+        let refused: Vec<String> = roles.refused.iter().map(ToString::to_string).collect();
+        let json = serde_json::json!({
+            "train": names(&roles.train), "validate": roles.validate.name, "refused": refused,
+            "held_out": held_out, "validation": validation, "seconds": history.seconds(),
+            "files": { "weights": blob, "page": report },
+        });
+        return print_json(&mut stdout, &json);
+    }
+    writeln!(stdout, "1 s error over static initialisation's on {}:", held_out.drives.join(", "))?;
+    for ratio in &held_out.over_static {
+        writeln!(stdout, "  {:<26}{}", ratio.method, ratio.all)?;
+    }
+    if let Some(ours) = held_out.over_best_classical {
+        writeln!(stdout, "sent for navigation, over the best classical method: {ours}")?;
+    }
+    writeln!(
+        stdout,
+        "weights: {} ({} bytes; `gyronet device weights` sends them to a board)",
+        blob.display(),
+        bytes.len()
+    )?;
+    Ok(writeln!(stdout, "page: {}", report.display())?)
+}
+
+/// Trains in Python. Its progress bar and lines go to standard error.
+fn python_training(args: &Args, common: Common, roles: &Roles, out: &Path) -> super::Result {
+    let (environment, source) = (bench::workspace().join(".venv"), bench::workspace().join("tools/train"));
+    let mut packages = vec!["torch", "numpy", "safetensors", "tqdm"];
+    packages.extend(args.shards.as_ref().map(|_| "pyarrow"));
+    let requirements = source.join("requirements.txt");
+    let python = python::interpreter(args.python.as_deref(), &environment, &requirements, &packages)?;
+    let mut command = Command::new(&python);
+    command.env("PYTHONPATH", source);
+    if args.processes > 1 {
+        let processes = args.processes.to_string();
+        command.args(["-m", "torch.distributed.run", "--standalone", "--nproc_per_node", &processes]);
+    }
+    command.args(["-m", "gyronet_train"]).arg(&args.folder).arg("--out").arg(out);
+    command.args(["--validate", &roles.validate.name]);
+    match &args.shards {
+        Some(folder) => command.arg("--shards").arg(folder),
+        None => command.arg("--train").args(roles.train.iter().map(|drive| &drive.name)),
+    };
+    for (option, value) in [("--epochs", args.epochs), ("--patience", args.patience)] {
+        command.args([option, &value.to_string()]);
+    }
+    command.arg("--seeds").args(args.seeds.iter().map(ToString::to_string));
+    if common.quiet {
+        command.env("TQDM_DISABLE", "1").stdout(Stdio::null());
+    } else {
+        command.stdout(Stdio::from(std::io::stderr()));
+    }
+    let status = command.status().map_err(WriteError::to(&python))?;
+    if status.success() {
+        Ok(())
+    } else {
+        Err(format!("training stopped ({status}); the reason stands above").into())
+    }
+}
+
+/// What the weights gain on some drives.
+fn gain(drives: &[Examined], networks: &Files, common: Common) -> Result<Gain, Box<dyn Error>> {
+    let files: Vec<PathBuf> = drives.iter().map(|drive| drive.path.clone()).collect();
+    let errors = drives::errors(&files, common, |file, bar| {
+        let recording = Recording::read(file)?;
+        let rates = networks.rates_with(&recording, bar)?;
+        Ok(DriveErrors::new(&recording, &rates)?)
+    })?;
+    Ok(Gain::new(&errors))
+}

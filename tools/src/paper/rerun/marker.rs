@@ -1,0 +1,80 @@
+//! This module keeps a marker for each finished step: a file that says from what it was made, so that a step is run again
+//! when its command or one of its inputs has changed, and only then.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+use std::{fs, io};
+
+/// Says from what a step was made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Marker {
+    /// The command and its arguments.
+    pub command: Vec<String>,
+    /// The files that it read, each with its length and the time of its last change.
+    pub inputs: Vec<String>,
+    /// The steps whose results it read, with the hashes of their markers.
+    pub steps: Vec<String>,
+    /// The time that it took, s.
+    pub seconds: f64,
+}
+
+impl Marker {
+    /// Returns the marker of a step that would be run now.
+    ///
+    /// # Errors
+    /// The file system's error, of a file that cannot be read.
+    pub fn of(command: Vec<String>, inputs: &[PathBuf], steps: Vec<String>) -> io::Result<Self> {
+        let inputs = inputs.iter().map(|path| stamp(path)).collect::<io::Result<_>>()?;
+        Ok(Self { command, inputs, steps, seconds: 0.0 })
+    }
+
+    /// Reads the marker of a finished step; `None` where there is none that can be read.
+    #[must_use]
+    pub fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice(&fs::read(path).ok()?).ok()
+    }
+
+    /// Writes the marker, whole or not at all.
+    ///
+    /// # Errors
+    /// The file system's error.
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        let unfinished = path.with_extension("tmp");
+        fs::write(&unfinished, serde_json::to_string_pretty(self)? + "\n")?;
+        fs::rename(unfinished, path)
+    }
+
+    /// Says whether two markers are of the same command on the same inputs.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.hash() == other.hash()
+    }
+
+    /// Returns the hash of all but the time.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        let mut hash = Sha256::new();
+        for list in [&self.command, &self.inputs, &self.steps] {
+            for text in list {
+                hash.update((text.len() as u64).to_le_bytes());
+                hash.update(text);
+            }
+            hash.update(u64::MAX.to_le_bytes());
+        }
+        hash.finalize().iter().take(16).fold(String::new(), |mut text, byte| {
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{byte:02x}");
+            text
+        })
+    }
+}
+
+fn stamp(path: &Path) -> io::Result<String> {
+    let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
+    let data = fs::metadata(path).map_err(named)?;
+    let changed = data.modified().map_err(named)?.duration_since(UNIX_EPOCH).unwrap_or_default();
+    Ok(format!("{} {} bytes {} ns", path.display(), data.len(), changed.as_nanos()))
+}

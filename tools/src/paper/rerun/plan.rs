@@ -1,0 +1,229 @@
+//! This module lists the steps from a data set's files to its tables, as data: each step is one command.
+
+use super::split::{Role, Split};
+use crate::simulate::layout::Layout;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Names the program of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Program {
+    /// This command itself.
+    Gyronet,
+    /// A Python with PyTorch, and `tools/train` on its path.
+    Python,
+}
+
+/// Holds an argument, or some that belong together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Argument {
+    /// It is always given.
+    Always(String),
+    /// They are given if another step has been finished.
+    If(String, Vec<String>),
+}
+
+/// Holds a step.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    /// Its name.
+    pub name: String,
+    /// The program.
+    pub program: Program,
+    /// The arguments.
+    pub arguments: Vec<Argument>,
+    /// The files that it reads, beside what other steps have made.
+    pub inputs: Vec<PathBuf>,
+    /// The step without which this one cannot be run.
+    pub needs: Option<String>,
+    /// The file that it makes, if it makes one.
+    pub output: Option<PathBuf>,
+}
+
+/// Says how to train.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Effort {
+    /// Epochs of GyroNet, for each of its seeds.
+    pub gyronet_epochs: u32,
+    /// Seeds of GyroNet, from 1 on; the best is kept.
+    pub gyronet_seeds: u32,
+    /// Epochs of FoGNet.
+    pub fognet_epochs: u32,
+    /// Steps of lwoi's two processes.
+    pub lwoi_steps: u32,
+    /// The processes see one in so many windows: their memory and time grow with the square of the windows and more.
+    pub lwoi_every: u32,
+    /// Steps of each of RINS-W's detectors.
+    pub rinsw_steps: u32,
+}
+
+impl Effort {
+    /// As the numbers of `tools/train/README.md` were made.
+    pub const FULL: Self = Self {
+        gyronet_epochs: 20,
+        gyronet_seeds: 3,
+        fognet_epochs: 14,
+        lwoi_steps: 100,
+        lwoi_every: 2,
+        rinsw_steps: 1200,
+    };
+    /// For a trial: every step is run, and nothing is trained well.
+    pub const TRIAL: Self = Self {
+        gyronet_epochs: 1,
+        gyronet_seeds: 1,
+        fognet_epochs: 1,
+        lwoi_steps: 5,
+        lwoi_every: 2,
+        rinsw_steps: 10,
+    };
+}
+
+/// Chooses the uses of sequences.
+type Choice = fn(Role) -> bool;
+
+/// Builds a step.
+struct Builder(Step);
+
+impl Builder {
+    fn new(name: String, program: Program) -> Self {
+        Self(Step { name, program, arguments: Vec::new(), inputs: Vec::new(), needs: None, output: None })
+    }
+
+    fn text(mut self, texts: &[&dyn ToString]) -> Self {
+        self.0.arguments.extend(texts.iter().map(|text| Argument::Always(text.to_string())));
+        self
+    }
+
+    fn given(mut self, arguments: impl IntoIterator<Item = Argument>) -> Self {
+        self.0.arguments.extend(arguments);
+        self
+    }
+
+    fn needs(mut self, step: String) -> Self {
+        self.0.needs = Some(step);
+        self
+    }
+
+    fn makes(mut self, output: PathBuf) -> Step {
+        self.0.output = Some(output);
+        self.0
+    }
+}
+
+/// Returns the steps for a data set; all that they make goes below `out`. `inputs` lists the files of a sequence.
+#[must_use]
+pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) -> Vec<PathBuf>) -> Vec<Step> {
+    let set = match split.layout {
+        Layout::Kaist => "kaist",
+        Layout::Nclt => "nclt",
+    };
+    let out = out.join(set);
+    let step = |name: &str| format!("{set}/{name}");
+    let drives = out.join("drives");
+    let csv = |name: &str| format!("{name}.csv");
+    let show = |path: &Path| path.display().to_string();
+    let used = |role: Choice| split.members.iter().filter(move |member| role(member.role));
+    // What a sequence's step leaves, one argument for each sequence that could be read.
+    let of = |role: Choice, before: Option<&str>, text: &dyn Fn(&super::split::Member) -> String| {
+        let arguments = used(role).map(|member| {
+            let texts = before.map(str::to_owned).into_iter().chain([text(member)]).collect();
+            Argument::If(step(&member.name), texts)
+        });
+        arguments.collect::<Vec<_>>()
+    };
+    let (train, validate, tables): (Choice, Choice, Choice) =
+        (|role| role == Role::Train, |role| role == Role::Validate, |role| role != Role::Train);
+    let mut steps = Vec::new();
+    for member in &split.members {
+        let import = Builder::new(step(&member.name), Program::Gyronet).text(&[
+            &"import",
+            &set,
+            &show(&member.folder),
+        ]);
+        let mut import = if member.role == Role::Test {
+            import.0
+        } else {
+            let file = drives.join(csv(&member.name));
+            import.text(&[&"--training", &"--out", &show(&file)]).makes(file)
+        };
+        import.inputs = inputs(&member.folder);
+        steps.push(import);
+    }
+
+    let networks = out.join("networks");
+    let seeds: Vec<String> = (1..=effort.gyronet_seeds).map(|seed| seed.to_string()).collect();
+    let gyronet = Builder::new(step("gyronet"), Program::Python)
+        .text(&[&"-m", &"gyronet_train", &show(&drives), &"--out", &show(&networks)])
+        .text(&[&"--epochs", &effort.gyronet_epochs, &"--seeds"])
+        .given(seeds.into_iter().map(Argument::Always))
+        .text(&[&"--train"])
+        .given(of(train, None, &|member| csv(&member.name)))
+        .text(&[&"--validate"])
+        .given(of(validate, None, &|member| csv(&member.name)));
+    steps.push(gyronet.makes(networks.join("gyronet.safetensors")));
+    let simulated = split.members.iter().any(|member| member.simulated);
+    let fognet = Builder::new(step("fognet"), Program::Python)
+        .text(&[&"-m", &"gyronet_train.fognet", &"drives", &"--out", &show(&networks)])
+        .text(&[&"--epochs", &effort.fognet_epochs])
+        .given(simulated.then(|| Argument::Always("--simulated".into())))
+        .text(&[&"--train"])
+        .given(of(train, None, &|member| show(&drives.join(csv(&member.name)))))
+        .text(&[&"--validate"])
+        .given(of(validate, None, &|member| show(&drives.join(csv(&member.name)))));
+    steps.push(fognet.makes(networks.join("fognet.safetensors")));
+    for network in ["gyronet", "fognet"] {
+        let [from, to] =
+            [networks.join(format!("{network}.safetensors")), networks.join(format!("{network}.blob"))];
+        let quantize = Builder::new(step(&format!("{network}-weights")), Program::Gyronet)
+            .text(&[&"quantize", &show(&from), &"--out", &show(&to)])
+            .needs(step(network));
+        steps.push(quantize.makes(to));
+    }
+
+    let mut methods = Vec::new();
+    if split.layout == Layout::Kaist {
+        let rivals = [
+            ("lwoi", "model", vec![("--steps", effort.lwoi_steps), ("--every", effort.lwoi_every)]),
+            ("rinsw", "rinsw", vec![("--steps", effort.rinsw_steps)]),
+        ];
+        for (name, mode, options) in rivals {
+            let folder = out.join(name);
+            let mut rival = Builder::new(step(name), Program::Python).text(&[
+                &"-m",
+                &format!("gyronet_train.{name}"),
+                &"--out",
+                &show(&folder),
+            ]);
+            for (option, value) in options {
+                rival = rival.text(&[&option, &value]);
+            }
+            if name == "rinsw" {
+                rival = rival.text(&[&"--modes", &mode]);
+            }
+            let rival = rival
+                .text(&[&"--train"])
+                .given(of(train, None, &|member| show(&member.folder)))
+                .text(&[&"--test"])
+                .given(of(tables, None, &|member| show(&member.folder)));
+            steps.push(rival.makes(folder.join(format!("{name}.json"))));
+            let method = format!("{name}={}", show(&folder.join(mode)));
+            methods.push(Argument::If(step(name), vec!["--method".into(), method]));
+        }
+    }
+
+    let report = out.join("report");
+    let weights = [("gyronet", "--weights"), ("fognet", "--fog-weights")].map(|(network, option)| {
+        let file = show(&networks.join(format!("{network}.blob")));
+        Argument::If(step(&format!("{network}-weights")), vec![option.to_owned(), file])
+    });
+    let tables = Builder::new(step("tables"), Program::Gyronet)
+        .text(&[&"tables"])
+        .given(of(tables, None, &|member| show(&member.folder)))
+        .given(of(train, Some("--train"), &|member| show(&member.folder)))
+        .given(weights)
+        .given(methods)
+        .text(&[&"--out", &show(&report)]);
+    steps.push(tables.makes(report.join("report.html")));
+    steps
+}

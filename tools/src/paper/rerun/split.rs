@@ -1,0 +1,167 @@
+//! This module finds the sequences that the paper used in a folder, by their names, and splits them as the paper does:
+//! KAIST Urban 06 to 13 to train, 14 to 17 to validate, 18 to 37 to test; of NCLT's 27 dates the first 18 to train and 9
+//! to test. The paper names no sequences of NCLT to validate with; here these are the last two of the 18.
+
+use crate::drive::error::{DataError, DataFault};
+use crate::paper::sequence;
+use crate::simulate::layout::{Layout, MARKER};
+use serde::Serialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The dates of NCLT's sequences.
+const DATES: [&str; 27] = [
+    "2012-01-08",
+    "2012-01-15",
+    "2012-01-22",
+    "2012-02-02",
+    "2012-02-04",
+    "2012-02-05",
+    "2012-02-12",
+    "2012-02-18",
+    "2012-02-19",
+    "2012-03-17",
+    "2012-03-25",
+    "2012-03-31",
+    "2012-04-29",
+    "2012-05-11",
+    "2012-05-26",
+    "2012-06-15",
+    "2012-08-04",
+    "2012-08-20",
+    "2012-09-28",
+    "2012-10-28",
+    "2012-11-04",
+    "2012-11-16",
+    "2012-11-17",
+    "2012-12-01",
+    "2013-01-10",
+    "2013-02-23",
+    "2013-04-05",
+];
+/// The first of [`DATES`] to validate with, and the first to test with.
+const DATES_SPLIT: [usize; 2] = [16, 18];
+
+/// Names what a sequence is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Its truth trains the networks and the rivals.
+    Train,
+    /// Its truth chooses among epochs and seeds.
+    Validate,
+    /// It is used for the tables alone.
+    Test,
+}
+
+/// Holds a sequence that was found.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Member {
+    /// Its folder's name, which may go on after the paper's: urban28-pankyo.
+    pub name: String,
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Its use.
+    pub role: Role,
+    /// Says whether it is simulated.
+    pub simulated: bool,
+}
+
+/// Holds what was found of a data set.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Split {
+    /// The data set.
+    pub layout: Layout,
+    /// The sequences found, in the paper's order.
+    pub members: Vec<Member>,
+    /// The names of those that the paper used and that are not there.
+    pub missing: Vec<String>,
+    /// The folders and files that are not used, and why.
+    pub unused: Vec<String>,
+}
+
+/// Says why nothing can be trained.
+#[derive(Debug, thiserror::Error)]
+pub enum SplitError {
+    /// The folder cannot be read.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// There is no sequence for a purpose that is needed.
+    #[error("{root}: no sequence to {purpose} with, of {names}")]
+    None {
+        /// The folder.
+        root: String,
+        /// The purpose.
+        purpose: &'static str,
+        /// The names of the sequences that serve it.
+        names: String,
+    },
+}
+
+/// Returns the paper's names of a data set's sequences, and their use.
+fn expected(layout: Layout) -> Vec<(String, Role)> {
+    let role = |k: usize, [validate, test]: [usize; 2]| match k {
+        k if k < validate => Role::Train,
+        k if k < test => Role::Validate,
+        _ => Role::Test,
+    };
+    match layout {
+        Layout::Kaist => (6..=37).map(|k| (format!("urban{k:02}"), role(k, [14, 18]))).collect(),
+        Layout::Nclt => {
+            DATES.iter().enumerate().map(|(k, date)| ((*date).to_owned(), role(k, DATES_SPLIT))).collect()
+        }
+    }
+}
+
+/// Says whether a folder's name is that of a sequence: the same, or the same and more that is no digit.
+fn is_named(folder: &str, name: &str) -> bool {
+    folder.strip_prefix(name).is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_digit()))
+}
+
+impl Split {
+    /// Finds the sequences directly below a folder.
+    ///
+    /// # Errors
+    /// [`SplitError`] if the folder cannot be read, or nothing is there to train or to validate with.
+    pub fn find(layout: Layout, root: &Path) -> Result<Self, SplitError> {
+        let error = |source: std::io::Error| DataError::of(root.display(), DataFault::Io(source));
+        let entries = fs::read_dir(root).map_err(error)?;
+        let mut folders: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        folders.sort();
+        let (mut members, mut missing): (Vec<Member>, Vec<String>) = (Vec::new(), Vec::new());
+        let mut unused = Vec::new();
+        let all = expected(layout);
+        for (expected, role) in &all {
+            let before = members.len();
+            for folder in folders.extract_if(.., |folder| is_named(&name(folder), expected)) {
+                let name = name(&folder);
+                match sequence::layout(&folder) {
+                    Ok(found) if found == layout && members.len() == before => {
+                        let simulated = folder.join(MARKER).is_file();
+                        members.push(Member { name, folder, role: *role, simulated });
+                    }
+                    Ok(found) if found == layout => unused.push(format!("{name}: a second {expected}")),
+                    Ok(found) => unused.push(format!("{name}: has the layout of {found:?}")),
+                    Err(error) => unused.push(error.to_string()),
+                }
+            }
+            if members.len() == before {
+                missing.push(expected.clone());
+            }
+        }
+        unused.extend(folders.iter().map(|folder| format!("{}: not in the paper", name(folder))));
+        for (needed, purpose) in [(Role::Train, "train"), (Role::Validate, "validate")] {
+            if !members.iter().any(|member| member.role == needed) {
+                let names: Vec<&str> =
+                    all.iter().filter(|(_, role)| *role == needed).map(|(name, _)| name.as_str()).collect();
+                let names = names.join(", ");
+                return Err(SplitError::None { root: root.display().to_string(), purpose, names });
+            }
+        }
+        Ok(Self { layout, members, missing, unused })
+    }
+}
+
+fn name(folder: &Path) -> String {
+    folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,84 @@
+//! Some steps are Python programs of this repository: [`interpreter`] finds a Python for them, or makes a virtual
+//! environment.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The reason why there is no Python for a step.
+#[derive(Debug, thiserror::Error)]
+pub enum PythonError {
+    /// A program cannot be started.
+    #[error("{}: {source}", program.display())]
+    Start {
+        /// The program.
+        program: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// The interpreter lacks a package.
+    #[error("{}: {reason} (needed: {})", python.display(), packages.join(", "))]
+    Packages {
+        /// The interpreter.
+        python: PathBuf,
+        /// What it says.
+        reason: String,
+        /// All that are needed.
+        packages: Vec<String>,
+    },
+    /// A step of making the environment failed; its own message stands before this one.
+    #[error("{}: could not be made: {step} failed (without network, name a Python that has all: --python)", environment.display())]
+    Environment {
+        /// The folder.
+        environment: PathBuf,
+        /// The step.
+        step: &'static str,
+    },
+}
+
+/// Returns an interpreter that imports all `packages`: `given`, or that of the virtual environment, which is made and
+/// filled with `requirements` where it is not there or not whole. What pip prints goes to standard error.
+///
+/// # Errors
+/// [`PythonError`].
+pub fn interpreter(
+    given: Option<&Path>,
+    environment: &Path,
+    requirements: &Path,
+    packages: &[&str],
+) -> Result<PathBuf, PythonError> {
+    if let Some(python) = given {
+        return imports(python, packages).map(|()| python.to_owned());
+    }
+    let python = environment.join("bin/python");
+    if python.exists() && imports(&python, packages).is_ok() {
+        return Ok(python);
+    }
+    let made = |step, command: &mut Command| match run(command)? {
+        true => Ok(()),
+        false => Err(PythonError::Environment { environment: environment.to_owned(), step }),
+    };
+    made("python3 -m venv", Command::new("python3").args(["-m", "venv"]).arg(environment))?;
+    let install = ["-m", "pip", "install", "--disable-pip-version-check", "-r"];
+    made("pip install", Command::new(&python).args(install).arg(requirements))?;
+    imports(&python, packages).map(|()| python)
+}
+
+/// Runs a command with its output on standard error; says whether it succeeded.
+fn run(command: &mut Command) -> Result<bool, PythonError> {
+    let status = command.stdout(Stdio::from(std::io::stderr())).status();
+    let program = || command.get_program().into();
+    Ok(status.map_err(|source| PythonError::Start { program: program(), source })?.success())
+}
+
+fn imports(python: &Path, packages: &[&str]) -> Result<(), PythonError> {
+    let import = format!("import {}", packages.join(", "));
+    let output = Command::new(python).args(["-c", &import]).output();
+    let output = output.map_err(|source| PythonError::Start { program: python.to_owned(), source })?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let text = String::from_utf8_lossy(&output.stderr);
+    let reason = text.trim().lines().last().unwrap_or("ended without a word").to_owned();
+    let packages = packages.iter().map(|package| (*package).to_owned()).collect();
+    Err(PythonError::Packages { python: python.to_owned(), reason, packages })
+}

@@ -1,0 +1,174 @@
+//! This module says whether a drive can be trained on, and if not, why.
+
+use crate::drive::DT;
+use crate::drive::error::DataError;
+use crate::drive::recording::{Recording, Row};
+use crate::drive::replay::{Replay, ReplayError};
+use crate::evaluate::ablation::Uncorrected;
+use crate::evaluate::heading_error::{PLAUSIBLE_10S_RAD, Reference};
+use gyronet::bias::STATIC_SAMPLES;
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::{PERIOD_US, RATE_HZ};
+use std::path::{Path, PathBuf};
+
+/// A drive needs at least so much time after static initialisation, s.
+pub const SHORTEST_S: f64 = 30.0;
+/// Times between samples may differ from 10 ms by at most this, microseconds.
+const JITTER_US: u64 = 1_000;
+/// A second turns if its reference does so by more than this, rad: a standing gyro's noise is no turn.
+const TURNING_RAD: f64 = 0.02;
+/// Rows in which static initialisation is over.
+const STARTED: usize = STATIC_SAMPLES as usize + RATE_HZ as usize;
+
+/// The reason why a drive cannot be trained on.
+#[derive(Debug, thiserror::Error)]
+pub enum Refusal {
+    /// It is no drive.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// It does not stand still in the first 3 s.
+    #[error(transparent)]
+    Start(#[from] ReplayError),
+    /// It has no true yaw rate.
+    #[error("{path}: line {line}: no ref_gyr_z, the true yaw rate, which a training needs in every row")]
+    NoReference {
+        /// The recording.
+        path: String,
+        /// The first line without it.
+        line: u64,
+    },
+    /// Rows are missing.
+    #[error("{path}: line {line}: {ms:.1} ms after the row before; a training needs a row every 10 ms")]
+    Gap {
+        /// The recording.
+        path: String,
+        /// The line after the first gap.
+        line: u64,
+        /// The time from the row before.
+        ms: f64,
+    },
+    /// It is too short.
+    #[error("{path}: {seconds:.0} s after the 3 s at rest; a training needs {SHORTEST_S:.0}")]
+    TooShort {
+        /// The recording.
+        path: String,
+        /// Its length after static initialisation.
+        seconds: f64,
+    },
+    /// Gyro and reference do not belong together.
+    #[error(
+        "{path}: ref_gyr_z turns otherwise than gyr_z, by {rad:.2} rad in 10 s: another unit or sign (rad/s, positive to \
+         the left), or another drive"
+    )]
+    Disagrees {
+        /// The recording.
+        path: String,
+        /// The typical difference.
+        rad: f64,
+    },
+}
+
+/// Describes a drive that can be trained on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Examined {
+    /// The file.
+    pub path: PathBuf,
+    /// The file's name without `.csv`.
+    pub name: String,
+    /// Its length after static initialisation, s.
+    pub seconds: f64,
+    /// The turns to either side together, rad.
+    pub turned_rad: f64,
+}
+
+/// Examines a drive.
+///
+/// # Errors
+/// [`Refusal`], which names the file and, where there is one, the line.
+pub fn examine(path: &Path) -> Result<Examined, Refusal> {
+    let mut recording = Recording::read(path)?;
+    let named = || recording.path.clone();
+    if let Some(row) = recording.rows.iter().find(|row| row.reference.is_none()) {
+        return Err(Refusal::NoReference { path: named(), line: row.line });
+    }
+    let period = |pair: &[Row]| pair[1].sample.time.0 - pair[0].sample.time.0;
+    let mut pairs = recording.rows.windows(2);
+    if let Some(pair) = pairs.find(|pair| period(pair).abs_diff(PERIOD_US) > JITTER_US) {
+        let (line, ms) = (pair[1].line, 1e-3 * period(pair) as f64);
+        return Err(Refusal::Gap { path: named(), line, ms });
+    }
+    let moving = recording.rows.get(STATIC_SAMPLES as usize..).unwrap_or_default();
+    let seconds = moving.len() as f64 * DT;
+    if seconds < SHORTEST_S {
+        return Err(Refusal::TooShort { path: named(), seconds });
+    }
+    let gyro: Vec<f64> = moving.iter().map(|row| row.sample.angular_rate[2].rad_per_sec()).collect();
+    let reference: Vec<f64> = moving.iter().filter_map(|row| row.reference).collect();
+    recording.rows.truncate(STARTED);
+    let start = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Uncorrected, || {})?;
+    let bias = start.gyro_bias[2].rad_per_sec();
+    let still: Vec<f64> = gyro.iter().map(|rate| rate - bias).collect();
+    let seconds_turned =
+        reference.chunks_exact(RATE_HZ as usize).map(|second| second.iter().sum::<f64>().abs() * DT);
+    let turned_rad =
+        seconds_turned.filter(|turned| *turned > TURNING_RAD).fold(0.0, |sum, turned| sum + turned);
+    let typical = Reference::Rate(reference).errors(&still).and_then(|errors| errors.typical_10s());
+    if let Some(rad) = typical.filter(|rad| *rad > PLAUSIBLE_10S_RAD) {
+        return Err(Refusal::Disagrees { path: recording.path, rad });
+    }
+    Ok(Examined { path: path.to_owned(), name: recording.name().to_owned(), seconds, turned_rad })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write;
+
+    /// Examines a made drive with a row every 10 ms of (yaw rate, reference) by second of the drive.
+    fn examined(name: &str, seconds: u32, rates: impl Fn(f64) -> (f64, String)) -> Result<Examined, String> {
+        let mut csv = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z\n");
+        for k in 0..seconds * RATE_HZ {
+            let noise = 1e-3 * f64::from(k % 3) - 1e-3;
+            let time = f64::from(k) * DT;
+            let (gyro, reference) = rates(time);
+            // Every axis flickers as a sensor does; equal readings are stuck ones.
+            let (up, gyro) = (9.8 + 10.0 * noise, gyro + noise);
+            // Writing to a string does not fail.
+            let _ = writeln!(csv, "{time:.2},{noise},{noise},{up},{noise},{noise},{gyro},{reference}");
+        }
+        let path = std::env::temp_dir().join(format!("gyronet-examine-{}-{name}.csv", std::process::id()));
+        std::fs::write(&path, csv).expect("a writable folder");
+        let result = examine(&path).map_err(|refusal| refusal.to_string());
+        std::fs::remove_file(&path).expect("the file just written");
+        result
+    }
+
+    /// Half a turn a minute, from the fourth second on.
+    fn turn(time: f64) -> f64 {
+        if time < 3.0 { 0.0 } else { 0.05 }
+    }
+
+    #[test]
+    fn a_drive_that_carries_a_training_is_measured() {
+        let drive = examined("good", 63, |time| (turn(time) + 0.002, turn(time).to_string())).expect("good");
+        assert!((drive.seconds - 60.0).abs() < 0.02, "{drive:?}");
+        assert!((drive.turned_rad - 3.0).abs() < 0.06, "{drive:?}");
+    }
+
+    #[test]
+    fn a_drive_that_carries_none_is_refused_with_the_reason() {
+        let same = |rate: f64| (rate, rate.to_string());
+        let without = |time| (0.0, if time < 20.0 { "0".to_owned() } else { String::new() });
+        for (name, seconds, reason, rates) in [
+            ("blind", 63, "line 2002: no ref_gyr_z", &without as &dyn Fn(f64) -> (f64, String)),
+            ("short", 20, "17 s after the 3 s at rest; a training needs 30", &|time| same(turn(time))),
+            ("moving", 63, "starts moving: line ", &|time: f64| same((2.0 * time).sin())),
+            ("mirrored", 63, "another unit or sign", &|time: f64| {
+                (30.0 * turn(time), (-30.0 * turn(time)).to_string())
+            }),
+        ] {
+            let refusal = examined(name, seconds, rates).expect_err(name);
+            assert!(refusal.contains(reason) && refusal.contains(name), "{refusal}");
+        }
+    }
+}

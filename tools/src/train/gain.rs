@@ -1,0 +1,106 @@
+//! This module computes what weights gain on drives that chose nothing in their training.
+
+use crate::evaluate::methods::Method;
+use crate::evaluate::report::DriveErrors;
+use serde::Serialize;
+
+/// Holds the mean over drives, and the standard deviation between them; none for one drive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// The mean.
+    pub mean: f64,
+    /// The standard deviation.
+    pub deviation: Option<f64>,
+}
+
+impl Spread {
+    /// Returns that of some values; `None` where there are none.
+    #[must_use]
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let count = (!values.is_empty()).then_some(values.len() as f64)?;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+        let deviation = (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt());
+        Some(Self { mean, deviation })
+    }
+}
+
+impl std::fmt::Display for Spread {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.3}", self.mean)?;
+        self.deviation.map_or(Ok(()), |deviation| write!(f, " +- {deviation:.3}"))
+    }
+}
+
+/// Holds the 1 s error of a method over that of static initialisation.
+#[derive(Debug, Clone, Serialize)]
+pub struct Ratio {
+    /// The method's name.
+    pub method: &'static str,
+    /// Of each drive.
+    pub drives: Vec<f64>,
+    /// Over all of them.
+    pub all: Spread,
+}
+
+/// Holds the gain on some drives.
+#[derive(Debug, Clone, Serialize)]
+pub struct Gain {
+    /// The drives' names.
+    pub drives: Vec<String>,
+    /// The methods, in the order of the tables.
+    pub over_static: Vec<Ratio>,
+    /// The rate for navigation over the best classical method of each drive.
+    pub over_best_classical: Option<Spread>,
+}
+
+impl Gain {
+    /// The methods that are compared. What stands for the library's own weights is left out.
+    pub const METHODS: [Method; 6] = [
+        Method::STATIC_ZERO_RATE,
+        Method::FIR,
+        Method::FIR_ZERO_RATE,
+        Method::VQF,
+        Method::PROMPT,
+        Method::NAVIGATION,
+    ];
+
+    /// Computes it.
+    #[must_use]
+    pub fn new(drives: &[DriveErrors]) -> Self {
+        let over_static = Self::METHODS.into_iter().filter_map(|method| {
+            let ratio = |drive: &DriveErrors| {
+                let still = drive.methods[Method::STATIC].error.mean_1s_rad?;
+                Some(drive.methods[method].error.mean_1s_rad? / still)
+            };
+            let drives: Vec<f64> = drives.iter().filter_map(ratio).collect();
+            Some(Ratio { method: method.name, all: Spread::of(&drives)?, drives })
+        });
+        let classical: Vec<f64> =
+            drives.iter().filter_map(|drive| Some(drive.over_best_classical?.default.ratio)).collect();
+        Self {
+            drives: drives.iter().map(|drive| drive.name.clone()).collect(),
+            over_static: over_static.collect(),
+            over_best_classical: Spread::of(&classical),
+        }
+    }
+
+    /// Returns the ratio of what is sent for navigation.
+    #[must_use]
+    pub fn sent(&self) -> Option<Spread> {
+        self.over_static.iter().find(|ratio| ratio.method == Method::NAVIGATION.name).map(|ratio| ratio.all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_is_that_between_drives() {
+        let spread = Spread::of(&[0.5, 0.7, 0.9]).expect("three drives");
+        assert_eq!(spread.to_string(), "0.700 +- 0.200");
+        assert_eq!(Spread::of(&[0.5]).expect("one drive").to_string(), "0.500");
+        assert_eq!(Spread::of(&[]), None);
+    }
+}

@@ -1,0 +1,62 @@
+"""Drives as `gyronet import` writes them: pieces between gaps, for GyroNet and for FoGNet."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+from gyronet_train.recordings import load_drive, load_pieces
+from gyronet_train.seconds import DRIVE, STEPS, load_grid, window_rows
+
+GYR_Z, FOG, REFERENCE = DRIVE.index("gyr_z"), DRIVE.index("fog_rad"), DRIVE.index("ref_gyr_z")
+
+
+class Gaps(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.path = Path(temporary.name) / "any name.csv"
+        rows = np.random.default_rng(1).normal(size=(2400, len(DRIVE)))
+        rows[:, 0] = np.arange(2400) / 100
+        self.rows = rows
+
+    def write(self, kept):
+        np.savetxt(self.path, self.rows[kept], delimiter=",", header=",".join(DRIVE), comments="")
+
+    def test_without_a_gap_there_is_one_piece(self):
+        self.write(np.arange(2400))
+        [piece] = load_pieces(self.path)
+        np.testing.assert_array_equal(piece.features, load_drive(self.path).features)
+        self.assertEqual((len(piece.features), len(load_grid(self.path)[0].turn)), (2400, 24))
+
+    def test_pieces_share_the_static_initialisation_of_the_first(self):
+        kept = np.concatenate([np.arange(1010), np.arange(1230, 1300), np.arange(1400, 2400)])
+        self.write(kept)
+        first, second = load_pieces(self.path)
+        bias = self.rows[:300, GYR_Z].mean()
+        error = self.rows[1400:, GYR_Z] - bias - self.rows[1400:, REFERENCE]
+        np.testing.assert_allclose(second.gyro_error, error, atol=1e-5)
+        self.assertEqual((len(first.gyro_error), len(second.gyro_error)), (1010, 1000))
+        with self.assertRaisesRegex(ValueError, "any name.csv: wants an unbroken"):
+            load_drive(self.path)
+
+    def test_seconds_with_a_gap_are_left_out(self):
+        self.write(np.concatenate([np.arange(1010), np.arange(1230, 2400)]))
+        first, second = load_grid(self.path)
+        self.assertEqual((len(first.turn), len(second.turn)), (10, 11))
+        np.testing.assert_allclose(second.turn[0], self.rows[1300:1400, REFERENCE].sum() / 100)
+        np.testing.assert_allclose(second.features[0, 8], self.rows[1300:1400, FOG].sum())
+
+    def test_a_drive_that_begins_with_a_gap_is_named(self):
+        self.write(np.concatenate([np.arange(200), np.arange(250, 2400)]))
+        with self.assertRaisesRegex(ValueError, "any name.csv: wants an unbroken 100 Hz recording of more than 3 s"):
+            load_pieces(self.path)
+
+
+class Windows(unittest.TestCase):
+    def test_the_rows_of_a_window(self):
+        self.assertEqual(window_rows(STEPS, "none").tolist(), list(range(STEPS)))
+        self.assertIsNone(window_rows(STEPS - 1, "none"))
+        self.assertEqual(window_rows(2, "repeat").tolist(), [0, 1] * (STEPS // 2))
+        self.assertEqual(window_rows(2, "edge").tolist(), [0] * (STEPS - 1) + [1])
