@@ -64,10 +64,12 @@ fn trials(test: &str) -> Option<&'static [Trial]> {
 
 /// The README's rows: how each begins, its method, and the place among its numbers of the ratio of both drives to static
 /// initialisation, behind which stand those of each drive.
-const ROWS: [(&str, Method, usize); 2] =
-    [("| sent at once |", Method::PROMPT, 0), ("| sent 70 ms later,", Method::NAVIGATION, 1)];
-/// The place, in the last one, of the ratio to the best classical method.
-const OVER_BEST_CLASSICAL: usize = 0;
+const ROWS: [(&str, Method, usize); 2] = [
+    ("| sent at once |", Method::PROMPT, 1),
+    ("| sent 70 ms later, for navigation |", Method::NAVIGATION, 1),
+];
+/// The sentence that begins so has the ratio to the best classical method as its first number.
+const OVER_BEST_CLASSICAL: &str = "The navigation rate has";
 
 /// Returns the numbers in the README's row that begins so: `(0.78 (0.95 and 0.72)` gives all three.
 fn readme_numbers(row: &str) -> Vec<f64> {
@@ -101,7 +103,7 @@ fn rates_are_as_good_as_the_readme_says() {
         }
     }
     let ours = report.sets[0].over_best_classical.expect("two drives").default;
-    hold(ours.best_classical, ours.ratio, readme_numbers(ROWS[1].0)[OVER_BEST_CLASSICAL]);
+    hold(ours.best_classical, ours.ratio, readme_numbers(OVER_BEST_CLASSICAL)[0]);
 }
 
 #[test]
