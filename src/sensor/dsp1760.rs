@@ -96,6 +96,13 @@ impl Dsp1760 {
         self.framer.receive(byte);
     }
 
+    /// Takes at least one of some bytes, as many as belong together, and returns their number. Call
+    /// [`Dsp1760::next_sample`] until `None` before the next ones.
+    #[inline]
+    pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
+        self.framer.receive_some(bytes)
+    }
+
     /// Returns the next sample, or the reason why an intact frame gives none. Built-in-test messages are skipped.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {

@@ -60,6 +60,25 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         }
     }
 
+    /// Takes the bytes that are needed before there is something to find, at most those given, and returns their number:
+    /// a frame costs two calls instead of one for each byte. Call [`Framer::next_frame`] until `None` before the next
+    /// ones.
+    #[inline]
+    pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
+        if self.used > 0 {
+            self.release();
+        }
+        let wanted = self.needed.saturating_sub(self.buffer.len()).min(bytes.len());
+        if let Some(some) = bytes.get(..wanted).filter(|some| !some.is_empty())
+            && self.buffer.extend_from_slice(some).is_ok()
+        {
+            return wanted;
+        }
+        let Some(first) = bytes.first() else { return 0 };
+        self.receive(*first);
+        1
+    }
+
     /// Returns the next intact frame, if one is complete.
     pub fn next_frame(&mut self) -> Option<&[u8]> {
         if self.is_waiting() { None } else { self.search() }

@@ -45,6 +45,13 @@ impl Mti {
         self.framer.receive(byte);
     }
 
+    /// Takes at least one of some bytes, as many as belong together, and returns their number. Call
+    /// [`Mti::next_sample`] until `None` before the next ones.
+    #[inline]
+    pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
+        self.framer.receive_some(bytes)
+    }
+
     /// Returns the next sample, or the reason why an intact data message gives none. Other messages are skipped.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {

@@ -22,12 +22,20 @@ use gyronet::units::Micros;
 pub fn xsens(data: &[u8]) {
     let mut mti = Mti::new();
     let mut dialogue = XsensDialogue::new();
+    let mut samples = Vec::new();
     for (now, byte) in (0..).zip(data) {
         mti.receive(*byte);
-        while mti.next_sample().is_some() {}
+        samples.extend(core::iter::from_fn(|| mti.next_sample()));
         dialogue.receive(*byte);
         let _ = dialogue.poll(Micros(now * 10_000));
     }
+    // Taken several at a time, the same bytes give the same samples.
+    let (mut rest, mut mti, mut again) = (data, Mti::new(), Vec::new());
+    while !rest.is_empty() {
+        rest = &rest[mti.receive_some(rest)..];
+        again.extend(core::iter::from_fn(|| mti.next_sample()));
+    }
+    assert_eq!(format!("{again:?}"), format!("{samples:?}"));
     if let Ok(message) = MtData2::parse(data) {
         // A message that was read is written and read as the same; NaN is not equal to itself.
         let frame = message.emit_as(Precision::Double);
@@ -51,13 +59,20 @@ pub fn xsens_seeds() -> Vec<Seed> {
 /// is made to fit.
 pub fn dsp1760(data: &[u8]) {
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
+    let mut samples = Vec::new();
     let mut dialogue = KvhDialogue::new(Dsp1760Config::DEFAULT);
     for (now, byte) in (0..).zip(data) {
         part.receive(*byte);
-        while part.next_sample().is_some() {}
+        samples.extend(core::iter::from_fn(|| part.next_sample()));
         dialogue.receive(*byte);
         let _ = dialogue.poll(Micros(now * 10_000));
     }
+    let (mut rest, mut part, mut again) = (data, Dsp1760::new(Dsp1760Config::DEFAULT), Vec::new());
+    while !rest.is_empty() {
+        rest = &rest[part.receive_some(rest)..];
+        again.extend(core::iter::from_fn(|| part.next_sample()));
+    }
+    assert_eq!(format!("{again:?}"), format!("{samples:?}"));
     let _ = (Command::parse(data), Reply::parse(data));
     let mut frame = data.to_vec();
     frame.extend(CRC_32_MPEG_2.checksum(data).to_be_bytes());

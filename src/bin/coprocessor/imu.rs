@@ -65,8 +65,12 @@ impl Imu {
                 if let Some(sample) = mti.next_sample() {
                     return Some(sample.map_err(drop));
                 }
-                *turn = turn.checked_sub(1)?;
-                mti.receive(port.receive()?);
+                let taken = mti.receive_some(port.received());
+                if taken == 0 {
+                    return None;
+                }
+                port.consume(taken);
+                *turn = turn.checked_sub(taken)?;
             },
             Self::Spi(part) => {
                 *turn = turn.checked_sub(LOOK)?;

@@ -138,8 +138,11 @@ impl Output {
             let _ = coprocessor.can(&frame, now);
         }
         for _ in 0..serial::RECEIVED {
-            let Some(byte) = self.fog.receive() else { break };
-            self.dsp1760.receive(byte);
+            let taken = self.dsp1760.receive_some(self.fog.received());
+            if taken == 0 {
+                break;
+            }
+            self.fog.consume(taken);
             while let Some(sample) = self.dsp1760.next_sample() {
                 match sample {
                     Ok(sample) => {

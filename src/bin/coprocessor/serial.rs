@@ -79,23 +79,27 @@ pub fn start(
 }
 
 impl Port {
-    /// The next received byte.
+    /// Received bytes that lie behind each other; none if none waits.
     #[inline]
-    pub fn receive(&mut self) -> Option<u8> {
-        let Memory { received, faults, .. } = self.memory;
-        if self.emulated {
-            let byte = received.pop()?;
-            faults.release(&self.usart);
-            return Some(byte);
-        }
+    pub fn received(&mut self) -> &[u8] {
+        let received = &self.memory.received;
         let waiting = received.len();
-        if waiting > RECEIVED - AHEAD {
+        if !self.emulated && waiting > RECEIVED - AHEAD {
             // The stream is, or soon will be, where the oldest bytes lie.
             received.drop_oldest(waiting);
             self.overwritten = self.overwritten.saturating_add(waiting as u32);
-            return None;
         }
-        received.pop()
+        received.oldest()
+    }
+
+    /// Drops received bytes that have been used.
+    #[inline]
+    pub fn consume(&mut self, count: usize) {
+        let Memory { received, faults, .. } = self.memory;
+        received.drop_oldest(count);
+        if self.emulated {
+            faults.release(&self.usart);
+        }
     }
 
     /// Bytes that came damaged, or when there was no room for them.
@@ -143,7 +147,8 @@ impl ReadReady for Port {
 impl Read for Port {
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
         let Some(first) = bytes.first_mut() else { return Ok(0) };
-        *first = self.receive().ok_or(ErrorKind::TimedOut)?;
+        *first = *self.received().first().ok_or(ErrorKind::TimedOut)?;
+        self.consume(1);
         Ok(1)
     }
 }

@@ -40,8 +40,11 @@ impl Wheels {
     /// Drops speeds that are too old. Call it before new speeds are taken.
     pub fn expire(&mut self, now: Micros) {
         for slot in &mut self.speeds {
-            let old = |(_, at): &(_, Micros)| now.since(*at) > self.rule.timeout;
-            *slot = slot.take_if(|speed| !old(speed));
+            if let Some((_, at)) = slot
+                && now.since(*at) > self.rule.timeout
+            {
+                *slot = None;
+            }
         }
         if !self.complete() {
             self.still_since = None;
