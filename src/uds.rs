@@ -30,10 +30,11 @@ mod routines;
 pub mod security;
 mod server;
 mod services;
+mod session;
 pub mod settings;
 pub mod signature;
 mod troubles;
 
 pub use response::Nrc;
 pub use server::Server;
-pub use services::Session;
+pub use session::Session;

@@ -1,7 +1,8 @@
 //! These services control the server itself: session, restart, messages of the board, memory of troubles.
 
 use super::response::{Nrc, Response, exactly, nrc, put};
-use super::services::{SUPPRESS, Services, Session};
+use super::services::Services;
+use super::session::Session;
 use crate::service::message::Request;
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::ResetType;
@@ -11,12 +12,11 @@ use embedded_storage::nor_flash::NorFlash;
 const P2_MS: u16 = 50;
 const P2_STAR_10_MS: u16 = 500;
 
-/// Each returns whether a positive response is wanted.
 impl Services {
     /// Enters a session, which ends the one before.
-    pub(super) fn session_control(&mut self, rest: &[u8], out: &mut Response) -> Result<bool, Nrc> {
-        let [sub] = exactly(rest)?;
-        let session = match sub & !SUPPRESS {
+    pub(super) fn session_control(&mut self, sub: u8, rest: &[u8], out: &mut Response) -> Result<(), Nrc> {
+        let [] = exactly(rest)?;
+        let session = match sub {
             1 => Session::Default,
             2 => Session::Programming,
             3 => Session::Extended,
@@ -24,55 +24,47 @@ impl Services {
         };
         self.enter(session);
         let [[a, b], [c, d]] = [P2_MS.to_be_bytes(), P2_STAR_10_MS.to_be_bytes()];
-        put(out, &[session as u8, a, b, c, d])?;
-        Ok(sub & SUPPRESS == 0)
+        put(out, &[a, b, c, d])
     }
 
     /// Has the board restart, once the response is out.
     pub(super) fn reset<R: NorFlash, W: MappedSlots>(
         &mut self,
+        sub: u8,
         rest: &[u8],
         device: &mut Device<R, W>,
-        out: &mut Response,
-    ) -> Result<bool, Nrc> {
-        let [sub] = exactly(rest)?;
-        let reset = ResetType::from_repr(sub & !SUPPRESS);
-        if !matches!(reset, Some(ResetType::HardReset | ResetType::SoftReset)) {
+    ) -> Result<(), Nrc> {
+        let [] = exactly(rest)?;
+        if !matches!(ResetType::from_repr(sub), Some(ResetType::HardReset | ResetType::SoftReset)) {
             return Err(Nrc::SubFunctionNotSupported);
         }
         self.security.check(device)?;
         device.act(&Request::Restart).map_err(nrc)?;
         self.is_restarting = true;
-        put(out, &[sub & !SUPPRESS])?;
-        Ok(sub & SUPPRESS == 0)
+        Ok(())
     }
 
     /// Keeps the session.
-    pub(super) fn tester_present(rest: &[u8], out: &mut Response) -> Result<bool, Nrc> {
-        let [sub] = exactly(rest)?;
-        if sub & !SUPPRESS != 0 {
-            return Err(Nrc::SubFunctionNotSupported);
-        }
-        put(out, &[0])?;
-        Ok(sub & SUPPRESS == 0)
+    pub(super) fn tester_present(sub: u8, rest: &[u8]) -> Result<(), Nrc> {
+        let [] = exactly(rest)?;
+        if sub == 0 { Ok(()) } else { Err(Nrc::SubFunctionNotSupported) }
     }
 
     /// Stops the messages of the board, or lets them go out again.
     pub(super) fn communication_control<R: NorFlash, W: MappedSlots>(
         &mut self,
+        sub: u8,
         rest: &[u8],
         device: &mut Device<R, W>,
-        out: &mut Response,
-    ) -> Result<bool, Nrc> {
-        self.needs(Session::Extended)?;
-        let [sub, what] = exactly(rest)?;
-        let is_silenced = match sub & !SUPPRESS {
+    ) -> Result<(), Nrc> {
+        let [kind] = exactly(rest)?;
+        let is_silenced = match sub {
             0 => false,
             1 => true,
             _ => return Err(Nrc::SubFunctionNotSupported),
         };
         // Normal messages, or they and those of a network management that this board has not got.
-        if !matches!(what, 1 | 3) {
+        if !matches!(kind, 1 | 3) {
             return Err(Nrc::RequestOutOfRange);
         }
         self.security.check(device)?;
@@ -80,27 +72,22 @@ impl Services {
             return Err(Nrc::ConditionsNotCorrect);
         }
         self.is_silenced = is_silenced;
-        put(out, &[sub & !SUPPRESS])?;
-        Ok(sub & SUPPRESS == 0)
+        Ok(())
     }
 
     /// Stops the memory of troubles, or lets it go on.
     pub(super) fn dtc_setting<R: NorFlash, W: MappedSlots>(
         &mut self,
-        rest: &[u8],
+        sub: u8,
         device: &mut Device<R, W>,
-        out: &mut Response,
-    ) -> Result<bool, Nrc> {
-        self.needs(Session::Extended)?;
-        let sub = *rest.first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+    ) -> Result<(), Nrc> {
         self.security.check(device)?;
-        self.memory.is_enabled = match sub & !SUPPRESS {
+        self.memory.is_enabled = match sub {
             1 => true,
             2 => false,
             _ => return Err(Nrc::SubFunctionNotSupported),
         };
-        put(out, &[sub & !SUPPRESS])?;
-        Ok(sub & SUPPRESS == 0)
+        Ok(())
     }
 
     /// Clears one trouble or all.
@@ -108,10 +95,10 @@ impl Services {
         &mut self,
         rest: &[u8],
         device: &mut Device<R, W>,
-    ) -> Result<bool, Nrc> {
+    ) -> Result<(), Nrc> {
         let [a, b, c] = exactly(rest)?;
         self.security.check(device)?;
         let is_known = self.memory.clear(u32::from_be_bytes([0, a, b, c]));
-        if is_known { Ok(true) } else { Err(Nrc::RequestOutOfRange) }
+        if is_known { Ok(()) } else { Err(Nrc::RequestOutOfRange) }
     }
 }

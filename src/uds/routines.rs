@@ -4,7 +4,8 @@ use super::data;
 use super::download::Download;
 use super::response::{Nrc, Response, exactly, nrc, put};
 use super::security::{self, Seed};
-use super::services::{SUPPRESS, Services, Session};
+use super::services::Services;
+use super::session::Session;
 use crate::service::calibrate::{State, Task};
 use crate::service::message::{Calibrate, Refusal, Request};
 use crate::service::{Device, MappedSlots};
@@ -13,6 +14,10 @@ use embedded_storage::nor_flash::NorFlash;
 
 /// Examines the parts of the board.
 const SELF_TEST: u16 = 0x0204;
+/// Begins a request for the log.
+pub(super) const READ_LOG: [u8; 3] = [1, 0x02, 0x03];
+/// Reads the log.
+const LOG: u16 = 0x0203;
 /// Has a download used.
 const USE_DOWNLOAD: u16 = 0xFF01;
 
@@ -36,39 +41,32 @@ impl Services {
     /// Runs a routine; its number and, for a calibration, its state are the response.
     pub(super) fn routine<R: NorFlash, W: MappedSlots>(
         &mut self,
+        sub: u8,
         rest: &[u8],
         device: &mut Device<R, W>,
         entropy: impl FnOnce() -> Option<Seed>,
         out: &mut Response,
-    ) -> Result<bool, Nrc> {
-        if let [1, 0x02, 0x03, after @ ..] = rest {
-            put(out, &[1, 0x02, 0x03])?;
-            data::put_record(out, &device.events(u32::from_be_bytes(exactly(after)?)))?;
-            return Ok(true);
+    ) -> Result<(), Nrc> {
+        let (id, option) = rest.split_first_chunk().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        put(out, id)?;
+        let id = u16::from_be_bytes(*id);
+        let control = RoutineControlType::from_repr(sub).ok_or(Nrc::SubFunctionNotSupported)?;
+        if id == LOG && control == RoutineControlType::StartRoutine {
+            return data::put_record(out, &device.events(u32::from_be_bytes(exactly(option)?)));
         }
-        self.needs(Session::Extended)?;
-        let (sub, high, low, option) = match *rest {
-            [sub, high, low, ref option @ ..] => (sub, high, low, option),
-            _ => return Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
-        };
-        let id = u16::from_be_bytes([high, low]);
-        let control = RoutineControlType::from_repr(sub & !SUPPRESS).ok_or(Nrc::SubFunctionNotSupported)?;
         if id == SELF_TEST && control == RoutineControlType::StartRoutine {
             let [] = exactly(option)?;
-            put(out, &[sub & !SUPPRESS, high, low, self_test(device, entropy().is_some())])?;
-            return Ok(sub & SUPPRESS == 0);
+            return put(out, &[self_test(device, entropy().is_some())]);
         }
         let task = match id {
             0x0200 => Some(Task::Static),
             0x0201 => Some(Task::Mounting),
             _ => None,
         };
-        put(out, &[sub & !SUPPRESS, high, low])?;
         if id == USE_DOWNLOAD && control == RoutineControlType::StartRoutine {
             self.needs(Session::Programming)?;
             self.accept_download(option, device)?;
-            device.act(&Request::WeightsActivate).map_err(nrc)?;
-            return Ok(sub & SUPPRESS == 0);
+            return device.act(&Request::WeightsActivate).map(drop).map_err(nrc);
         }
         let [] = exactly(option)?;
         if control != RoutineControlType::RequestRoutineResult {
@@ -96,7 +94,7 @@ impl Services {
             (0x0202 | SELF_TEST | USE_DOWNLOAD, None, _) => return Err(Nrc::SubFunctionNotSupported),
             _ => return Err(Nrc::RequestOutOfRange),
         }
-        Ok(sub & SUPPRESS == 0)
+        Ok(())
     }
 
     /// Checks the signature of a download, where a key asks for one.

@@ -17,7 +17,6 @@
 //! | no random numbers, the same again, or the vehicle may move | 0x22 |
 
 use super::response::{Nrc, Response, exactly, nrc, put};
-use super::services::SUPPRESS;
 use super::signature::{self, Digest, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
 use crate::service::message::Refusal;
 use crate::service::{Device, MappedSlots};
@@ -67,21 +66,18 @@ impl Security {
     /// Makes a challenge, or takes the answer to it.
     pub fn access<R: NorFlash, W: MappedSlots>(
         &mut self,
-        rest: &[u8],
+        sub: u8,
+        answer: &[u8],
         device: &mut Device<R, W>,
-        now: u32,
-        entropy: impl FnOnce() -> Option<Seed>,
+        (now, entropy): (u32, impl FnOnce() -> Option<Seed>),
         out: &mut Response,
     ) -> Result<(), Nrc> {
-        let (&sub, answer) = rest.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
         let access = device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let beyond = access.wrong.saturating_sub(FREE);
         let delay = DELAY_MS << beyond.saturating_sub(1).min(MOST_DOUBLED);
         if beyond > 0 && now.wrapping_sub(self.wrong_at) < delay {
             return Err(Nrc::RequiredTimeDelayNotExpired);
         }
-        let sub = sub & !SUPPRESS;
-        put(out, &[sub])?;
         match sub {
             1 => {
                 let [] = exactly(answer)?;

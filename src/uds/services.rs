@@ -7,8 +7,9 @@ use super::data::{self, Sources};
 use super::download::Download;
 use super::dtc::Memory;
 use super::isotp::TransportErrors;
-use super::response::{Nrc, Response, put};
+use super::response::{Nrc, Response, exactly, put};
 use super::security::{self, Security, Seed};
+use super::session::{self, Session};
 use super::troubles;
 use crate::service::message::AllCounters;
 use crate::service::{Device, MappedSlots};
@@ -18,19 +19,7 @@ use embedded_storage::nor_flash::NorFlash;
 /// Longest silence of a tester in a session other than the default one, ms (S3).
 const SESSION_MS: u32 = 5_000;
 /// This bit of a sub-function suppresses the positive response.
-pub(super) const SUPPRESS: u8 = 0x80;
-
-/// A diagnostic session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Session {
-    /// Data and troubles can be read.
-    Default = 1,
-    /// Weights can be downloaded, too.
-    Programming = 2,
-    /// Settings can be written, and routines run.
-    Extended = 3,
-}
+const SUPPRESS: u8 = 0x80;
 
 /// First byte of a negative response.
 pub const NEGATIVE: u8 = 0x7F;
@@ -56,7 +45,7 @@ pub(super) struct Services {
     pub(super) security: Security,
 }
 
-/// What a request is answered from beside the device.
+/// Holds what answers need beside the device.
 pub(super) struct Surroundings<'a, E> {
     pub counters: &'a AllCounters,
     pub errors: TransportErrors,
@@ -178,19 +167,43 @@ impl Services {
         if command != UdsCommand::ReadDataByIdentifier {
             device.forget_refusal();
         }
-        let Surroundings { counters, errors, now, entropy, .. } = surroundings;
+        self.needs(session::needed(command, rest))?;
+        if !session::has_sub_function(command) {
+            return self.serve_data(command, rest, device, surroundings, out).map(|()| true);
+        }
+        let (&sub, rest) = rest.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        let (sub, is_wanted) = (sub & !SUPPRESS, sub & SUPPRESS == 0);
+        put(out, &[sub])?;
+        let Surroundings { now, entropy, .. } = surroundings;
         match command {
-            UdsCommand::DiagnosticSessionControl => self.session_control(rest, out),
-            UdsCommand::ECUReset => self.reset(rest, device, out),
-            UdsCommand::TesterPresent => Self::tester_present(rest, out),
-            UdsCommand::CommunicationControl => self.communication_control(rest, device, out),
-            UdsCommand::ControlDTCSetting => self.dtc_setting(rest, device, out),
+            UdsCommand::DiagnosticSessionControl => self.session_control(sub, rest, out),
+            UdsCommand::ECUReset => self.reset(sub, rest, device),
+            UdsCommand::TesterPresent => Self::tester_present(sub, rest),
+            UdsCommand::CommunicationControl => self.communication_control(sub, rest, device),
+            UdsCommand::ControlDTCSetting => self.dtc_setting(sub, device),
+            UdsCommand::ReadDTCInformation => troubles::read(&self.memory, sub, rest, out),
+            UdsCommand::SecurityAccess => self.security.access(sub, rest, device, (now, entropy), out),
+            _ => self.routine(sub, rest, device, entropy, out),
+        }?;
+        Ok(is_wanted)
+    }
+
+    /// Executes a service without sub-functions.
+    fn serve_data<R: NorFlash, W: MappedSlots, E>(
+        &mut self,
+        command: UdsCommand,
+        rest: &[u8],
+        device: &mut Device<R, W>,
+        surroundings: Surroundings<'_, E>,
+        out: &mut Response,
+    ) -> Result<(), Nrc> {
+        match command {
             UdsCommand::ClearDiagnosticInformation => self.clear_troubles(rest, device),
-            UdsCommand::ReadDTCInformation => troubles::read(&self.memory, rest, out).map(|()| true),
             UdsCommand::ReadDataByIdentifier => {
                 if rest.is_empty() || !rest.len().is_multiple_of(2) {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 }
+                let Surroundings { counters, errors, .. } = surroundings;
                 let session = self.session as u8;
                 let security = &self.security;
                 let sources = Sources { device: &*device, counters, session, security, errors };
@@ -199,10 +212,9 @@ impl Services {
                     let id = id.try_into().map_or(0, u16::from_be_bytes);
                     data::read(id, &sources, out)?;
                 }
-                Ok(true)
+                Ok(())
             }
             UdsCommand::WriteDataByIdentifier => {
-                self.needs(Session::Extended)?;
                 let [high, low, bytes @ ..] = rest else {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 };
@@ -212,44 +224,32 @@ impl Services {
                     0x0110 => self.security.write_key(content, device)?,
                     _ => data::write(id, content, device)?,
                 }
-                put(out, &[*high, *low])?;
-                Ok(true)
+                put(out, &[*high, *low])
             }
-            UdsCommand::SecurityAccess => {
-                self.needs(Session::Extended)?;
-                self.security.access(rest, device, now, entropy, out)?;
-                Ok(rest.first().is_some_and(|sub| sub & SUPPRESS == 0))
-            }
-            UdsCommand::RoutineControl => self.routine(rest, device, entropy, out),
             UdsCommand::RequestDownload => {
-                self.needs(Session::Programming)?;
                 self.download = None;
                 self.download = Some(Download::begin(rest, device, out)?);
-                Ok(true)
+                Ok(())
             }
-            UdsCommand::TransferData => {
-                self.needs(Session::Programming)?;
-                let download = self.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
-                download.block(rest, device, out)?;
-                Ok(true)
-            }
+            UdsCommand::TransferData => self.under_way()?.block(rest, device, out),
             UdsCommand::RequestTransferExit => {
-                self.needs(Session::Programming)?;
-                if !rest.is_empty() {
-                    return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
-                }
-                let download = self.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
-                download.finish(device, out)?;
-                Ok(true)
+                let [] = exactly(rest)?;
+                self.under_way()?.finish(device, out)
             }
             _ => Err(Nrc::ServiceNotSupported),
         }
     }
 
-    /// Refuses a service that this session does not have.
+    /// Returns the download that has begun.
+    fn under_way(&mut self) -> Result<&mut Download, Nrc> {
+        self.download.as_mut().ok_or(Nrc::RequestSequenceError)
+    }
+
+    /// Refuses what this session does not have.
     pub(super) fn needs(&self, session: Session) -> Result<(), Nrc> {
-        let has =
-            self.session == session || (self.session, session) == (Session::Programming, Session::Extended);
+        let has = session == Session::Default
+            || self.session == session
+            || (self.session, session) == (Session::Programming, Session::Extended);
         if has { Ok(()) } else { Err(Nrc::ServiceNotSupportedInActiveSession) }
     }
 }

@@ -5,14 +5,11 @@ use super::response::{Nrc, Response, exactly, put};
 use automotive_diag::uds::DtcSubFunction;
 
 /// Appends what a sub-function reports.
-pub(super) fn read(memory: &Memory, rest: &[u8], out: &mut Response) -> Result<(), Nrc> {
-    let length = Nrc::IncorrectMessageLengthOrInvalidFormat;
-    let (&sub, rest) = rest.split_first().ok_or(length)?;
+pub(super) fn read(memory: &Memory, sub: u8, rest: &[u8], out: &mut Response) -> Result<(), Nrc> {
     let code = |code: u32| {
         let [_, a, b, c] = code.to_be_bytes();
         [a, b, c]
     };
-    put(out, &[sub])?;
     match DtcSubFunction::from_repr(sub) {
         Some(DtcSubFunction::ReportNumberOfDtcByStatusMask) => {
             let [mask] = exactly(rest)?;

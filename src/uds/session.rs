@@ -1,0 +1,48 @@
+//! These tables say which session a service needs, and which services have sub-functions (ISO 14229-1).
+
+use super::routines::READ_LOG;
+use automotive_diag::uds::UdsCommand;
+
+/// A diagnostic session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Session {
+    /// Data and troubles can be read.
+    Default = 1,
+    /// Weights can be downloaded, too.
+    Programming = 2,
+    /// Settings can be written, and routines run.
+    Extended = 3,
+}
+
+/// Returns the session that a service needs.
+pub(super) fn needed(command: UdsCommand, rest: &[u8]) -> Session {
+    match command {
+        // The log can be read in any session.
+        UdsCommand::RoutineControl if rest.starts_with(&READ_LOG) => Session::Default,
+        UdsCommand::CommunicationControl
+        | UdsCommand::ControlDTCSetting
+        | UdsCommand::WriteDataByIdentifier
+        | UdsCommand::SecurityAccess
+        | UdsCommand::RoutineControl => Session::Extended,
+        UdsCommand::RequestDownload | UdsCommand::TransferData | UdsCommand::RequestTransferExit => {
+            Session::Programming
+        }
+        _ => Session::Default,
+    }
+}
+
+/// Returns whether a service has sub-functions: the first byte of its request and of its response.
+pub(super) fn has_sub_function(command: UdsCommand) -> bool {
+    matches!(
+        command,
+        UdsCommand::DiagnosticSessionControl
+            | UdsCommand::ECUReset
+            | UdsCommand::TesterPresent
+            | UdsCommand::CommunicationControl
+            | UdsCommand::ControlDTCSetting
+            | UdsCommand::ReadDTCInformation
+            | UdsCommand::SecurityAccess
+            | UdsCommand::RoutineControl
+    )
+}
