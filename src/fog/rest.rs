@@ -92,7 +92,7 @@ pub struct RestReading {
     errors: FogErrors,
     /// The Earth's rate about the vertical, rad/s; `None` while no latitude is known.
     earth: Option<f32>,
-    /// By the standstills alone.
+    /// The bias by the standstills alone.
     measured: Estimate,
     /// Variance of the bias by the data sheet.
     bias_variance: f32,

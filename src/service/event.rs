@@ -26,7 +26,7 @@ pub enum ResetCause {
     BrownOut,
     /// The reset pin.
     Pin,
-    /// Asked for, or after a crash: see [`Crash`].
+    /// The board was restarted by a request or by a crash: see [`Crash`].
     Software,
     /// A watchdog.
     Watchdog,

@@ -111,7 +111,7 @@ pub enum Refusal {
     /// A key is needed, and this session has not proven to have it.
     #[error("the board has a key, and this session has no access: give its private part with --key")]
     Locked,
-    /// What is written to a board with a key wants a signature, and has none.
+    /// The data have no signature, and the board has a key.
     #[error("the board has a key, and what is written is not signed: give --key or --signature")]
     Unsigned,
     /// The answer to a challenge is none of the board's key.

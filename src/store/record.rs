@@ -115,7 +115,7 @@ impl Raw {
 enum Place {
     /// A record; it may be torn.
     Record,
-    /// Nothing has been written here since the sector was erased.
+    /// The place is empty since its sector was erased.
     Blank,
     /// No record begins here: the bytes are not a record's, or no room is left.
     End,

@@ -20,7 +20,7 @@ pub enum PythonError {
     Packages {
         /// The interpreter.
         python: PathBuf,
-        /// What it says.
+        /// The end of its output.
         reason: String,
         /// All that are needed.
         packages: Vec<String>,

@@ -30,7 +30,7 @@ pub enum KeyError {
     Content {
         /// Its path.
         path: PathBuf,
-        /// What it should be.
+        /// The expected kind.
         what: &'static str,
     },
     /// The system has no random numbers.

@@ -40,7 +40,7 @@ bind_interrupts!(struct Interrupts {
     CAN1_SCE => can::SceInterruptHandler<peripherals::CAN1>;
 });
 
-/// What the tasks hand over: a window and its estimate, and the frames with the number of those that were lost.
+/// The tasks share a window and its estimate, and the frames with the number of those that were lost.
 static WINDOW: Signal<CriticalSectionRawMutex, DueWindow> = Signal::new();
 static ESTIMATE: Signal<CriticalSectionRawMutex, (u32, Estimate)> = Signal::new();
 static FRAMES: Channel<CriticalSectionRawMutex, Frame, 24> = Channel::new();

@@ -23,7 +23,7 @@ BO_ 2566845182 AxleRear: 8 ABS
  SG_ SpeedRearRight : 24|13@1+ (0.03125,0) [0|255] "m/s" ABS
 "#;
 const FRAMES: [u32; 2] = [2_566_844_926 - (1 << 31), 2_566_845_182 - (1 << 31)];
-/// What the DBC file does not say: a counter in byte 6, and the exclusive or in byte 7.
+/// The DBC file does not tell two things: a counter in byte 6, and the exclusive or in byte 7.
 const PROTECTION: &str = "checksum = { kind = \"xor\", byte = 7 }\n\
                           counter = { start_bit = 48, bits = 4, order = \"intel\" }\n";
 

@@ -10,7 +10,7 @@ fn elf(test: &str, name: &str) -> Option<Vec<u8>> {
     Some(std::fs::read(path).expect("it was just built"))
 }
 
-/// Whatever ends in the panic handler: the handler itself (`rust_begin_unwind`, under the
+/// These symbols end in the panic handler: the handler itself (`rust_begin_unwind`, under the
 /// language's own mangling) and the core library's ways to it.
 fn panics(elf: &[u8]) -> Vec<String> {
     let names = functions(elf).expect("a firmware image");

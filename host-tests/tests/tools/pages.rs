@@ -28,7 +28,7 @@ const OVER: &str = r"['.plot .x b', '.plot .y b', '.legend .key', 'h2, figcaptio
         return apart ? [] : [before.textContent + ' / ' + e.textContent];
     });
 })";
-/// What can be used, apart from what is not shown.
+/// This script lists the controls that are shown.
 const USABLE: &str = "[...document.querySelectorAll('button, .plot')].filter(e => e.offsetParent)";
 
 fn demo(recording: &Recording) -> String {

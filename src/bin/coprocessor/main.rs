@@ -116,7 +116,7 @@ mod app {
     #[shared]
     struct Shared {
         coprocessor: &'static mut Coprocessor,
-        /// For idle, which answers testers.
+        /// Idle answers testers with these.
         counters: AllCounters,
     }
 

@@ -71,7 +71,7 @@ enum Recovery {
 /// Sends frames through the controller.
 pub struct Can {
     registers: pac::CAN1,
-    /// When each mailbox got its frame, ms.
+    /// The time at which each mailbox got its frame, ms.
     requested: [u32; MAILBOXES],
     recovery: Recovery,
     interval_ms: u32,

@@ -43,10 +43,10 @@ pub struct Device<B> {
     authority: Authority,
 }
 
-/// What a board with a key accepts a writer by.
+/// Names what a writer shows to a board with a key.
 #[derive(Default)]
 pub enum Authority {
-    /// Nothing: such a board refuses.
+    /// The writer shows nothing, and such a board refuses.
     #[default]
     None,
     /// The private key.

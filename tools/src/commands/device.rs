@@ -98,7 +98,7 @@ enum Action {
 
 type Board = Device<Box<dyn Bus>>;
 
-/// What `access` prints.
+/// Holds what `access` prints.
 #[derive(Serialize)]
 struct Access {
     #[serde(flatten)]

@@ -68,7 +68,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if bad > 0 { Err(format!("{bad} findings are to be cured first").into()) } else { Ok(()) }
 }
 
-/// What calibration and training would gain on this drive, or why that cannot be said.
+/// Says what calibration and training would gain on this drive, or why that cannot be known.
 fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
     let refused = |error: &dyn std::fmt::Display| format!("Cannot be said: {error}.");
     let recording = match read_drive(&args.file, common) {

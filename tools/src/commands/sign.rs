@@ -20,7 +20,7 @@ Examples:
 pub struct Args {
     /// Weight file, whole configuration (`device get --json`), wheel frames (.toml), unit file, or public key.
     file: PathBuf,
-    /// What the file is.
+    /// Names the kind of the file.
     #[arg(long, value_enum)]
     target: Target,
     /// Private key (`gyronet keys`).

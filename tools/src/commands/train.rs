@@ -170,7 +170,7 @@ fn python_training(args: &Args, common: Common, roles: &Roles, out: &Path) -> su
     }
 }
 
-/// What the weights gain on some drives.
+/// Returns what the weights gain on some drives.
 fn gain(drives: &[Examined], networks: &Files, common: Common) -> Result<Gain, Box<dyn Error>> {
     let files: Vec<PathBuf> = drives.iter().map(|drive| drive.path.clone()).collect();
     let errors = drives::errors(&files, common, |file, bar| {

@@ -12,7 +12,7 @@ pub const SECOND: usize = 100;
 /// Rows kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
 
-/// What a recording holds.
+/// Counts what a recording holds.
 #[derive(Debug)]
 pub struct Rows {
     pub name: String,
@@ -29,7 +29,7 @@ pub struct Rows {
     /// Rows that could not be read, and why the first one could not.
     pub bad: u64,
     pub first_bad: Option<String>,
-    /// What the vehicle file beside it says.
+    /// The vehicle file beside it holds these.
     pub vehicle: Vehicle,
 }
 

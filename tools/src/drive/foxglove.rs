@@ -114,7 +114,7 @@ pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> 
     Ok(file.messages)
 }
 
-/// What is sent with a sample, and what is known of it.
+/// Holds what is sent with a sample, and its inputs.
 fn rate(step: &Step, reference: Option<f64>) -> Value {
     let (prompt, navigation) = (&step.vehicle.prompt, step.navigation);
     json!({

@@ -59,7 +59,7 @@ pub struct Recording {
     pub rows: Vec<Row>,
     /// Rows that are missing between others.
     pub missing: u64,
-    /// What the vehicle file beside it says; the rows are in the vehicle's axes.
+    /// The vehicle file beside it holds these; the rows are in the vehicle's axes.
     pub vehicle: Vehicle,
 }
 

@@ -24,11 +24,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What is known of a vehicle and of the names in its logs.
+/// Describes a vehicle and the names in its logs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Vehicle {
-    /// How the IMU is mounted.
+    /// The mounting of the IMU.
     pub mounting: Mounting,
     /// The wheels and the signals of their speeds.
     pub wheels: Wheels,

@@ -10,7 +10,7 @@ pub enum Gyro {
     Mems,
     /// The fibre-optic gyro.
     Fog,
-    /// None: the wheels alone.
+    /// The wheels alone, without a gyro.
     Wheels,
     /// That of another program, whose trajectory is given.
     Given,

@@ -21,7 +21,7 @@ const MOST: usize = 16_384;
 /// The offset of a clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
-    /// What is added to the second clock's times, s.
+    /// This is added to the second clock's times, s.
     pub seconds: f64,
     /// The coefficient at that offset.
     pub coefficient: f64,

@@ -78,7 +78,7 @@ struct Text<'a> {
     data: Vec<u8>,
 }
 
-/// What the lines of a file have told about those that follow.
+/// Holds what the lines so far say about those that follow.
 struct State {
     radix: u32,
     relative: bool,

@@ -22,7 +22,7 @@ const RATES: std::ops::RangeInclusive<f64> = 24.5..=1_020.0;
 /// A clock that both files share overlaps at least so much, s.
 const OVERLAP: f64 = 3.0;
 
-/// What is asked for.
+/// Holds what the user asks for.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
     /// The logs; the one with the IMU gives the time.
@@ -91,7 +91,7 @@ pub fn import(request: &Request) -> Result<Imported, ImportError> {
     Ok(Imported { rows, report, dropped })
 }
 
-/// What is added to the times of each file.
+/// These are added to the times of each file.
 fn clocks(
     files: &[File],
     selection: &Selection<'_>,

@@ -1,6 +1,6 @@
 //! The error of an import: one line that names the file and what to do.
 
-/// What is wrong.
+/// The reason for a refusal.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each names its fields")]
@@ -14,7 +14,7 @@ pub enum ImportError {
     /// The DBC file cannot be used.
     #[error("{path}: no DBC file: {reason}")]
     Dbc { path: String, reason: String },
-    /// Nothing in the files is fit for what is needed.
+    /// The files hold no channel that fits.
     #[error("no {role} in the files{}", list(.candidates, "; there are "))]
     Missing { role: &'static str, candidates: Vec<String> },
     /// Several channels are.

@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-/// What the formats read from.
+/// Formats read from this.
 pub type Input<'a> = dyn BufRead + 'a;
 
 /// Formats that are known but not read, by their first bytes, and what turns them into one that is.

@@ -6,7 +6,7 @@
 
 use crate::drive::DT;
 
-/// From this rate on samples are averaged, Hz.
+/// Samples are averaged from this rate on, Hz.
 const AVERAGED_HZ: f64 = 150.0;
 /// Gaps are longer than this many periods.
 const GAP_PERIODS: f64 = 2.5;
@@ -25,7 +25,7 @@ pub fn rate<const N: usize>(series: &Series<N>) -> Option<f64> {
     Some(1.0 / *median)
 }
 
-/// How a rate comes to the grid.
+/// Says how samples of a rate come to the grid.
 pub fn method(hz: f64) -> &'static str {
     if hz >= AVERAGED_HZ {
         "mean of the samples within 5 ms of each row"

@@ -5,7 +5,7 @@
 
 use super::log::{Fix, Log, Value};
 
-/// How the numbers of a message lie.
+/// Says how the numbers of a message lie in its bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// ROS 1: packed, little-endian.

@@ -137,7 +137,7 @@ fn channels(files: &[File]) -> impl Iterator<Item = Channel<'_>> {
     })
 }
 
-/// At most twenty channels for a message.
+/// Lists at most twenty channels for a message.
 fn listed(files: &[File], fits: impl Fn(Kind) -> bool) -> Vec<String> {
     let catalogue = files.iter().flat_map(|file| file.log.catalogue());
     let fitting = catalogue.filter(|(_, kind, ..)| fits(*kind));

@@ -201,7 +201,7 @@ fn header(input: &mut Input<'_>) -> Result<Header, TableError> {
     Err(TableError::Unknown)
 }
 
-/// Where a column of ours is, and its unit in SI.
+/// Says where a column of ours is, and its unit in SI.
 fn find(names: &[String], columns: &Columns, ours: &str) -> Result<Option<(usize, f64)>, TableError> {
     if let Some(Column { name, unit }) = columns.get(ours) {
         let at = names.iter().position(|column| column == name);

@@ -37,7 +37,7 @@ impl std::fmt::Display for Spread {
 pub struct Ratio {
     /// The method's name.
     pub method: &'static str,
-    /// Of each drive.
+    /// The gain on each drive.
     pub drives: Vec<f64>,
     /// Over all of them.
     pub all: Spread,

@@ -346,7 +346,7 @@ fn a_power_cut_never_takes_the_counter_back() {
     assert!(cuts > 4, "{cuts} operations to cut");
 }
 
-/// What a workshop and the owner see of somebody who tried.
+/// A workshop and the owner see that somebody has tried.
 #[test]
 fn refusals_are_counted_and_a_trouble_that_stays() {
     let (flash, mut bench, key) = locked();

@@ -29,7 +29,7 @@ impl Line for Connection {
 pub struct SlcanBus<L> {
     line: L,
     text: Vec<u8>,
-    /// What an earlier program has left in the other end's buffer is ended.
+    /// The line that an earlier program may have left in the other end's buffer has been ended.
     is_clean: bool,
 }
 

@@ -47,7 +47,7 @@ const STATIC: u16 = 0x0200;
 const MOUNTING: u16 = 0x0201;
 const STORE_CALIBRATION: u16 = 0x0202;
 const LOG: u16 = 0x0203;
-/// What is done with a routine.
+/// These sub-functions start and stop a routine.
 const START: u8 = 1;
 const STOP: u8 = 2;
 

@@ -59,7 +59,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// As the numbers of `tools/train/README.md` were made.
+    /// The numbers of `tools/train/README.md` were made with this plan.
     pub const FULL: Self = Self {
         gyronet_epochs: 20,
         gyronet_seeds: 3,
@@ -68,7 +68,7 @@ impl Effort {
         lwoi_every: 2,
         rinsw_steps: 1200,
     };
-    /// For a trial: every step is run, and nothing is trained well.
+    /// This plan is for a trial: every step is run, and nothing is trained well.
     pub const TRIAL: Self = Self {
         gyronet_epochs: 1,
         gyronet_seeds: 1,

@@ -23,7 +23,7 @@ pub struct Set {
 /// Holds what there is to say of a run.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// How the networks were trained.
+    /// Says how the networks were trained.
     pub effort: Effort,
     /// The data sets.
     pub sets: Vec<Set>,
