@@ -16,7 +16,9 @@
 //! noise of past samples, which the newest sample does not have; carried at once, it would add that noise to it.
 //!
 //! No window of 0.1 s can know a constant error, and one that a model was trained to is wrong on another vehicle.
-//! The slow mean of the corrections is taken out of them: standstill finds the bias, and `calibrate` the gain.
+//! The slow mean of the corrections is taken out of them: standstill finds the bias, and `calibrate` the gain. Nor does
+//! another vehicle's unit have the mounting of the one that a model was trained with: where driving shows that it has
+//! not, that part is taken out, too, until driving shows otherwise.
 //!
 //! | when | prompt | navigation |
 //! |---|---|---|
@@ -28,10 +30,12 @@
 //! Samples are counted, not time: a gap delays earlier samples and drops none.
 
 mod mode;
+mod mounting_check;
 mod slow_mean;
 
 pub use mode::{DELAY, Hop, Lag, Mode, OutOfRange};
 
+use mounting_check::MountingCheck;
 use slow_mean::SlowMean;
 
 use crate::model::window::WINDOW;
@@ -88,8 +92,8 @@ const KEPT: usize = Lag::MAX.samples() + 1;
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     tick: u32,
-    /// Gyro less static bias.
-    rate: i32,
+    /// Gyro less static bias, about x, y and z.
+    rates: [AngularRate; 3],
     validity: Validity,
     /// The navigation rate went out as zero, whatever the estimate.
     held: bool,
@@ -97,6 +101,14 @@ struct Entry {
     count: i32,
     /// The estimate; the steady part, which is known with the sample, where `count` is 0.
     estimate: i32,
+}
+
+impl Entry {
+    /// Returns the yaw rate.
+    fn rate(&self) -> AngularRate {
+        let [.., rate] = self.rates;
+        rate
+    }
 }
 
 /// A compensated rate and what was taken off for it.
@@ -155,6 +167,7 @@ pub struct Compensator {
     kept: [Option<Entry>; KEPT],
     /// The steady gain of the newest estimate's model; none without an estimate.
     steady_gain: SteadyGain,
+    mounting_check: MountingCheck,
     /// The mean of the corrections.
     slow_mean: SlowMean,
     /// Revisions not yet in the prompt rate, and in the navigation rate.
@@ -175,6 +188,7 @@ impl Compensator {
             config,
             kept: [None; KEPT],
             steady_gain: SteadyGain::NONE,
+            mounting_check: MountingCheck::START,
             slow_mean: SlowMean::NONE,
             prompt_carry: 0,
             navigation_carry: 0,
@@ -207,12 +221,15 @@ impl Compensator {
         let used = mode.used();
         let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
         let window = self.kept.iter().skip(oldest).zip(corrections).take(used.end).skip(used.start);
-        let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|_| i64::from(c.0)));
+        let foreign = self.foreign();
+        let own =
+            |entry: &Entry, c: &AngularRate| i64::from(c.0) - i64::from(foreign.correction(entry.rates).0);
+        let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|entry| own(entry, c)));
         self.slow_mean.observe(seen.sum::<i64>() / used.len() as i64, mode.hop());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
-            entry.sum += i64::from(correction.0) - constant;
+            entry.sum += own(entry, correction) - constant;
             entry.count += 1;
             let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
             let revision = estimate - i64::from(entry.estimate);
@@ -228,16 +245,28 @@ impl Compensator {
         Ok(())
     }
 
-    /// Takes in a sample: its gyro rates less static bias.
-    pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity) {
+    /// Takes in a sample: its gyro rates less static bias. `drives`: the vehicle is known to move. Returns whether the
+    /// model's mounting has just been found to be another unit's.
+    pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity, drives: bool) -> bool {
         self.kept.rotate_left(1);
         let steady = match self.steady_gain {
             SteadyGain::NONE => 0,
-            gain => gain.correction(rates).0.saturating_sub(self.slow_mean.get() as i32),
+            gain => gain.less(self.foreign()).correction(rates).0.saturating_sub(self.slow_mean.get() as i32),
         };
-        let [.., AngularRate(rate)] = rates;
-        let entry = Entry { tick, rate, validity, held: false, sum: 0, count: 0, estimate: steady };
-        self.kept[KEPT - 1] = Some(entry);
+        self.kept[KEPT - 1] =
+            Some(Entry { tick, rates, validity, held: false, sum: 0, count: 0, estimate: steady });
+        let mounting = self.steady_gain.mounting();
+        if !drives || !validity.is_good() || mounting == SteadyGain::NONE {
+            self.mounting_check.interrupt();
+            return false;
+        }
+        let [.., yaw_rate] = rates;
+        self.mounting_check.observe(yaw_rate, mounting.correction(rates))
+    }
+
+    /// Returns the mounting of the newest estimate's model if it is another unit's.
+    fn foreign(&self) -> SteadyGain {
+        if self.mounting_check.is_foreign() { self.steady_gain.mounting() } else { SteadyGain::NONE }
     }
 
     /// Returns the rate of the newest sample, less a bias that is subtracted beside the estimate.
@@ -264,8 +293,8 @@ impl Compensator {
                 (self.held[0], self.held_until) = (0, RATE_HZ / 4);
             }
             self.held_until -= 1;
-            self.held[0] += i64::from(entry.rate) - taken;
-            taken = i64::from(entry.rate);
+            self.held[0] += i64::from(entry.rate().0) - taken;
+            taken = i64::from(entry.rate().0);
         }
         let carried = self.navigation_carry;
         Some(emit(entry, taken, carried, &mut self.navigation_carry, self.config.max_carry))
@@ -277,7 +306,7 @@ impl Compensator {
         let entry = self.kept.iter().nth_back(self.config.mode.settled_after())?.as_ref()?;
         Some(Settled {
             tick: entry.tick,
-            rate: AngularRate(entry.rate),
+            rate: entry.rate(),
             correction: AngularRate(entry.estimate),
             good: entry.count > 0 && entry.validity.is_good(),
         })
@@ -315,7 +344,7 @@ impl Compensator {
     #[must_use]
     pub fn navigation_owed(&self, bias: AngularRate) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
-        let best = |entry: &Entry| i64::from(entry.rate) - i64::from(entry.estimate) - i64::from(bias.0);
+        let best = |entry: &Entry| i64::from(entry.rate().0) - i64::from(entry.estimate) - i64::from(bias.0);
         waiting.map(best).sum::<i64>() - self.navigation_carry
     }
 }
@@ -326,10 +355,10 @@ fn emit(entry: &Entry, taken: i64, carried: i64, carry: &mut i64, max_carry: Ang
     // A negative bound would disable the limit.
     let bound = if entry.validity.is_good() { i64::from(max_carry.0).max(0) } else { 0 };
     let carried = carried.clamp(-bound, bound);
-    let wanted = i64::from(entry.rate) - taken - carried;
+    let wanted = i64::from(entry.rate().0) - taken - carried;
     let rate = wanted.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
     *carry += rate - wanted - carried;
-    let correction = (i64::from(entry.rate) - rate).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+    let correction = (i64::from(entry.rate().0) - rate).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
     Compensated {
         tick: entry.tick,
         rate: AngularRate(rate as i32),

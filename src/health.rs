@@ -220,6 +220,8 @@ pub struct Counters {
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
+    /// Times that the model's mounting was found to be another unit's, and taken out of the correction.
+    pub foreign_mountings: u32,
 }
 
 impl Counters {
@@ -237,6 +239,7 @@ impl Counters {
         late: 0,
         zero_rate_updates: 0,
         contradicted: 0,
+        foreign_mountings: 0,
     };
 }
 

@@ -81,6 +81,19 @@ impl SteadyGain {
     /// A model without a linear part has this gain: zero.
     pub const NONE: Self = Self([0; 3]);
 
+    /// Returns its part in the roll and pitch rates, which models the mounting.
+    #[must_use]
+    pub const fn mounting(self) -> Self {
+        let Self([roll, pitch, _]) = self;
+        Self([roll, pitch, 0])
+    }
+
+    /// Returns what is left of it without a part.
+    #[must_use]
+    pub fn less(self, part: Self) -> Self {
+        Self(core::array::from_fn(|axis| self.0[axis].saturating_sub(part.0[axis])))
+    }
+
     /// Returns the correction of a sample with these rates.
     #[must_use]
     pub fn correction(&self, rates: [AngularRate; 3]) -> AngularRate {

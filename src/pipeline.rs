@@ -279,7 +279,9 @@ impl Pipeline {
         let [_, _, _, rates @ ..] = features.map(AngularRate);
         let [.., rate] = rates;
         let good = sample.validity.is_good();
-        self.state.compensator.add(frame.tick, rates, sample.validity);
+        let drives = self.state.wheels.standstill() == Some(Standstill::Moving);
+        let is_foreign = self.state.compensator.add(frame.tick, rates, sample.validity, drives);
+        count(&mut self.state.counters.foreign_mountings, u32::from(is_foreign));
         self.state.inertial = good.then_some(features);
         if good {
             self.state.windows.add(features);

@@ -10,7 +10,7 @@ use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
 /// The version of what is encoded as these types; it is raised when one changes.
-pub const PROTOCOL: u8 = 10;
+pub const PROTOCOL: u8 = 11;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 

@@ -33,6 +33,7 @@ mod kvh_dsp1760;
 mod kvh_dsp3000;
 mod links;
 mod lstm_exact;
+mod mounting_check;
 mod odometry;
 mod pac_writes;
 mod pipeline;

@@ -10,6 +10,7 @@ mod fog_kingston;
 mod fognet_golden;
 mod fognet_integer;
 mod fognet_simulated;
+mod foreign_mounting;
 mod gyronet_golden;
 mod import_converted;
 mod import_logs;

@@ -225,6 +225,7 @@ fn events(drive: &Replay) -> Vec<(&'static str, u32)> {
         ("clamped inputs", c.clamped_inputs),
         ("implausible", c.implausible),
         ("late", c.late),
+        ("mounting found to be another unit's", c.foreign_mountings),
         ("out of range", drive.out_of_range),
     ];
     all.into_iter().filter(|(_, count)| *count > 0).collect()
