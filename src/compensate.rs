@@ -225,7 +225,8 @@ impl Compensator {
         let own =
             |entry: &Entry, c: &AngularRate| i64::from(c.0) - i64::from(foreign.correction(entry.rates).0);
         let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|entry| own(entry, c)));
-        self.slow_mean.observe(seen.sum::<i64>() / used.len() as i64, mode.hop());
+        let used_mean = seen.sum::<i64>().checked_div(used.len() as i64).unwrap_or(0);
+        self.slow_mean.observe(used_mean, mode.hop());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
