@@ -17,21 +17,6 @@
 //! | [`odometry`] | reckons the vehicle's way from wheel speeds and rate |
 //! | [`store`], [`service`] | keep configuration and weights in flash, and change them on request |
 //!
-//! # Ten words
-//!
-//! | word | meaning |
-//! |---|---|
-//! | tick | number of a 10 ms step on the grid that all sensors share |
-//! | window | ten samples in a row (GyroNet), or sixty seconds (FoGNet), that a network sees at once |
-//! | hop | samples between two windows; with five, two windows cover each sample |
-//! | prompt | the rate of the newest sample, sent at once for a receiver that steers by it |
-//! | lag | samples by which the navigation rate is later than the prompt one |
-//! | navigation | the rate after its lag, for a receiver that sums it to a heading |
-//! | settled | said of a sample whose estimate no window changes any more |
-//! | carry | what later windows changed in rates already sent; it is spread over the rates that follow |
-//! | standstill | the vehicle stands, by its wheels or because its sensors are quiet |
-//! | zero-rate update | the correction of the gyro's bias by what it reads at a standstill |
-//!
 //! # On a board of your own
 //!
 //! Everything but the board itself (`examples/own_board.rs`); `examples/cortex_m.rs` is the
@@ -110,6 +95,8 @@
 //!
 //! Nothing that comes from outside can make the library panic: bad bytes, times and weights are typed
 //! errors or counted, and what is wrong is said on the bus. Errors implement [`core::error::Error`].
+//!
+#![doc = include_str!("GLOSSARY.md")]
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
@@ -156,8 +143,3 @@ pub use estimate::{VehicleSample, YawEstimate};
 pub use model::{Blob, FogNet, GyroNet, WindowNetwork, weights};
 pub use sample::{FogSample, ImuSample};
 pub use units::{AngularRate, Duration, Micros};
-
-/// The README's examples run as tests, too.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-pub struct Readme;
