@@ -1,4 +1,4 @@
-//! This module calibrates one unit: gain and mounting of its gyro, from drives with a reference yaw rate.
+//! This module calibrates one unit: gain and mounting of its gyro, from drives with a reference of their heading.
 //!
 //! A yaw rate that the coprocessor has corrected still contains a share of the roll rate and of the pitch rate (the
 //! sensor is not level in the vehicle, or the reference is not) and a share of itself (gain). Over a second or more
@@ -103,17 +103,22 @@ const SHARES: [(&str, f64, &str); 3] = [
 /// [`CalibrateError`].
 pub fn calibrate(drives: &[Drive<'_>], weights: u32) -> Result<UnitFile, CalibrateError> {
     let spans: Vec<Vec<Span>> = drives.iter().map(spans::of).collect::<Result<_, _>>()?;
-    let mut shown = [true; 3];
-    let all = Fit::new(&spans, shown);
-    for (shown, (sigma, (_, most, _))) in shown.iter_mut().zip(all.sigmas.iter().zip(SHARES)) {
-        *shown = *sigma <= most;
-    }
-    let fit = Fit::new(&spans, shown);
+    // A share that the drives hardly show makes the others uncertain, so the least certain one goes first.
+    let (mut fitted, mut refused) = ([true; 3], [None; 3]);
+    let fit = loop {
+        let fit = Fit::new(&spans, fitted);
+        let excess = |k: &usize| fit.sigmas[*k] / SHARES[*k].1;
+        let worst = (0..3).filter(|k| fitted[*k]).max_by(|a, b| excess(a).total_cmp(&excess(b)));
+        match worst.filter(|k| excess(k) > 1.0) {
+            Some(k) => (fitted[k], refused[k]) = (false, Some(fit.sigmas[k])),
+            None => break fit,
+        }
+    };
     let shares: [Share; 3] = std::array::from_fn(|k| {
         let (name, _, lacking) = SHARES[k];
-        match shown[k] {
-            true => Share { name, value: fit.shares[k], sigma: fit.sigmas[k], refused: None },
-            false => Share { name, value: 0.0, sigma: all.sigmas[k], refused: Some(lacking) },
+        match refused[k] {
+            None => Share { name, value: fit.shares[k], sigma: fit.sigmas[k], refused: None },
+            Some(sigma) => Share { name, value: 0.0, sigma, refused: Some(lacking) },
         }
     });
     for (drive, deviation) in drives.iter().zip(&fit.deviations) {
@@ -131,4 +136,55 @@ pub fn calibrate(drives: &[Drive<'_>], weights: u32) -> Result<UnitFile, Calibra
         CalibrateError::Implausible { what, value }
     })?;
     Ok(UnitFile { gyro_map, shares, weights, drives: unit_file::drives(drives, &fit) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{Config, csv};
+    use gyronet::model::window::{Features, WINDOW};
+    use gyronet::model::{Estimate, WindowNetwork};
+    use gyronet::pipeline::PipelineConfig;
+    use gyronet::units::AngularRate;
+
+    struct Nothing;
+
+    impl WindowNetwork for Nothing {
+        fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
+            Estimate::NONE
+        }
+    }
+
+    /// Simulates 20 minutes of a unit that reads 2 % too much about z. The reference is a course once a second, which is
+    /// known to 0.02 rad, missing for a minute, and ends at a sample.
+    fn by_course(end: usize) -> Result<UnitFile, CalibrateError> {
+        let mut bytes = Vec::new();
+        csv::write(&Config { seconds: 1_200, seed: 5, ..Config::DEFAULT }, &mut bytes).unwrap();
+        let mut recording = Recording::parse("course.csv", &bytes[..]).unwrap();
+        let mut random = crate::random::Random::new(1, 0);
+        let mut heading = 0.0;
+        for (k, row) in recording.rows.iter_mut().enumerate() {
+            let rate = row.reference.take().unwrap();
+            heading += rate * crate::drive::DT;
+            let known = k % 100 == 0 && !(30_000..36_000).contains(&k) && k < end;
+            row.course = known.then(|| heading + 0.02 * random.normal());
+            let yaw_rate = &mut row.sample.angular_rate[2];
+            *yaw_rate = AngularRate((f64::from(yaw_rate.0) * 1.02) as i32);
+        }
+        let replay = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Nothing, || {}).unwrap();
+        calibrate(&[Drive { recording: &recording, replay }], 0)
+    }
+
+    #[test]
+    fn a_course_shows_the_gain() {
+        let [.., gain] = by_course(usize::MAX).unwrap().shares;
+        assert_eq!(gain.refused, None, "{gain:?}");
+        // The true rate is the reading over 1.02; the part has a gain of its own, 0.1 % of sigma.
+        assert!((gain.value + 0.02).abs() < 0.003 + 3.0 * gain.sigma, "{gain:?}");
+    }
+
+    #[test]
+    fn half_a_minute_of_course_is_too_short() {
+        assert!(matches!(by_course(3_000), Err(CalibrateError::TooShort { .. })), "{:?}", by_course(3_000));
+    }
 }

@@ -1,12 +1,18 @@
 //! Spans are pieces of a drive for which the reference gives the angle turned; over a second or more its noise is small
 //! beside the errors to be fitted.
+//!
+//! A yaw rate as reference gives a span a second. A course by GNSS is noisy from one second to the next, so its spans go
+//! from the median of ten seconds to that of the next ten.
 
 use super::{CalibrateError, Drive, SHORTEST_S};
 use crate::drive::DT;
+use crate::evaluate::heading_error::{BLOCK_S, medians, off_course};
 use gyronet::sample::RATE_HZ;
 
 /// With a yaw rate as reference, a span has this many samples: a second.
 const RATE_SPAN: usize = RATE_HZ as usize;
+/// With a course, it has this many.
+const COURSE_SPAN: usize = BLOCK_S * RATE_HZ as usize;
 
 /// Holds a piece of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +25,19 @@ pub struct Span {
     pub seconds: f64,
 }
 
-/// Cuts a drive into spans.
+/// Holds a sample of a drive.
+struct Sample {
+    /// Corrected yaw rate, rad/s.
+    corrected: f64,
+    /// Turns about x, y and z by the gyro, rad.
+    turns: [f64; 3],
+    /// The true yaw rate, rad/s.
+    reference: Option<f64>,
+    /// The true course, rad.
+    course: Option<f64>,
+}
+
+/// Cuts a drive into spans, by its yaw rate of reference, or by its course.
 ///
 /// # Errors
 /// [`CalibrateError::NoReference`], [`CalibrateError::TooShort`].
@@ -29,14 +47,21 @@ pub fn of(Drive { recording, replay }: &Drive<'_>) -> Result<Vec<Span>, Calibrat
     let samples = replay.steps[replay.compared()].iter().map(|step| {
         let row = &recording.rows[step.row];
         let rates = row.sample.angular_rate.map(|rate| rate.rad_per_sec());
-        let turns: [f64; 3] = std::array::from_fn(|axis| (rates[axis] - bias[axis]) * DT);
-        row.reference.map(|reference| ((reference - step.settled.rad_per_sec()) * DT, turns))
+        Sample {
+            corrected: step.settled.rad_per_sec(),
+            turns: std::array::from_fn(|axis| (rates[axis] - bias[axis]) * DT),
+            reference: row.reference,
+            course: row.course,
+        }
     });
-    let samples: Vec<Option<(f64, [f64; 3])>> = samples.collect();
-    if samples.iter().all(Option::is_none) {
-        return Err(CalibrateError::NoReference { path: path(), columns: "ref_gyr_z" });
-    }
-    let spans: Vec<Span> = samples.chunks_exact(RATE_SPAN).filter_map(whole).collect();
+    let samples: Vec<Sample> = samples.collect();
+    let spans = if samples.iter().any(|sample| sample.reference.is_some()) {
+        samples.chunks_exact(RATE_SPAN).filter_map(by_rate).collect()
+    } else if samples.iter().any(|sample| sample.course.is_some()) {
+        by_course(&samples)
+    } else {
+        return Err(CalibrateError::NoReference { path: path(), columns: "ref_gyr_z and no ref_yaw" });
+    };
     let seconds = spans.iter().map(|span| span.seconds).sum::<f64>();
     if seconds < SHORTEST_S {
         return Err(CalibrateError::TooShort { path: path(), seconds });
@@ -45,12 +70,39 @@ pub fn of(Drive { recording, replay }: &Drive<'_>) -> Result<Vec<Span>, Calibrat
 }
 
 /// Sums up a span; `None` if the reference is not known throughout.
-fn whole(samples: &[Option<(f64, [f64; 3])>]) -> Option<Span> {
+fn by_rate(samples: &[Sample]) -> Option<Span> {
     let mut span = Span { error: 0.0, turns: [0.0; 3], seconds: samples.len() as f64 * DT };
-    for sample in samples {
-        let (error, turns) = (*sample)?;
-        span.error += error;
+    for Sample { corrected, turns, reference, .. } in samples {
+        span.error += ((*reference)? - corrected) * DT;
         span.turns.iter_mut().zip(turns).for_each(|(sum, turn)| *sum += turn);
     }
     Some(span)
+}
+
+/// Returns the spans between the blocks whose course is known, each from the middle of a block to that of the next.
+fn by_course(samples: &[Sample]) -> Vec<Span> {
+    let corrected: Vec<f64> = samples.iter().map(|sample| sample.corrected).collect();
+    let course: Vec<Option<f64>> = samples.iter().map(|sample| sample.course).collect();
+    let off: Vec<Option<f64>> = medians(&off_course(&corrected, &course)).collect();
+    // The mean turn since the start over each block, whose median is taken of the errors.
+    let mut sum = [0.0; 3];
+    let turned: Vec<[f64; 3]> = samples
+        .chunks(COURSE_SPAN)
+        .map(|block| {
+            let mut mean = [0.0; 3];
+            for sample in block {
+                for axis in 0..3 {
+                    sum[axis] += sample.turns[axis];
+                    mean[axis] += sum[axis] / block.len() as f64;
+                }
+            }
+            mean
+        })
+        .collect();
+    let between = |(off, turned): (&[Option<f64>], &[[f64; 3]])| {
+        let ([before, after], [from, to]) = (off, turned) else { return None };
+        let turns = std::array::from_fn(|axis| to[axis] - from[axis]);
+        Some(Span { error: (*before)? - (*after)?, turns, seconds: COURSE_SPAN as f64 * DT })
+    };
+    off.windows(2).zip(turned.windows(2)).filter_map(between).collect()
 }

@@ -1,4 +1,4 @@
-//! `gyronet calibrate`: gain and mounting of a unit's gyro, from drives with a reference yaw rate.
+//! `gyronet calibrate`: gain and mounting of a unit's gyro, from drives with a reference of their heading.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress, read_drive};
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Find gain and mounting of a unit's gyro.
 ///
 /// Each drive runs through the pipeline with the weights that the board runs. What the corrected yaw rate then lacks
-/// of the reference is put down to the gyro's gain and to how the unit is mounted: shares of the yaw, roll and pitch
+/// of the reference (a yaw rate, ref_gyr_z, or a course, ref_yaw) is put down to the gyro's gain and to how the unit is mounted: shares of the yaw, roll and pitch
 /// rate, each with its sigma. A share that the drives do not show (no turns, no tilt) is refused and left at zero. The
 /// file is for `gyronet device calibrate unit` and for `gyronet evaluate --calibration`, and belongs to these weights.
 #[derive(Debug, Clone, clap::Args)]
@@ -23,7 +23,7 @@ Examples:
   gyronet calibrate drive1.csv drive2.csv --out unit.json
   gyronet evaluate drive3.csv --calibration unit.json")]
 pub struct Args {
-    /// Recorded drives of the unit, with ref_gyr_z.
+    /// Recorded drives of the unit, with ref_gyr_z or ref_yaw.
     #[arg(required = true, value_name = "DRIVE")]
     files: Vec<PathBuf>,
     /// Write the calibration to this file.

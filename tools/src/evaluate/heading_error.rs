@@ -13,7 +13,7 @@ use serde::Serialize;
 /// A second has this many samples.
 const SECOND: usize = RATE_HZ as usize;
 /// The error against a course is a median over this many seconds.
-const BLOCK_S: usize = 10;
+pub const BLOCK_S: usize = 10;
 /// A median needs at least this many values of the course.
 const BLOCK_VALUES: usize = 3;
 /// Both headings are aligned at their median over this many seconds of known course.
@@ -157,11 +157,7 @@ fn against_course(estimate: &[f64], course: &[Option<f64>]) -> Option<HeadingErr
     let (first, _) = known.first()?;
     let begin = known.iter().take_while(|(k, _)| k - first < ALIGNED_S * SECOND).map(|(_, off)| *off);
     let aligned = median(begin.collect())?;
-    let block = |block: &[Option<f64>]| {
-        let values: Vec<f64> = block.iter().flatten().copied().collect();
-        median(values).filter(|_| block.iter().flatten().count() >= BLOCK_VALUES).map(|off| off - aligned)
-    };
-    let errors: Vec<Option<f64>> = off.chunks(BLOCK_S * SECOND).map(block).collect();
+    let errors: Vec<Option<f64>> = medians(&off).map(|off| Some(off? - aligned)).collect();
     let last = errors.iter().rev().find_map(|error| *error)?;
     let (end, _) = known.last()?;
     let enough = end - first + SECOND >= ALIGNED_S * SECOND;
@@ -180,6 +176,14 @@ pub fn off_course(estimate: &[f64], course: &[Option<f64>]) -> Vec<Option<f64>> 
         last
     };
     integral(estimate).into_iter().zip(course).map(off).collect()
+}
+
+/// Returns the median of each block of [`BLOCK_S`] seconds; `None` where too few values are known.
+pub fn medians(off: &[Option<f64>]) -> impl Iterator<Item = Option<f64>> {
+    off.chunks(BLOCK_S * SECOND).map(|block| {
+        let values: Vec<f64> = block.iter().flatten().copied().collect();
+        if values.len() < BLOCK_VALUES { None } else { median(values) }
+    })
 }
 
 /// Returns the bias that a gyro has had over a drive, by the line through its heading less the course, rad/s; `None`
