@@ -56,6 +56,9 @@ pub struct Args {
     /// Weight file of FoGNet [default: the one that comes with the library].
     #[arg(long, value_name = "BLOB")]
     fog_weights: Option<PathBuf>,
+    /// Weight file of a FoGNet that was trained on GyroNet's rate, for pseudo_fog [default: that of --fog-weights].
+    #[arg(long, value_name = "BLOB")]
+    pseudo_fog_weights: Option<PathBuf>,
 }
 
 /// Name of a sequence's pictures: folders of different data sets may have the same name.
@@ -104,6 +107,10 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     };
     let mut fog_state = FogNetState::ZERO;
     let mut fognet = FogNet::new(fog_blob, &mut fog_state);
+    let pseudo_weights = args.pseudo_fog_weights.as_deref().map(WeightFile::read_fognet).transpose()?;
+    let pseudo_blob = pseudo_weights.as_ref().map_or(Ok(fog_blob), |file| file.fog_blob())?;
+    let mut pseudo_state = FogNetState::ZERO;
+    let mut pseudo_fog = FogNet::new(pseudo_blob, &mut pseudo_state);
     let mut folders = Vec::new();
     for folder in &args.folders {
         folders.extend(sequence::find(folder)?);
@@ -115,6 +122,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         let bar = progress::bar(common, 5 * sequence.steps.len(), &sequence.name);
         let mut estimates = estimates::run(&sequence, &mut network, || bar.inc(1));
         estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
+        estimates.add_pseudo_fog(&sequence, &mut pseudo_fog, || bar.inc(1));
         bar.finish_and_clear();
         if let Some((_, joint)) = joint.iter().find(|(layout, _)| *layout == sequence.layout) {
             estimates.add_joint(&sequence, joint);

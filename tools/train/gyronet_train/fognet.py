@@ -40,6 +40,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("layout", choices=["kaist", "drives", "kingston"])
     parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="PATH")
     parser.add_argument("--validate", type=Path, nargs="+", metavar="PATH", help="the drives to validate with")
+    parser.add_argument(
+        "--rates", type=Path, metavar="FOLDER", help="rates of `gyronet replay --csv`, DRIVE.csv each, in place of the FoG's"
+    )
     parser.add_argument("--simulated", action="store_true", help="say in the provenance that the drives are")
     parser.add_argument("--init", type=Path, metavar="FILE", help="checkpoint to go on from")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
@@ -53,13 +56,18 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--weight-decay", type=float, default=0.0)
     parser.add_argument("--head-only", action="store_true", help="train FC3 and FC4 only")
     parser.add_argument("--seed", type=int, default=1)
-    return parser.parse_args()
+    args = parser.parse_args()
+    if args.rates and args.layout != "drives":
+        parser.error("--rates is for LAYOUT drives")
+    return args
 
 
 def load(args: argparse.Namespace) -> tuple[list[Seconds], list[Seconds]]:
     """The drives to train on and to validate with; pieces of a drive count as drives."""
     if args.layout != "kingston":
-        pieces = load_grid if args.layout == "drives" else lambda folder: [load_kaist(folder)]
+        rates = lambda path: args.rates and args.rates / path.name
+        grid = lambda path: load_grid(path, rates(path))
+        pieces = grid if args.layout == "drives" else lambda folder: [load_kaist(folder)]
         train = [piece for path in tqdm(args.train, "reading", disable=None) for piece in pieces(path)]
         return train, [piece for path in args.validate or [] for piece in pieces(path)]
     drive = load_kingston(args.train[0])

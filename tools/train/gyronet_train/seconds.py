@@ -88,16 +88,20 @@ def load_kaist(folder: Path) -> Seconds:
     )
 
 
-def load_grid(path: Path) -> list[Seconds]:
+def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
     """Read a drive that `gyronet import kaist` or `nclt` wrote: the pieces of whole seconds between its gaps, on the grid
-    of seconds from its first row. Raises ValueError that names what is wrong."""
+    of seconds from its first row. The rates for navigation of `gyronet replay --csv` stand in for the fibre-optic gyro
+    where they are given: the paper's pseudo-FoG. Raises ValueError that names what is wrong."""
     digest = hashlib.sha256(path.read_bytes())
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in DRIVE if name not in (table.dtype.names or ())]
     if missing:
         raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
     values = np.stack([table[name] for name in DRIVE], axis=1)
-    second = np.round((values[:, 0] - values[0, 0]) * RATE_HZ).astype(int) // RATE_HZ
+    row = np.round((values[:, 0] - values[0, 0]) * RATE_HZ).astype(int)
+    second = row // RATE_HZ
+    if rates:
+        values[:, 9] = turns(rates, values[0, 0], row)
     values[:, 4:7] -= values[second < STATIC_S, 4:7].mean(axis=0)
     values[:, 10] /= RATE_HZ
     whole = np.flatnonzero(np.bincount(second) == RATE_HZ)
@@ -109,6 +113,18 @@ def load_grid(path: Path) -> list[Seconds]:
         Seconds(path.stem, digest.hexdigest(), features[begin:end], turn[begin:end])
         for begin, end in zip(edges, edges[1:])
     ]
+
+
+def turns(path: Path, start: float, row: np.ndarray) -> np.ndarray:
+    """The turns of a drive's rows by the rates that `gyronet replay --csv` wrote; zero before the first, where the vehicle
+    stands."""
+    sent = np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="ascii")
+    at = np.round((sent["t_s"] - start) * RATE_HZ).astype(int)
+    if not np.isin(at, row).all():
+        raise ValueError(f"{path}: rates at times that the drive has no rows for")
+    turn = np.zeros(row[-1] + 1)
+    turn[at] = np.nan_to_num(sent["navigation"]) / RATE_HZ
+    return turn[row]
 
 
 def load_kingston(folder: Path) -> Seconds:

@@ -48,6 +48,20 @@ class Gaps(unittest.TestCase):
         np.testing.assert_allclose(second.turn[0], self.rows[1300:1400, REFERENCE].sum() / 100)
         np.testing.assert_allclose(second.features[0, 8], self.rows[1300:1400, FOG].sum())
 
+    def test_rates_stand_in_for_the_fibre_optic_gyro(self):
+        self.write(np.concatenate([np.arange(1010), np.arange(1230, 2400)]))
+        rates = self.path.with_name("rates.csv")
+        sent = np.concatenate([np.arange(300, 1010), np.arange(1230, 2400)])
+        lines = [f"{k / 100:.4f},{'' if k == 500 else k / 1000},ready" for k in sent]
+        rates.write_text("\n".join(["t_s,navigation,status", *lines]))
+        first, second = load_grid(self.path, rates)
+        self.assertEqual(first.features[:3, 8].tolist(), [0.0] * 3)
+        np.testing.assert_allclose(first.features[5, 8], np.arange(501, 600).sum() / 1e5)
+        np.testing.assert_allclose(second.features[0, 8], np.arange(1300, 1400).sum() / 1e5)
+        rates.write_text("t_s,navigation,status\n11.0,0.1,ready\n11.01,0.1,ready\n")
+        with self.assertRaisesRegex(ValueError, "rates.csv: rates at times that the drive has no rows for"):
+            load_grid(self.path, rates)
+
     def test_a_drive_that_begins_with_a_gap_is_named(self):
         self.write(np.concatenate([np.arange(200), np.arange(250, 2400)]))
         with self.assertRaisesRegex(ValueError, "any name.csv: wants an unbroken 100 Hz recording of more than 3 s"):

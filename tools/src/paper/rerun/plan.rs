@@ -79,6 +79,9 @@ impl Effort {
     };
 }
 
+/// Ends the name of the step that makes the rates of a drive.
+const RATES: &str = "-rates";
+
 /// Chooses the uses of sequences.
 type Choice = fn(Role) -> bool;
 
@@ -124,13 +127,17 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
     let csv = |name: &str| format!("{name}.csv");
     let show = |path: &Path| path.display().to_string();
     let used = |role: Choice| split.members.iter().filter(move |member| role(member.role));
-    // What a sequence's step leaves, one argument for each sequence that could be read.
+    // What a sequence's step leaves, one argument for each sequence that could be read; `suffix` names a later step of it.
+    let left =
+        |suffix: &str, role: Choice, before: Option<&str>, text: &dyn Fn(&super::split::Member) -> String| {
+            let arguments = used(role).map(|member| {
+                let texts = before.map(str::to_owned).into_iter().chain([text(member)]).collect();
+                Argument::If(step(&format!("{}{suffix}", member.name)), texts)
+            });
+            arguments.collect::<Vec<_>>()
+        };
     let of = |role: Choice, before: Option<&str>, text: &dyn Fn(&super::split::Member) -> String| {
-        let arguments = used(role).map(|member| {
-            let texts = before.map(str::to_owned).into_iter().chain([text(member)]).collect();
-            Argument::If(step(&member.name), texts)
-        });
-        arguments.collect::<Vec<_>>()
+        left("", role, before, text)
     };
     let (train, validate, tables): (Choice, Choice, Choice) =
         (|role| role == Role::Train, |role| role == Role::Validate, |role| role != Role::Train);
@@ -163,23 +170,45 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
         .given(of(validate, None, &|member| csv(&member.name)));
     steps.push(gyronet.makes(networks.join("gyronet.safetensors")));
     let simulated = split.members.iter().any(|member| member.simulated);
-    let fognet = Builder::new(step("fognet"), Program::Python)
-        .text(&[&"-m", &"gyronet_train.fognet", &"drives", &"--out", &show(&networks)])
-        .text(&[&"--epochs", &effort.fognet_epochs])
-        .given(simulated.then(|| Argument::Always("--simulated".into())))
-        .text(&[&"--train"])
-        .given(of(train, None, &|member| show(&drives.join(csv(&member.name)))))
-        .text(&[&"--validate"])
-        .given(of(validate, None, &|member| show(&drives.join(csv(&member.name)))));
-    steps.push(fognet.makes(networks.join("fognet.safetensors")));
-    for network in ["gyronet", "fognet"] {
-        let [from, to] =
-            [networks.join(format!("{network}.safetensors")), networks.join(format!("{network}.blob"))];
-        let quantize = Builder::new(step(&format!("{network}-weights")), Program::Gyronet)
+    let drive = |member: &super::split::Member| show(&drives.join(csv(&member.name)));
+    let fognet = |name: &str, suffix: &str, options: &[&dyn ToString]| {
+        Builder::new(step(name), Program::Python)
+            .text(&[&"-m", &"gyronet_train.fognet", &"drives", &"--out", &show(&networks)])
+            .text(&[&"--stem", &name, &"--epochs", &effort.fognet_epochs])
+            .text(options)
+            .given(simulated.then(|| Argument::Always("--simulated".into())))
+            .text(&[&"--train"])
+            .given(left(suffix, train, None, &drive))
+            .text(&[&"--validate"])
+            .given(left(suffix, validate, None, &drive))
+            .makes(networks.join(format!("{name}.safetensors")))
+    };
+    let quantize = |network: &str| {
+        let [from, to] = ["safetensors", "blob"].map(|kind| networks.join(format!("{network}.{kind}")));
+        Builder::new(step(&format!("{network}-weights")), Program::Gyronet)
             .text(&[&"quantize", &show(&from), &"--out", &show(&to)])
-            .needs(step(network));
-        steps.push(quantize.makes(to));
+            .needs(step(network))
+            .makes(to)
+    };
+    let weights = |network: &str, option: &str| {
+        let file = show(&networks.join(format!("{network}.blob")));
+        Argument::If(step(&format!("{network}-weights")), vec![option.to_owned(), file])
+    };
+    steps.extend([fognet("fognet", "", &[]), quantize("gyronet"), quantize("fognet")]);
+
+    // The pseudo-FoG: a FoGNet on the rate that GyroNet makes of the inertial sensor.
+    let rates = out.join("rates");
+    for member in used(|role| role != Role::Test) {
+        let file = rates.join(csv(&member.name));
+        let replay = Builder::new(step(&format!("{}{RATES}", member.name)), Program::Gyronet)
+            .text(&[&"replay", &drive(member)])
+            .given([weights("gyronet", "--weights")])
+            .text(&[&"--csv", &show(&file)])
+            .needs(step(&member.name));
+        steps.push(replay.makes(file));
     }
+    steps.push(fognet("pseudo_fog", RATES, &[&"--rates", &show(&rates)]));
+    steps.push(quantize("pseudo_fog"));
 
     let mut methods = Vec::new();
     if split.layout == Layout::Kaist {
@@ -213,15 +242,16 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
     }
 
     let report = out.join("report");
-    let weights = [("gyronet", "--weights"), ("fognet", "--fog-weights")].map(|(network, option)| {
-        let file = show(&networks.join(format!("{network}.blob")));
-        Argument::If(step(&format!("{network}-weights")), vec![option.to_owned(), file])
-    });
+    let networks = [
+        weights("gyronet", "--weights"),
+        weights("fognet", "--fog-weights"),
+        weights("pseudo_fog", "--pseudo-fog-weights"),
+    ];
     let tables = Builder::new(step("tables"), Program::Gyronet)
         .text(&[&"tables"])
         .given(of(tables, None, &|member| show(&member.folder)))
         .given(of(train, Some("--train"), &|member| show(&member.folder)))
-        .given(weights)
+        .given(networks)
         .given(methods)
         .text(&[&"--out", &show(&report)]);
     steps.push(tables.makes(report.join("report.html")));

@@ -73,8 +73,7 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl
 }
 
 impl Estimates {
-    /// Adds FoGNet, padded and not, and on GyroNet's rate, where there is an inertial sensor; `tick` is called for each
-    /// step of all three.
+    /// Adds FoGNet, padded and not, where there is an inertial sensor; `tick` is called for each step of both.
     pub fn add_fognet(
         &mut self,
         sequence: &Sequence,
@@ -91,11 +90,15 @@ impl Estimates {
             let (drive, run_time) = timed(|| fog_replay::run(sequence, network, config, &mut tick));
             self.push(method, drive.turns[self.start..].to_vec(), run_time);
         }
-        self.add_pseudo_fog(sequence, network, tick);
     }
 
     /// Adds FoGNet on GyroNet's rate, if there is one; `tick` is called for each step.
-    fn add_pseudo_fog(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, tick: impl FnMut()) {
+    pub fn add_pseudo_fog(
+        &mut self,
+        sequence: &Sequence,
+        network: &mut impl MinuteNetwork,
+        tick: impl FnMut(),
+    ) {
         let looped = self.methods.iter().find(|estimate| estimate.method == Method::GYRONET_LOOP);
         let Some((looped, looped_s)) = looped.and_then(|looped| Some((looped, looped.run_time?))) else {
             return;
