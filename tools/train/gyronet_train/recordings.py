@@ -2,7 +2,8 @@
 
 A drive is sampled at 100 Hz and stands still for its first three seconds. The
 gyro is taken less its own mean over those seconds (static initialisation), in
-rad/s; the accelerometer is taken as it is, in m/s^2.
+rad/s; the accelerometer is taken as it is, in m/s^2. Both are turned as the
+vehicle file beside the drive says.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
+from .vehicle import read_mounting
 
 RATE_HZ = 100
 STATIC_SAMPLES = 3 * RATE_HZ
@@ -42,7 +45,8 @@ def load_drive(path: Path) -> Drive:
 def load_pieces(path: Path) -> list[Drive]:
     """Read the pieces of one CSV between its gaps; static initialisation is that of the first. Raises ValueError that
     names the file and what is wrong with it."""
-    raw = path.read_bytes()
+    mounting = read_mounting(path)
+    digest = hashlib.sha256(path.read_bytes() + mounting.text).hexdigest()
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in COLUMNS if name not in (table.dtype.names or ())]
     if missing:
@@ -55,7 +59,7 @@ def load_pieces(path: Path) -> list[Drive]:
     pieces = np.split(np.arange(len(values)), broken)
     if len(pieces[0]) <= STATIC_SAMPLES:
         raise ValueError(f"{path}: wants an unbroken 100 Hz recording of more than 3 s")
-    force, gyro, reference = values[:, 1:4], values[:, 4:7], values[:, 7]
+    force, gyro, reference = mounting.turn(values[:, 1:4]), mounting.turn(values[:, 4:7]), values[:, 7]
     gyro = gyro - gyro[:STATIC_SAMPLES].mean(axis=0)
     kept = [rows for rows in pieces if len(rows) >= LEAST_SAMPLES] if len(pieces) > 1 else pieces
     if not kept:
@@ -63,7 +67,7 @@ def load_pieces(path: Path) -> list[Drive]:
     return [
         Drive(
             name=path.stem,
-            sha256=hashlib.sha256(raw).hexdigest(),
+            sha256=digest,
             features=np.concatenate([force[rows], gyro[rows]], axis=1).astype(np.float32),
             gyro_error=(gyro[rows, 2] - reference[rows]).astype(np.float32),
             reference_rate=reference[rows].astype(np.float32),

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .vehicle import read_mounting
+
 STEPS = 60  # of a window
 FOG = 8  # column of the gyro increment
 STATIC_S = 3.0
@@ -92,12 +94,14 @@ def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
     """Read a drive that `gyronet import kaist` or `nclt` wrote: the pieces of whole seconds between its gaps, on the grid
     of seconds from its first row. The rates for navigation of `gyronet replay --csv` stand in for the fibre-optic gyro
     where they are given: the paper's pseudo-FoG. Raises ValueError that names what is wrong."""
-    digest = hashlib.sha256(path.read_bytes())
+    mounting = read_mounting(path)
+    digest = hashlib.sha256(path.read_bytes() + mounting.text)
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in DRIVE if name not in (table.dtype.names or ())]
     if missing:
         raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
     values = np.stack([table[name] for name in DRIVE], axis=1)
+    values[:, 1:4], values[:, 4:7] = mounting.turn(values[:, 1:4]), mounting.turn(values[:, 4:7])
     row = np.round((values[:, 0] - values[0, 0]) * RATE_HZ).astype(int)
     second = row // RATE_HZ
     if rates:

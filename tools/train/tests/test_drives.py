@@ -67,6 +67,37 @@ class Gaps(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "any name.csv: wants an unbroken 100 Hz recording of more than 3 s"):
             load_pieces(self.path)
 
+    def test_rows_are_turned_as_the_vehicle_file_beside_the_drive_says(self):
+        self.write(np.arange(2400))
+        [plain], [seconds] = load_pieces(self.path), load_grid(self.path)
+        beside = self.path.with_suffix(".toml")
+        beside.write_text("[mounting]\nyaw_deg = 90.0\n[wheels]\nradius_m = 0.3\n")
+        [turned], [turned_seconds] = load_pieces(self.path), load_grid(self.path)
+        x, y, z, p, q, r = plain.features.T
+        np.testing.assert_allclose(turned.features.T, [-y, x, z, -q, p, r], atol=1e-6)
+        np.testing.assert_allclose(turned_seconds.features[:, 0], -seconds.features[:, 1], atol=1e-12)
+        np.testing.assert_allclose(turned_seconds.features[:, 4], seconds.features[:, 3], atol=1e-12)
+        # A training that is gone on with must not mix the two.
+        self.assertNotEqual(turned.sha256, plain.sha256)
+        beside.write_text("[mounting]\nyaw_deg = 90.0\napplied = true\n")
+        np.testing.assert_array_equal(load_pieces(self.path)[0].features, plain.features)
+
+    def test_a_sensor_on_its_side_has_its_yaw_on_another_axis(self):
+        self.write(np.arange(2400))
+        [plain] = load_pieces(self.path)
+        self.path.with_suffix(".toml").write_text("[mounting]\nroll_deg = 90.0\n")
+        [turned] = load_pieces(self.path)
+        np.testing.assert_allclose(turned.features[:, 5], plain.features[:, 4], atol=1e-6)
+        error = plain.features[:, 4] - plain.reference_rate
+        np.testing.assert_allclose(turned.gyro_error, error, atol=1e-6)
+
+    def test_a_vehicle_file_that_cannot_be_read_is_named(self):
+        self.write(np.arange(2400))
+        for text in ["mounting = 3", "[mounting", "[mounting]\nyaw_deg = 'left'", "[mounting]\nyaw_deg = nan"]:
+            self.path.with_suffix(".toml").write_text(text)
+            with self.assertRaisesRegex(ValueError, "any name.toml: "):
+                load_pieces(self.path)
+
 
 class Windows(unittest.TestCase):
     def test_the_rows_of_a_window(self):
