@@ -17,6 +17,7 @@ mod import_logs;
 mod mounting;
 mod pages;
 mod python_seconds;
+mod python_units;
 mod recordings_bad_input;
 mod replay_mcap;
 mod replay_via;

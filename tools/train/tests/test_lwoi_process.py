@@ -2,9 +2,10 @@
 
 import unittest
 
+from .needs_torch import torch
+
 import gpytorch
 import numpy as np
-import torch
 from torch import nn
 
 from gyronet_train.lwoi_process import (

@@ -3,6 +3,8 @@
 import unittest
 from dataclasses import replace
 
+from . import needs_torch  # noqa: F401
+
 import numpy as np
 
 from gyronet_train.lwoi_process import Errors

@@ -8,6 +8,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
+from . import needs_torch  # noqa: F401
+
 import numpy as np
 
 from .made_csv import write_drive

@@ -5,8 +5,9 @@ import unittest
 from dataclasses import replace
 from pathlib import Path
 
+from .needs_torch import torch
+
 import numpy as np
-import torch
 
 from gyronet_train.rinsw_detector import WINDOW, DetectorError, Detectors, Settings, load_detectors, train
 from gyronet_train.rinsw_profiles import Limits, agreement, label

@@ -9,8 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
+from .needs_torch import torch
+
 import numpy as np
-import torch
 from scipy.spatial.transform import Rotation
 
 from gyronet_train.rinsw import main

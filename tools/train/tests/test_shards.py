@@ -6,8 +6,9 @@ import tempfile
 import unittest
 from pathlib import Path
 
+from .needs_torch import torch
+
 import numpy as np
-import torch
 
 from gyronet_train.recordings import load_drive
 from gyronet_train.spans import Spans

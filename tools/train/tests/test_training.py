@@ -4,7 +4,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-import torch
+from .needs_torch import torch
 
 from gyronet_train.recordings import find_drive, load_drive
 from gyronet_train.spans import Spans
