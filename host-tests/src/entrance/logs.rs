@@ -27,10 +27,12 @@ pub fn file(data: &[u8]) {
     let mut samples = 0;
     for channel in log.channels.values() {
         samples += channel.len();
-        assert!(channel.windows(2).all(|pair| pair[0].0 < pair[1].0), "time rises");
+        let mut last = f64::NEG_INFINITY;
         for (seconds, value) in channel {
+            assert!(last < seconds, "time rises");
+            last = seconds;
             let finite = match value {
-                Value::Imu(force, rate) => force.iter().chain(rate).all(|value| value.is_finite()),
+                Value::Imu(force, rate) => force.iter().chain(&rate).all(|value| value.is_finite()),
                 Value::Odometry(speed, rate) => speed.is_finite() && rate.is_finite(),
                 Value::Position(fix) => fix.degrees.iter().all(|degrees| degrees.is_finite()),
                 Value::Number(number) => number.is_finite(),
@@ -161,7 +163,7 @@ mod tests {
         let bus = Bus::parse("a.dbc", DBC).unwrap();
         for (name, bytes) in seeds() {
             let log = read_bytes(name, &bytes, Some(&bus), &Columns::new()).unwrap();
-            assert!(log.channels.values().any(|channel| !channel.is_empty()), "{name}: {log:?}");
+            assert!(!log.channels.is_empty(), "{name}: {log:?}");
         }
     }
 }

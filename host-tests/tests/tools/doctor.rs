@@ -4,7 +4,9 @@ use gyronet_host_tests::recordings::{folder, trial};
 use gyronet_host_tests::require::{Need, wants};
 use gyronet_tools::doctor::{Doctor, Mounting, Noise, Verdict, page};
 use gyronet_tools::drive::vehicle::Vehicle;
-use gyronet_tools::import::drive::{Request, import, write_csv};
+use gyronet_tools::import::drive::{Logs, Request};
+use std::fs::File;
+use std::io::BufWriter;
 
 #[test]
 fn a_car_is_fit_and_its_reference_has_the_known_floor() {
@@ -40,10 +42,12 @@ fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
         text += &column(&format!("gyr_{axis}"), &format!("gyr_{axis}_dps"), "deg/s");
     }
     let vehicle = Vehicle::parse("vehicle.toml", &text).unwrap();
-    let imported = import(&Request { files: vec![path], vehicle, ..Request::default() }).unwrap();
-    assert_eq!((imported.rows.len(), imported.dropped), (180_000, 0), "{:?}", imported.report);
+    let request = Request { files: vec![path], vehicle, ..Request::default() };
+    let logs = Logs::read(&request).unwrap();
+    let drive = logs.drive(&request).unwrap();
+    assert_eq!((drive.seen.rows, logs.dropped), (180_000, 0), "{:?}", drive.report);
     let csv = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("static_doctor.csv");
-    write_csv(&imported.rows, std::fs::File::create(&csv).unwrap()).unwrap();
+    drive.write_csv(BufWriter::new(File::create(&csv).unwrap())).unwrap();
 
     let doctor = Doctor::examine(&csv).unwrap();
     let Some(Mounting { roll_deg, pitch_deg, force }) = doctor.mounting else { panic!() };

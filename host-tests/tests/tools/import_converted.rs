@@ -1,11 +1,12 @@
 //! Formats that `gyronet import` leaves to Python: refused with a command, which is run here as it stands in the message,
 //! and whose result is imported.
 
+use crate::imported::{Imported, import};
 use gyronet_host_tests::recordings::{folder, workspace};
 use gyronet_host_tests::require::{Need, python, wants};
 use gyronet_tools::bundled;
 use gyronet_tools::drive::vehicle::Vehicle;
-use gyronet_tools::import::drive::{Imported, Request, import};
+use gyronet_tools::import::drive::Request;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

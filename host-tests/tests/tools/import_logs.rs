@@ -1,13 +1,14 @@
 //! Logs of other people's tools read as the reference readers in Python read them, value by value, and imported or refused
 //! with the reason.
 
+use crate::imported::{Imported, import};
 use gyronet_host_tests::recordings::{folder, workspace};
 use gyronet_host_tests::require::{Need, python, wants};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::vehicle::{Columns, Vehicle};
 use gyronet_tools::import::can::Bus;
-use gyronet_tools::import::drive::{Imported, Request, import};
-use gyronet_tools::import::log::{Log, Value};
+use gyronet_tools::import::drive::Request;
+use gyronet_tools::import::log::{Log, Sample, Value};
 use gyronet_tools::import::{read_bytes, read_file};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -65,13 +66,24 @@ fn numbers(value: &Value) -> Vec<f64> {
     }
 }
 
+/// Returns the samples of each channel. A second bus stands apart in a log, which python-can leaves to its user.
+fn channels(log: &Log) -> BTreeMap<String, Vec<Sample>> {
+    let mut channels: BTreeMap<String, Vec<Sample>> = BTreeMap::new();
+    for (name, samples) in &log.channels {
+        let name = name.split('@').next().unwrap().to_owned();
+        channels.entry(name).or_default().extend(samples);
+    }
+    channels
+}
+
 /// Every value that the reference has and that comes in rising order of time is in the log, and no others.
 fn assert_same(log: &Log, reference: &BTreeMap<String, Vec<Vec<f64>>>, from_first: bool) -> usize {
-    assert_eq!(log.channels.keys().collect::<Vec<_>>(), reference.keys().collect::<Vec<_>>());
-    let start = log.channels.values().flatten().map(|(seconds, _)| *seconds).fold(f64::INFINITY, f64::min);
+    let channels = channels(log);
+    assert_eq!(channels.keys().collect::<Vec<_>>(), reference.keys().collect::<Vec<_>>());
+    let start = channels.values().flatten().map(|(seconds, _)| *seconds).fold(f64::INFINITY, f64::min);
     let start = if from_first { start } else { 0.0 };
     let mut compared = 0;
-    for (name, samples) in &log.channels {
+    for (name, samples) in &channels {
         let mut last = f64::NEG_INFINITY;
         let rising = reference[name].iter().filter(|row| {
             let rises = row[0] > last;
@@ -117,13 +129,7 @@ fn can_logs_are_read_as_by_python_can_and_cantools() {
     for (name, least) in [("logfile.asc", 13), ("test_CanMessage_V2_1.trc", 7)] {
         let Some(path) = log_file(test, name) else { return };
         let log = read_file(&path, Some(&bus), &Columns::new()).unwrap();
-        // A second bus stands apart here, which python-can leaves to its user.
-        let mut log_of_all = Log::default();
-        for (name, samples) in &log.channels {
-            let name = name.split('@').next().unwrap().to_owned();
-            log_of_all.channels.entry(name).or_default().extend(samples.iter().copied());
-        }
-        let compared = assert_same(&log_of_all, &reference(&python, &path, Some(&dbc)), true);
+        let compared = assert_same(&log, &reference(&python, &path, Some(&dbc)), true);
         assert!(compared >= least, "{name}: {compared} {log:?}");
     }
     // Its two frames have an identifier of 27 bits that is marked as one of 11: no DBC file can name it.

@@ -14,6 +14,7 @@ mod foreign_mounting;
 mod gyronet_golden;
 mod import_converted;
 mod import_logs;
+mod imported;
 mod mounting;
 mod pages;
 mod python_seconds;

@@ -60,12 +60,8 @@ fn demo_and_train(recording: &Recording) -> [String; 2] {
 
 /// Returns the page of a training whose course is made up, and whose gain is that of the library's weights.
 fn train(recording: &Recording, errors: &[DriveErrors]) -> String {
-    let drive = |name: &str| Examined {
-        path: name.into(),
-        name: name.to_owned(),
-        seconds: 612.0,
-        turned_rad: 40.0,
-    };
+    let drive =
+        |name: &str| Examined { path: name.into(), name: name.to_owned(), seconds: 612.0, turned_rad: 40.0 };
     let short = Refusal::TooShort { path: "drives/to the bakery.csv".into(), seconds: 12.0 };
     let roles = Roles {
         train: vec![drive("2024-03-01_a_name_that_is_rather_long"), drive("monday")],

@@ -13,7 +13,16 @@ fn the_trainers_unit_tests_pass() {
     let test = "the_trainers_unit_tests_pass";
     let Some(python) = require::python(test, &["numpy", "scipy"]) else { return };
     let output = Command::new(python)
-        .args(["-B", "-m", "unittest", "discover", "--start-directory", "tests", "--top-level-directory", "."])
+        .args([
+            "-B",
+            "-m",
+            "unittest",
+            "discover",
+            "--start-directory",
+            "tests",
+            "--top-level-directory",
+            ".",
+        ])
         .current_dir(workspace().join("tools/train"))
         .output()
         .unwrap();
@@ -22,9 +31,9 @@ fn the_trainers_unit_tests_pass() {
     let ran = said.lines().find_map(|line| line.strip_prefix("Ran ")).expect("a count of tests");
     let ran: usize = ran.split(' ').next().unwrap().parse().unwrap();
     // A module that is skipped counts as one.
-    let skipped = said.split_once("skipped=").map_or(0, |(_, count)| {
-        count.trim_end().trim_end_matches(')').parse().unwrap()
-    });
+    let skipped = said
+        .split_once("skipped=")
+        .map_or(0, |(_, count)| count.trim_end().trim_end_matches(')').parse().unwrap());
     if skipped > 0 {
         require::skipped(test, &format!("{skipped} modules of the trainer's want PyTorch"));
     }

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::vehicle::Vehicle;
-use gyronet_tools::import::drive::{Imported, Request, import, write_csv};
+use gyronet_tools::import::drive::{Logs, Request, Seen};
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::paper::tables::pictures;
 use gyronet_tools::simulate::layout::Layout;
@@ -95,31 +95,33 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
         return Err("--from should be seconds from the first sample on".into());
     }
     let vehicle = vehicle(args)?;
-    let Imported { rows, mut report, dropped } = import(&Request {
+    let request = Request {
         files: args.files.clone(),
         vehicle: vehicle.clone(),
         same_clock: args.same_clock,
         from: args.from,
-    })?;
+    };
+    let logs = Logs::read(&request)?;
+    let drive = logs.drive(&request)?;
+    let (Seen { rows, seconds, .. }, dropped, mut report) = (drive.seen, logs.dropped, drive.report.clone());
     if let Some(path) = &args.out {
         let error = WriteError::to(path);
-        write_csv(&rows, BufWriter::new(File::create(path).map_err(&error)?)).map_err(&error)?;
+        drive.write_csv(BufWriter::new(File::create(path).map_err(&error)?)).map_err(&error)?;
         let beside = write_vehicle(vehicle, path)?;
-        report.push(format!("{}: {} rows; {} beside it", path.display(), rows.len(), beside.display()));
+        report.push(format!("{}: {rows} rows; {} beside it", path.display(), beside.display()));
         // Read as all others will read it, so that its faults are known now.
-        if let Err(error) = Recording::read(path) {
+        if let Err(error) = Recording::check(path) {
             report.push(format!("other commands will refuse it: {error}"));
         }
     }
-    let seconds = rows.last().map_or(0.0, |row| row.seconds);
     let mut out = std::io::stdout().lock();
     if common.json {
         let json = serde_json::json!({
-            "seconds": seconds, "rows": rows.len(), "dropped": dropped, "report": report,
+            "seconds": seconds, "rows": rows, "dropped": dropped, "report": report,
         });
         return print_json(&mut out, &json);
     }
-    writeln!(out, "{seconds:.2} s, {} rows, {dropped} records dropped", rows.len())?;
+    writeln!(out, "{seconds:.2} s, {rows} rows, {dropped} records dropped")?;
     for line in report {
         writeln!(out, "  {line}")?;
     }

@@ -33,6 +33,8 @@ pub const WHEELS: usize = 4;
 pub const WHEEL_STANDS: f64 = 0.3;
 /// The median sample period may differ from 10 ms by at most this, microseconds.
 const PERIOD_TOLERANCE_US: u64 = 2_000;
+/// Rows that tell whether a drive of any length can begin: ten seconds.
+const BEGINNING: usize = 1_000;
 
 /// Holds one row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,6 +76,20 @@ impl Recording {
         Self::of(&name, file, Vehicle::of_drive(path)?)
     }
 
+    /// Checks a file of any length, with its beginning alone in memory.
+    ///
+    /// # Errors
+    /// As [`Recording::read`].
+    pub fn check(path: &Path) -> Result<(), DataError> {
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
+        let vehicle = Vehicle::of_drive(path)?;
+        let mut rows = Reader::new(&name, file)?.mounted(&vehicle);
+        let beginning = rows.by_ref().take(BEGINNING).collect::<Result<Vec<Row>, _>>()?;
+        Self { path: name, rows: beginning, missing: 0, vehicle }.checked()?;
+        rows.try_for_each(|row| row.map(drop))
+    }
+
     /// Parses any input; errors name it `path`.
     ///
     /// # Errors
@@ -84,10 +100,7 @@ impl Recording {
 
     fn of(path: &str, input: impl std::io::Read, vehicle: Vehicle) -> Result<Self, DataError> {
         let rows = Reader::new(path, input)?.mounted(&vehicle).collect::<Result<Vec<Row>, _>>()?;
-        let mut recording = Self { path: path.to_owned(), rows, missing: 0, vehicle };
-        recording.check_length()?;
-        recording.check_period()?;
-        recording.check_wheels()?;
+        let mut recording = Self { path: path.to_owned(), rows, missing: 0, vehicle }.checked()?;
         recording.missing = recording
             .periods()
             .map(|us| (us + PERIOD_US / 2) / PERIOD_US)
@@ -112,6 +125,13 @@ impl Recording {
     /// Returns the times between neighbouring rows, microseconds.
     fn periods(&self) -> impl Iterator<Item = u64> {
         self.rows.windows(2).map(|pair| pair[1].sample.time.0 - pair[0].sample.time.0)
+    }
+
+    fn checked(self) -> Result<Self, DataError> {
+        self.check_length()?;
+        self.check_period()?;
+        self.check_wheels()?;
+        Ok(self)
     }
 
     fn check_length(&self) -> Result<(), DataError> {

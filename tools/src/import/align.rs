@@ -15,8 +15,8 @@ const COMMON: (f64, f64) = (20.0, 0.5);
 const LEAST: f64 = 0.8;
 /// A second peak this far from the first, s, must be lower by this much.
 const RIVAL: (f64, f64) = (3.0, 0.05);
-/// Longest drive that is tried, coarse samples; all lags of a longer one take minutes.
-const MOST: usize = 16_384;
+/// Time of each that is compared, from its beginning, s: all lags of more would take minutes.
+pub const LONGEST: f64 = 8_192.0;
 
 /// The offset of a clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,12 +32,10 @@ pub struct Offset {
 /// # Errors
 /// The reason why there is none.
 pub fn offset(first: &Rate, second: &Rate) -> Result<Offset, String> {
+    let (first, second) = (beginning(first), beginning(second));
     let (Some(one), Some(two)) = (on_grid(first, STEPS[0]), on_grid(second, STEPS[0])) else {
         return Err("the files hold no yaw rate that both have".to_owned());
     };
-    if one.values.len().max(two.values.len()) > MOST {
-        return Err("the files are too long to be compared".to_owned());
-    }
     let least = COMMON.0.max(COMMON.1 * STEPS[0] * one.values.len().min(two.values.len()) as f64) / STEPS[0];
     let lags = -(two.values.len() as isize)..one.values.len() as isize;
     let all: Vec<(isize, f64)> = lags
@@ -59,6 +57,11 @@ pub fn offset(first: &Rate, second: &Rate) -> Result<Offset, String> {
         return Err(format!("two offsets fit alike: correlations {coarse:.3} and {rival:.3}"));
     }
     Ok(Offset { seconds, coefficient })
+}
+
+fn beginning(rate: &Rate) -> &Rate {
+    let start = rate.first().map_or(0.0, |(seconds, _)| *seconds);
+    &rate[..rate.partition_point(|(seconds, _)| seconds - start < LONGEST)]
 }
 
 fn fine(first: &Rate, second: &Rate, near: f64) -> Option<Offset> {
@@ -91,7 +94,7 @@ struct Grid {
 fn on_grid(rate: &Rate, step: f64) -> Option<Grid> {
     let (first, last) = (rate.first()?.0, rate.last()?.0);
     let count = ((last - first) / step) as usize;
-    if rate.len() < 2 || count == 0 || count > (MOST as f64 * STEPS[0] / STEPS[1]) as usize {
+    if rate.len() < 2 || count == 0 {
         return None;
     }
     let mut at = 0;

@@ -1,11 +1,12 @@
-//! A drive from one or more logs: channels chosen, clocks aligned, everything on the 100 Hz grid of the IMU's file.
+//! A drive from one or more logs: channels chosen, clocks aligned, everything on the 100 Hz grid of the IMU's file, one row
+//! in memory at a time.
 
 use super::align::{self, Offset};
 use super::can::Bus;
 use super::course::{Course, courses};
 use super::error::ImportError;
 use super::format::read_into;
-use super::grid::{self, resample};
+use super::grid::{self, Grid, Stream};
 use super::log::Log;
 use super::select::{self, Channel, File, Selection, select};
 use crate::drive::DT;
@@ -50,45 +51,116 @@ pub struct Row {
     pub wheels: [Option<f64>; 4],
 }
 
-/// A drive that was made.
+/// Holds the logs of a drive.
 #[derive(Debug)]
-pub struct Imported {
-    /// Its rows; those in a gap of the IMU are missing.
-    pub rows: Vec<Row>,
-    /// One line for each thing that a user should know: what was taken, how, and what was dropped.
-    pub report: Vec<String>,
+pub struct Logs {
+    files: Vec<File>,
+    report: Vec<String>,
     /// Records that could not be used.
     pub dropped: u64,
 }
 
-/// Reads logs and makes one drive of them.
-///
-/// # Errors
-/// [`ImportError`].
-pub fn import(request: &Request) -> Result<Imported, ImportError> {
-    let bus = request.vehicle.bus.dbc.as_deref().map(Bus::read).transpose()?;
-    let mut files = Vec::new();
-    for path in &request.files {
-        let log = Log { wanted: Some(select::numbers(&request.vehicle)), ..Log::default() };
-        let log = read_into(path, bus.as_ref(), &request.vehicle.columns, log)?;
-        files.push(File { path: path.display().to_string(), log });
-    }
-    let mut report = Vec::new();
-    for File { path, log } in &files {
-        for (reason, count) in &log.dropped {
-            report.push(format!("{path}: dropped {count}: {reason}"));
+impl Logs {
+    /// Reads the logs that are asked for.
+    ///
+    /// # Errors
+    /// [`ImportError`].
+    pub fn read(request: &Request) -> Result<Self, ImportError> {
+        let bus = request.vehicle.bus.dbc.as_deref().map(Bus::read).transpose()?;
+        let mut files = Vec::new();
+        let mut report = Vec::new();
+        for path in &request.files {
+            let log = Log { wanted: Some(select::numbers(&request.vehicle)), ..Log::default() };
+            let log = read_into(path, bus.as_ref(), &request.vehicle.columns, log)?;
+            let path = path.display().to_string();
+            for (reason, count) in &log.dropped {
+                report.push(format!("{path}: dropped {count}: {reason}"));
+            }
+            let passed_over: u64 = log.passed_over.values().sum();
+            if passed_over > 0 {
+                let kinds: Vec<&str> = log.passed_over.keys().map(String::as_str).take(6).collect();
+                report.push(format!(
+                    "{path}: {passed_over} records of no use to a drive: {}",
+                    kinds.join(", ")
+                ));
+            }
+            files.push(File { path, log });
         }
-        let passed_over: u64 = log.passed_over.values().sum();
-        if passed_over > 0 {
-            let kinds: Vec<&str> = log.passed_over.keys().map(String::as_str).take(6).collect();
-            report.push(format!("{path}: {passed_over} records of no use to a drive: {}", kinds.join(", ")));
+        let dropped = files.iter().flat_map(|file| file.log.dropped.values()).sum();
+        Ok(Self { files, report, dropped })
+    }
+
+    /// Makes one drive of them.
+    ///
+    /// # Errors
+    /// [`ImportError`].
+    pub fn drive<'a>(&'a self, request: &'a Request) -> Result<Drive<'a>, ImportError> {
+        let mut report = self.report.clone();
+        let selection = select(&self.files, &request.vehicle)?;
+        let offsets = clocks(&self.files, &selection, request, &mut report)?;
+        let (start, count) = span(&selection, request, &mut report)?;
+        let mut drive = Drive {
+            has_odometry: has_odometry(&selection, &offsets, &request.vehicle, start, &mut report),
+            courses: courses_by_row(&selection, &offsets, start, &mut report),
+            selection,
+            offsets,
+            vehicle: &request.vehicle,
+            start,
+            count,
+            report,
+            seen: Seen::default(),
+        };
+        let mut seen = Seen::default();
+        drive.rows().for_each(|row| seen.add(&row));
+        drive.check(&self.files)?;
+        let missing = count - seen.rows;
+        if missing > 0 {
+            drive.report.push(format!("imu: {missing} of {count} rows lie in gaps and are left out"));
+        }
+        drive.seen = seen;
+        Ok(drive)
+    }
+}
+
+/// What is known of all rows together.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seen {
+    /// Their number.
+    pub rows: usize,
+    /// The time of the last one, s.
+    pub seconds: f64,
+    reference: bool,
+    course: bool,
+    wheels: [bool; 4],
+}
+
+impl Seen {
+    fn add(&mut self, row: &Row) {
+        self.rows += 1;
+        self.seconds = row.seconds;
+        self.reference |= row.reference.is_some();
+        self.course |= row.course.is_some();
+        for (seen, wheel) in self.wheels.iter_mut().zip(row.wheels) {
+            *seen |= wheel.is_some();
         }
     }
-    let dropped = files.iter().flat_map(|file| file.log.dropped.values()).sum();
-    let selection = select(&files, &request.vehicle)?;
-    let offsets = clocks(&files, &selection, request, &mut report)?;
-    let rows = rows(&selection, &offsets, request, &mut report)?;
-    Ok(Imported { rows, report, dropped })
+}
+
+/// Holds a drive whose rows are made as they are asked for.
+#[derive(Debug)]
+pub struct Drive<'a> {
+    selection: Selection<'a>,
+    offsets: Vec<f64>,
+    vehicle: &'a Vehicle,
+    start: f64,
+    count: usize,
+    /// Courses by the row that is nearest to them; the rows between have none.
+    courses: Vec<(usize, [f64; 3])>,
+    has_odometry: bool,
+    /// One line for each thing that a user should know: what was taken, how, and what was dropped.
+    pub report: Vec<String>,
+    /// What its rows are together.
+    pub seen: Seen,
 }
 
 /// These are added to the times of each file.
@@ -103,10 +175,9 @@ fn clocks(
     if request.same_clock || files.len() == 1 {
         return Ok(offsets);
     }
-    let imu = selection.imu.imu();
     let mounting = &request.vehicle.mounting;
-    let turning: Vec<(f64, f64)> =
-        imu.iter().map(|(seconds, [.., x, y, z])| (*seconds, mounting.turn([*x, *y, *z])[2])).collect();
+    let yaw = move |(seconds, [.., x, y, z]): (f64, [f64; 6])| (seconds, [mounting.turn([x, y, z])[2]]);
+    let turning = thinned(|| Box::new(selection.imu.imu().map(yaw)));
     let used = |file: usize| all(selection).any(|channel| channel.file == file);
     for (file, File { path, .. }) in files.iter().enumerate().filter(|(file, _)| *file != main && used(*file))
     {
@@ -134,11 +205,9 @@ fn all<'s>(selection: &'s Selection<'_>) -> impl Iterator<Item = &'s Channel<'s>
 /// A yaw rate of a file: the vehicle's own, that of its odometry, its wheels' difference, or its course's change.
 fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<(Vec<(f64, f64)>, String)> {
     let here = |channel: &Option<Channel<'_>>| channel.as_ref().is_some_and(|channel| channel.file == file);
-    let plain =
-        |series: Vec<(f64, [f64; 1])>| series.into_iter().map(|(seconds, [rate])| (seconds, rate)).collect();
     let own = [&selection.reference_rate, &selection.odometry].into_iter().find(|channel| here(channel));
     if let Some(channel) = own.and_then(Option::as_ref) {
-        return Some((plain(channel.yaw_rate()), channel.name.to_owned()));
+        return Some((thinned(|| channel.yaw_rate()), channel.name.to_owned()));
     }
     let [fr, rr, fl, rl] = &selection.wheels;
     for (right, left) in [(rr, rl), (fr, fl)] {
@@ -147,12 +216,14 @@ fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<
         else {
             continue;
         };
-        let ((right, _), (left, is_rate)) = (right.speed(), left.speed());
-        let scale = if is_rate { vehicle.radius_m() } else { 1.0 };
+        let scale = if left.speed().1 { vehicle.radius_m() } else { 1.0 };
         let track = vehicle.wheels.track_m.unwrap_or(1.5);
-        let start = right.first()?.0.max(left.first()?.0);
-        let count = ((right.last()?.0.min(left.last()?.0) - start) / DT).clamp(0.0, LONGEST / DT) as usize;
-        let both = resample(&right, start, count).into_iter().zip(resample(&left, start, count));
+        let start = right.samples.first().0.max(left.samples.first().0);
+        let end = right.samples.last().0.min(left.samples.last().0);
+        let seconds = (end - start).clamp(0.0, align::LONGEST);
+        let (right, left) =
+            (Grid::new(|| right.speed().0, 0.0, start), Grid::new(|| left.speed().0, 0.0, start));
+        let both = right.zip(left).take((seconds / DT) as usize);
         let rate = both.enumerate().filter_map(|(k, (right, left))| {
             Some((start + DT * k as f64, scale * (right?[0] - left?[0]) / track))
         });
@@ -168,178 +239,206 @@ fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<
     Some((courses.windows(2).filter_map(change).collect(), "the change of the course".to_owned()))
 }
 
-fn rows(
+/// A rate as far as it is compared, with at most one value in 10 ms.
+fn thinned<'a>(stream: impl Fn() -> Stream<'a, 1>) -> Vec<(f64, f64)> {
+    let start = stream().next().map_or(0.0, |(seconds, _)| seconds);
+    let near = stream().take_while(|(seconds, _)| seconds - start < align::LONGEST);
+    let mut thin: Vec<(f64, f64)> = Vec::new();
+    // The values that are in the last mean.
+    let mut count = 0.0;
+    for (seconds, [rate]) in near {
+        match thin.last_mut() {
+            Some((from, mean)) if seconds - *from < 0.5 * DT => {
+                count += 1.0;
+                *from += (seconds - *from) / count;
+                *mean += (rate - *mean) / count;
+            }
+            _ => {
+                count = 1.0;
+                thin.push((seconds, rate));
+            }
+        }
+    }
+    thin
+}
+
+/// The time of the first row and the number of rows.
+fn span(
     selection: &Selection<'_>,
-    offsets: &[f64],
     request: &Request,
     report: &mut Vec<String>,
-) -> Result<Vec<Row>, ImportError> {
-    let vehicle = &request.vehicle;
-    let imu = selection.imu.imu();
+) -> Result<(f64, usize), ImportError> {
     let channel = selection.imu.name.to_owned();
-    let (Some(first), Some(last)) = (imu.first(), imu.last()) else {
-        return Err(ImportError::Short { channel, seconds: 0.0 });
-    };
-    let start = first.0 + request.from;
-    let seconds = last.0 - start;
+    let start = selection.imu.samples.first().0 + request.from;
+    let seconds = selection.imu.samples.last().0 - start;
     if !(SHORTEST..LONGEST).contains(&seconds) {
         return Err(ImportError::Short { channel, seconds });
     }
-    let hz = grid::rate(&imu).unwrap_or_default();
+    let hz = grid::rate(selection.imu.imu()).unwrap_or_default();
     if !RATES.contains(&hz) {
         return Err(ImportError::Rate { channel, hz });
     }
-    let count = (seconds / DT) as usize + 1;
     report.push(format!("imu: {channel}, {hz:.1} Hz to 100 Hz: {}", grid::method(hz)));
-    let imu = resample(&imu, start, count);
-    let reference = selection.reference_rate.as_ref().map(|channel| {
-        report.push(format!("reference rate: {}", channel.name));
-        resample(&shifted(channel.yaw_rate(), offsets[channel.file]), start, count)
-    });
-    let wheels = wheels(selection, offsets, vehicle, (start, count), report);
-    let course = selection.position.as_ref().map(|channel| {
-        let courses = courses(&channel.fixes());
-        let mut sigmas: Vec<f64> = courses.iter().map(|course| course.sigma).collect();
-        sigmas.sort_unstable_by(f64::total_cmp);
-        let middle = sigmas
-            .get(sigmas.len() / 2)
-            .map_or("no course".to_owned(), |sigma| format!("median sigma {sigma:.3} rad"));
-        report.push(format!(
-            "position: {}, {} courses of {} fixes, {middle}",
-            channel.name,
-            courses.len(),
-            channel.samples.len()
-        ));
-        on_rows(&courses, start - offsets[channel.file], count)
-    });
-    let mut missing = 0;
-    let rows: Vec<Row> = (0..count)
-        .filter_map(|k| {
-            let Some([fx, fy, fz, wx, wy, wz]) = imu[k] else {
-                missing += 1;
-                return None;
-            };
-            let ([fx, fy, fz], [wx, wy, wz]) =
-                (vehicle.mounting.turn([fx, fy, fz]), vehicle.mounting.turn([wx, wy, wz]));
-            Some(Row {
-                seconds: DT * k as f64,
-                imu: [fx, fy, fz, wx, wy, wz],
-                reference: reference.as_ref().and_then(|reference| reference[k]).map(|[rate]| rate),
-                course: course.as_ref().and_then(|course| course[k]),
-                wheels: std::array::from_fn(|wheel| {
-                    wheels[wheel].as_ref().and_then(|wheel| wheel[k]).map(|[rate]| rate)
-                }),
-            })
-        })
-        .collect();
-    if missing > 0 {
-        report.push(format!("imu: {missing} of {count} rows lie in gaps and are left out"));
-    }
-    Ok(rows)
+    Ok((start, (seconds / DT) as usize + 1))
 }
 
-type Grid = Option<Vec<Option<[f64; 1]>>>;
-
-/// The rates of the wheels, rad/s: each by its own signal, or the rear ones by the odometry.
-fn wheels(
+/// Says what the wheels are taken from, and whether that is an odometry.
+fn has_odometry(
     selection: &Selection<'_>,
     offsets: &[f64],
     vehicle: &Vehicle,
-    (start, count): (f64, usize),
+    start: f64,
     report: &mut Vec<String>,
-) -> [Grid; 4] {
+) -> bool {
+    if let Some(channel) = &selection.reference_rate {
+        report.push(format!("reference rate: {}", channel.name));
+    }
     let radius = vehicle.radius_m();
     let assumed = if vehicle.wheels.radius_m.is_some() { "" } else { ", assumed: name wheels.radius_m" };
     if let Some(channel) = &selection.odometry {
-        let speed = shifted(channel.odometry(), offsets[channel.file]);
-        let half = 0.5 * vehicle.wheels.track_m.unwrap_or_default();
-        let overlap = speed.last().map_or(0.0, |(seconds, _)| seconds - start);
+        let overlap = channel.samples.last().0 + offsets[channel.file] - start;
         if overlap < OVERLAP {
             report.push(format!("wheels: {} has no time in common with the IMU", channel.name));
-            return [const { None }; 4];
+            return false;
         }
         report.push(format!("wheels: the rear ones by {}, radius {radius} m{assumed}", channel.name));
-        let grid = resample(&speed, start, count);
-        let side = |sign: f64| {
-            let rate = |[speed, turn]: [f64; 2]| [(speed + sign * half * turn) / radius];
-            Some(grid.iter().map(|row| row.map(rate)).collect())
-        };
-        return [None, side(1.0), None, side(-1.0)];
+        return true;
     }
-    let wheels = selection.wheels.map(|channel| {
-        let channel = channel?;
-        let (speed, is_rate) = channel.speed();
-        let scale = if is_rate { 1.0 } else { 1.0 / radius };
-        let rate = resample(&shifted(speed, offsets[channel.file]), start, count);
-        Some(rate.into_iter().map(|row| row.map(|[rate]| [scale * rate])).collect())
-    });
     let names: Vec<&str> = selection.wheels.iter().flatten().map(|channel| channel.name).collect();
     if !names.is_empty() {
         report.push(format!("wheels: {}, radius {radius} m{assumed}", names.join(", ")));
     }
-    wheels
+    false
 }
 
-fn shifted<const N: usize>(mut series: Vec<(f64, [f64; N])>, offset: f64) -> Vec<(f64, [f64; N])> {
-    for (seconds, _) in &mut series {
-        *seconds += offset;
-    }
-    series
+/// The courses by the row that is nearest to each.
+fn courses_by_row(
+    selection: &Selection<'_>,
+    offsets: &[f64],
+    start: f64,
+    report: &mut Vec<String>,
+) -> Vec<(usize, [f64; 3])> {
+    let Some(channel) = &selection.position else { return Vec::new() };
+    let courses = courses(&channel.fixes());
+    let mut sigmas: Vec<f64> = courses.iter().map(|course| course.sigma).collect();
+    sigmas.sort_unstable_by(f64::total_cmp);
+    let middle = sigmas
+        .get(sigmas.len() / 2)
+        .map_or("no course".to_owned(), |sigma| format!("median sigma {sigma:.3} rad"));
+    report.push(format!(
+        "position: {}, {} courses of {} fixes, {middle}",
+        channel.name,
+        courses.len(),
+        channel.samples.len()
+    ));
+    let row = |course: &Course| {
+        let at = ((course.seconds + offsets[channel.file] - start) / DT).round();
+        (at >= 0.0).then_some((at as usize, [course.rad, course.sigma, course.speed]))
+    };
+    courses.iter().filter_map(row).collect()
 }
 
-/// Each course in the row that is nearest to it; the rows between have none.
-fn on_rows(courses: &[Course], start: f64, count: usize) -> Vec<Option<[f64; 3]>> {
-    let mut rows = vec![None; count];
-    for Course { seconds, rad, sigma, speed } in courses {
-        let at = ((seconds - start) / DT).round();
-        if at >= 0.0
-            && let Some(row) = rows.get_mut(at as usize)
-        {
-            *row = Some([*rad, *sigma, *speed]);
-        }
-    }
-    rows
-}
-
-/// Writes a drive as the CSV that every command reads; columns that are empty throughout are left out.
-///
-/// # Errors
-/// The writer's.
-pub fn write_csv(rows: &[Row], mut out: impl Write) -> io::Result<()> {
-    let has_reference = rows.iter().any(|row| row.reference.is_some());
-    let has_course = rows.iter().any(|row| row.course.is_some());
-    let has_wheel: [bool; 4] =
-        std::array::from_fn(|wheel| rows.iter().any(|row| row.wheels[wheel].is_some()));
-    write!(out, "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z")?;
-    if has_reference {
-        write!(out, ",ref_gyr_z")?;
-    }
-    if has_course {
-        write!(out, ",ref_yaw,ref_yaw_sigma,gnss_speed")?;
-    }
-    for wheel in (0..4).filter(|wheel| has_wheel[*wheel]) {
-        write!(out, ",wheel{}_rate", wheel + 1)?;
-    }
-    writeln!(out)?;
-    for row in rows {
-        write!(out, "{:.2}", row.seconds)?;
-        for value in row.imu {
-            write!(out, ",{value:.7}")?;
-        }
-        if has_reference {
-            field(&mut out, row.reference)?;
-        }
-        if has_course {
-            for k in 0..3 {
-                field(&mut out, row.course.map(|course| course[k]))?;
+impl<'a> Drive<'a> {
+    /// Returns the rows; those in a gap of the IMU are missing.
+    pub fn rows(&self) -> impl Iterator<Item = Row> {
+        let start = self.start;
+        let mut imu = Grid::new(|| self.selection.imu.imu(), 0.0, start);
+        let mut reference = self.grid(self.selection.reference_rate.as_ref(), Channel::yaw_rate);
+        let odometry = self.selection.odometry.as_ref().filter(|_| self.has_odometry);
+        let mut odometry = self.grid(odometry, Channel::odometry);
+        let mut wheels = self
+            .selection
+            .wheels
+            .each_ref()
+            .map(|wheel| self.grid(wheel.as_ref(), |channel| channel.speed().0));
+        let (half, radius) = (0.5 * self.vehicle.wheels.track_m.unwrap_or_default(), self.vehicle.radius_m());
+        let scales = self.selection.wheels.each_ref().map(|wheel| {
+            let is_rate = wheel.as_ref().is_some_and(|wheel| wheel.speed().1);
+            if is_rate { 1.0 } else { 1.0 / radius }
+        });
+        let mut courses = self.courses.iter().peekable();
+        let row = move |k| {
+            let imu = imu.next().flatten();
+            let reference = reference.as_mut().and_then(|grid| grid.next().flatten());
+            let mut rates: [Option<f64>; 4] = std::array::from_fn(|wheel| {
+                let [speed] = wheels[wheel].as_mut()?.next()??;
+                Some(scales[wheel] * speed)
+            });
+            if let Some([speed, turn]) = odometry.as_mut().and_then(|grid| grid.next().flatten()) {
+                rates =
+                    [None, Some((speed + half * turn) / radius), None, Some((speed - half * turn) / radius)];
             }
+            let mut course = None;
+            while let Some((at, value)) = courses.next_if(|(at, _)| *at <= k) {
+                course = (*at == k).then_some(*value);
+            }
+            let [fx, fy, fz, wx, wy, wz] = imu?;
+            let [[fx, fy, fz], [wx, wy, wz]] =
+                [[fx, fy, fz], [wx, wy, wz]].map(|vector| self.vehicle.mounting.turn(vector));
+            let (seconds, imu) = (DT * k as f64, [fx, fy, fz, wx, wy, wz]);
+            Some(Row { seconds, imu, reference: reference.map(|[rate]| rate), course, wheels: rates })
+        };
+        (0..self.count).filter_map(row)
+    }
+
+    /// A channel on the rows.
+    fn grid<'s, const N: usize>(
+        &'s self,
+        channel: Option<&'s Channel<'a>>,
+        of: fn(&Channel<'a>) -> Stream<'a, N>,
+    ) -> Option<Grid<'a, N>> {
+        let channel = channel?;
+        Some(Grid::new(|| of(channel), self.offsets[channel.file], self.start))
+    }
+
+    /// Checks that no samples were lost between their temporary file and here.
+    fn check(&self, files: &[File]) -> Result<(), ImportError> {
+        let failed =
+            all(&self.selection).find_map(|channel| Some((channel.file, channel.samples.failure()?)));
+        failed
+            .map_or(Ok(()), |(file, source)| Err(ImportError::Io { path: files[file].path.clone(), source }))
+    }
+
+    /// Writes the drive as the CSV that every command reads; columns that are empty throughout are left out.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn write_csv(&self, mut out: impl Write) -> io::Result<()> {
+        let Seen { reference, course, wheels, .. } = self.seen;
+        write!(out, "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z")?;
+        if reference {
+            write!(out, ",ref_gyr_z")?;
         }
-        for wheel in (0..4).filter(|wheel| has_wheel[*wheel]) {
-            field(&mut out, row.wheels[wheel])?;
+        if course {
+            write!(out, ",ref_yaw,ref_yaw_sigma,gnss_speed")?;
+        }
+        for wheel in (0..4).filter(|wheel| wheels[*wheel]) {
+            write!(out, ",wheel{}_rate", wheel + 1)?;
         }
         writeln!(out)?;
+        for row in self.rows() {
+            write!(out, "{:.2}", row.seconds)?;
+            for value in row.imu {
+                write!(out, ",{value:.7}")?;
+            }
+            if reference {
+                field(&mut out, row.reference)?;
+            }
+            if course {
+                for k in 0..3 {
+                    field(&mut out, row.course.map(|course| course[k]))?;
+                }
+            }
+            for wheel in (0..4).filter(|wheel| wheels[*wheel]) {
+                field(&mut out, row.wheels[wheel])?;
+            }
+            writeln!(out)?;
+        }
+        if let Some(error) = all(&self.selection).find_map(|channel| channel.samples.failure()) {
+            return Err(error);
+        }
+        out.flush()
     }
-    out.flush()
 }
 
 fn field(out: &mut impl Write, value: Option<f64>) -> io::Result<()> {

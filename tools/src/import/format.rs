@@ -69,7 +69,7 @@ fn read(
     columns: &Columns,
     mut log: Log,
 ) -> Result<Log, ImportError> {
-    let io = |source| ImportError::Io { path: name.to_owned(), source };
+    let io = |source: std::io::Error| ImportError::Io { path: name.to_owned(), source };
     let refuse = |reason: &str| ImportError::Format { path: name.to_owned(), reason: reason.to_owned() };
     // A file's buffer holds them all at the first look.
     let head = input.fill_buf().map_err(io)?;
@@ -94,6 +94,10 @@ fn read(
         candump::read(dialect, input, bus, &mut log).map_err(io)?;
     } else {
         table::read(input, columns, &mut log).map_err(|error| refuse(&error.to_string()))?;
+    }
+    if let Some(error) = log.failed.take() {
+        let source = std::io::Error::new(error.kind(), format!("temporary file: {error}"));
+        return Err(io(source));
     }
     Ok(log)
 }

@@ -11,12 +11,17 @@ const AVERAGED_HZ: f64 = 150.0;
 /// Gaps are longer than this many periods.
 const GAP_PERIODS: f64 = 2.5;
 
+/// Periods that the rate is taken of, at most: the beginning of a long log.
+const RATED: usize = 100_000;
+
 /// Samples of a vector, in rising order of time.
-pub type Series<const N: usize> = [(f64, [f64; N])];
+pub type Stream<'a, const N: usize> = Box<dyn Iterator<Item = (f64, [f64; N])> + 'a>;
 
 /// Returns the rate by the median period, Hz.
-pub fn rate<const N: usize>(series: &Series<N>) -> Option<f64> {
-    let mut periods: Vec<f64> = series.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+pub fn rate<const N: usize>(stream: Stream<'_, N>) -> Option<f64> {
+    let mut last = None;
+    let period = |(seconds, _)| last.replace(seconds).map(|last| seconds - last);
+    let mut periods: Vec<f64> = stream.map(period).take(1 + RATED).flatten().collect();
     if periods.is_empty() {
         return None;
     }
@@ -36,29 +41,54 @@ pub fn method(hz: f64) -> &'static str {
     }
 }
 
-/// Returns the values at `start + k * 10 ms` for k below `rows`; `None` in gaps.
-pub fn resample<const N: usize>(series: &Series<N>, start: f64, rows: usize) -> Vec<Option<[f64; N]>> {
-    let hz = rate(series).unwrap_or(100.0);
-    let longest = GAP_PERIODS / hz;
-    let mut at = 0;
-    let row = |k: usize| {
-        let time = start + DT * k as f64;
-        if hz >= AVERAGED_HZ {
-            while at < series.len() && series[at].0 < time - 0.5 * DT {
-                at += 1;
-            }
-            let near = series[at..].iter().take_while(|sample| sample.0 < time + 0.5 * DT);
-            let (count, sum) = near.fold((0, [0.0; N]), |(count, sum), (_, value)| {
-                (count + 1, std::array::from_fn(|axis| sum[axis] + value[axis]))
-            });
-            return (count > 0).then(|| sum.map(|sum| sum / f64::from(count)));
+/// Samples brought to `start + k * 10 ms`, row after row; `None` in gaps.
+pub struct Grid<'a, const N: usize> {
+    stream: std::iter::Peekable<Stream<'a, N>>,
+    before: Option<(f64, [f64; N])>,
+    hz: f64,
+    start: f64,
+    row: usize,
+}
+
+impl<'a, const N: usize> Grid<'a, N> {
+    /// Begins at `start`. `stream` gives the samples anew each time it is called, `offset` is added to their times.
+    pub fn new(stream: impl Fn() -> Stream<'a, N>, offset: f64, start: f64) -> Self {
+        let hz = rate(stream()).unwrap_or(100.0);
+        let shifted: Stream<'a, N> =
+            Box::new(stream().map(move |(seconds, value)| (seconds + offset, value)));
+        Self { stream: shifted.peekable(), before: None, hz, start, row: 0 }
+    }
+
+    fn mean(&mut self, time: f64) -> Option<[f64; N]> {
+        while self.stream.next_if(|sample| sample.0 < time - 0.5 * DT).is_some() {}
+        let (mut count, mut sum) = (0, [0.0; N]);
+        while let Some((_, value)) = self.stream.next_if(|sample| sample.0 < time + 0.5 * DT) {
+            count += 1;
+            sum = std::array::from_fn(|axis| sum[axis] + value[axis]);
         }
-        while at + 1 < series.len() && series[at + 1].0 <= time {
-            at += 1;
+        (count > 0).then(|| sum.map(|sum| sum / f64::from(count)))
+    }
+}
+
+impl<const N: usize> Iterator for Grid<'_, N> {
+    type Item = Option<[f64; N]>;
+
+    /// Never ends.
+    fn next(&mut self) -> Option<Self::Item> {
+        let time = self.start + DT * self.row as f64;
+        self.row += 1;
+        if self.hz >= AVERAGED_HZ {
+            return Some(self.mean(time));
         }
-        between(series.get(at)?, series.get(at + 1), time, longest)
-    };
-    (0..rows).map(row).collect()
+        if self.before.is_none() {
+            self.before = self.stream.next();
+        }
+        while let Some(sample) = self.stream.next_if(|sample| sample.0 <= time) {
+            self.before = Some(sample);
+        }
+        let longest = GAP_PERIODS / self.hz;
+        Some(self.before.and_then(|before| between(&before, self.stream.peek(), time, longest)))
+    }
 }
 
 /// The value at a time from the sample before and the one behind.
@@ -82,6 +112,10 @@ fn between<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn resample(series: &[(f64, [f64; 1])], start: f64, rows: usize) -> Vec<Option<[f64; 1]>> {
+        Grid::new(|| Box::new(series.iter().copied()), 0.0, start).take(rows).collect()
+    }
 
     fn sine(hz: f64, seconds: f64) -> Vec<(f64, [f64; 1])> {
         let samples = (hz * seconds) as usize;

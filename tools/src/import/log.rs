@@ -1,9 +1,12 @@
 //! A log as all formats give it: named channels of timed measurements in SI units, and a count of what was dropped.
 
+use super::samples::Samples;
 use std::collections::BTreeMap;
 
-/// Samples of one channel that are kept: over a day at 100 Hz, 2.7 hours at 1 kHz.
-pub const MAX_SAMPLES: usize = 10_000_000;
+/// Samples of one channel that are kept: over a day at 1 kHz.
+pub const MAX_SAMPLES: usize = 100_000_000;
+/// Fixes of one channel that are kept: a day at 20 Hz. A course needs them all in memory.
+const MAX_FIXES: usize = 2_000_000;
 /// Channels of one file; a log has tens, a bus with a large DBC file some thousands of signals.
 const MAX_CHANNELS: usize = 4_096;
 /// Reasons that are counted apart.
@@ -88,21 +91,21 @@ impl Value {
 pub type Sample = (f64, Value);
 
 /// The channels of one file.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct Log {
     /// The samples of each channel, by name, in rising order of time.
-    pub channels: BTreeMap<String, Vec<Sample>>,
+    pub channels: BTreeMap<String, Samples>,
     /// The units of plain numbers, by channel, where the log has them.
     pub units: BTreeMap<String, String>,
     /// Records that were not used, by reason.
     pub dropped: BTreeMap<String, u64>,
     /// Records that have no use for a drive, by type.
     pub passed_over: BTreeMap<String, u64>,
-    /// Names of the plain numbers that a drive is made of; of any other only the first and the last sample stay, since a bus
-    /// has thousands. `None` keeps all.
+    /// Names of the plain numbers that a drive is made of; of any other only the ends and the number of samples are known,
+    /// since a bus has thousands. `None` keeps all.
     pub wanted: Option<Vec<String>>,
-    /// The number of samples of the channels that were not wanted.
-    pub(super) unwanted: BTreeMap<String, usize>,
+    /// The reason why samples could not be kept.
+    pub(super) failed: Option<std::io::Error>,
 }
 
 impl Log {
@@ -111,32 +114,33 @@ impl Log {
         if !seconds.is_finite() || !value.is_finite() {
             return self.drop(format!("{channel}: not a finite number"));
         }
-        if !self.channels.contains_key(channel) {
+        let sample = (seconds, value);
+        let Some(samples) = self.channels.get_mut(channel) else {
             if self.channels.len() >= MAX_CHANNELS {
                 return self.drop("more channels than can be kept".to_owned());
             }
-            self.channels.insert(channel.to_owned(), Vec::new());
-        }
-        let Some(samples) = self.channels.get_mut(channel) else { return };
-        if samples.first().is_some_and(|(_, first)| first.kind() != value.kind()) {
+            // A name may say the file too.
+            let is_wanted = |wanted: &Vec<String>| wanted.iter().any(|name| name.ends_with(channel));
+            let kept = value.kind() != Kind::Number || self.wanted.as_ref().is_none_or(is_wanted);
+            match Samples::new(sample, kept) {
+                Ok(samples) => drop(self.channels.insert(channel.to_owned(), samples)),
+                Err(error) => self.failed = Some(error),
+            }
+            return;
+        };
+        if samples.kind() != value.kind() {
             return self.drop(format!("{channel}: another type under the same name"));
         }
-        if samples.len() >= MAX_SAMPLES {
-            return self.drop(format!("{channel}: beyond the {MAX_SAMPLES} samples that are kept"));
+        let most = if value.kind() == Kind::Position { MAX_FIXES } else { MAX_SAMPLES };
+        if samples.len() >= most {
+            return self.drop(format!("{channel}: beyond the {most} samples that are kept"));
         }
-        if samples.last().is_some_and(|(last, _)| seconds <= *last) {
+        if seconds <= samples.last().0 {
             return self.drop(format!("{channel}: time does not rise"));
         }
-        // A name may say the file too.
-        let is_wanted = |wanted: &Vec<String>| wanted.iter().any(|name| name.ends_with(channel));
-        if matches!(value, Value::Number(_)) && !self.wanted.as_ref().is_none_or(is_wanted) {
-            samples.truncate(1);
-            match self.unwanted.get_mut(channel) {
-                Some(count) => *count += 1,
-                None => drop(self.unwanted.insert(channel.to_owned(), 1)),
-            }
+        if self.failed.is_none() {
+            self.failed = samples.push(sample).err();
         }
-        samples.push((seconds, value));
     }
 
     /// Counts a record that could not be used.
@@ -151,11 +155,9 @@ impl Log {
 
     /// Returns the names, kinds and rates of the channels, Hz.
     pub fn catalogue(&self) -> impl Iterator<Item = (&str, Kind, usize, f64)> {
-        self.channels.iter().filter_map(|(name, samples)| {
-            let (first, last) = (samples.first()?, samples.last()?);
-            let count = self.unwanted.get(name).copied().unwrap_or(samples.len());
-            let rate = (count - 1) as f64 / (last.0 - first.0).max(1e-9);
-            Some((name.as_str(), first.1.kind(), count, rate))
+        self.channels.iter().map(|(name, samples)| {
+            let rate = (samples.len() - 1) as f64 / (samples.last().0 - samples.first().0).max(1e-9);
+            (name.as_str(), samples.kind(), samples.len(), rate)
         })
     }
 }
@@ -173,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_numbers_that_are_not_wanted_two_samples_stay() {
+    fn of_numbers_that_are_not_wanted_none_is_kept() {
         let mut log = Log { wanted: Some(vec!["bus.blf:A.RL".to_owned()]), ..Log::default() };
         for k in 0..101 {
             let seconds = 0.01 * f64::from(k);
@@ -181,7 +183,7 @@ mod tests {
             log.add("A.RR", seconds, Value::Number(1.0));
             log.add("odometry", seconds, Value::Odometry(1.0, 0.0));
         }
-        assert_eq!(["A.RL", "A.RR", "odometry"].map(|name| log.channels[name].len()), [101, 2, 101]);
+        assert_eq!(["A.RL", "A.RR", "odometry"].map(|name| log.channels[name].iter().count()), [101, 0, 101]);
         for (name, _, count, hz) in log.catalogue() {
             assert!(count == 101 && (hz - 100.0).abs() < 1e-6, "{name} {count} {hz}");
         }
@@ -195,7 +197,7 @@ mod tests {
         }
         log.add("a", 0.3, Value::Number(f64::INFINITY));
         log.add("a", 0.3, Value::Odometry(1.0, 0.0));
-        let times: Vec<f64> = log.channels["a"].iter().map(|(seconds, _)| *seconds).collect();
+        let times: Vec<f64> = log.channels["a"].iter().map(|(seconds, _)| seconds).collect();
         assert_eq!(times, [0.0, 0.1, 0.2]);
         let dropped: Vec<_> = log.dropped.iter().map(|(reason, count)| (reason.as_str(), *count)).collect();
         let expected = [

@@ -1,7 +1,9 @@
 //! The channels of several files that a drive is made of: by type where one fits, by name where several do.
 
 use super::error::ImportError;
+use super::grid::Stream;
 use super::log::{Fix, Kind, Log, Sample, Value};
+use super::samples::Samples;
 use crate::drive::vehicle::Vehicle;
 
 /// The name with which a role is left out.
@@ -22,7 +24,7 @@ pub struct File {
 pub struct Channel<'a> {
     pub file: usize,
     pub name: &'a str,
-    pub samples: &'a [Sample],
+    pub samples: &'a Samples,
     pub unit: &'a str,
 }
 
@@ -128,7 +130,7 @@ fn by_name<'a>(
 
 fn channels(files: &[File]) -> impl Iterator<Item = Channel<'_>> {
     files.iter().enumerate().flat_map(|(file, File { log, .. })| {
-        log.channels.iter().filter(|(_, samples)| !samples.is_empty()).map(move |(name, samples)| Channel {
+        log.channels.iter().map(move |(name, samples)| Channel {
             file,
             name,
             samples,
@@ -144,40 +146,43 @@ fn listed(files: &[File], fits: impl Fn(Kind) -> bool) -> Vec<String> {
     fitting.map(|(name, kind, _, hz)| format!("{name} ({}, {hz:.1} Hz)", kind.name())).take(20).collect()
 }
 
-impl Channel<'_> {
+impl<'a> Channel<'a> {
     fn kind(&self) -> Kind {
-        self.samples.first().map_or(Kind::Number, |(_, value)| value.kind())
+        self.samples.kind()
+    }
+
+    fn stream<const N: usize>(&self, of: impl Fn(Value) -> Option<[f64; N]> + 'a) -> Stream<'a, N> {
+        let pick = move |(seconds, value): Sample| Some((seconds, of(value)?));
+        Box::new(self.samples.iter().filter_map(pick))
     }
 
     /// Specific force and angular rate of each sample.
-    pub fn imu(&self) -> Vec<(f64, [f64; 6])> {
-        let six = |(seconds, value): &Sample| match value {
-            Value::Imu([fx, fy, fz], [wx, wy, wz]) => Some((*seconds, [*fx, *fy, *fz, *wx, *wy, *wz])),
+    pub fn imu(&self) -> Stream<'a, 6> {
+        self.stream(|value| match value {
+            Value::Imu([fx, fy, fz], [wx, wy, wz]) => Some([fx, fy, fz, wx, wy, wz]),
             _ => None,
-        };
-        self.samples.iter().filter_map(six).collect()
+        })
     }
 
     /// Speed and yaw rate of each sample of an odometry.
-    pub fn odometry(&self) -> Vec<(f64, [f64; 2])> {
-        let two = |(seconds, value): &Sample| match value {
-            Value::Odometry(speed, rate) => Some((*seconds, [*speed, *rate])),
+    pub fn odometry(&self) -> Stream<'a, 2> {
+        self.stream(|value| match value {
+            Value::Odometry(speed, rate) => Some([speed, rate]),
             _ => None,
-        };
-        self.samples.iter().filter_map(two).collect()
+        })
     }
 
     /// The fixes.
     pub fn fixes(&self) -> Vec<(f64, Fix)> {
-        let fix = |(seconds, value): &Sample| match value {
-            Value::Position(fix) => Some((*seconds, *fix)),
+        let fix = |(seconds, value)| match value {
+            Value::Position(fix) => Some((seconds, fix)),
             _ => None,
         };
         self.samples.iter().filter_map(fix).collect()
     }
 
     /// A wheel's speed, m/s or, in rad/s, its rate: by the unit, m/s without one.
-    pub fn speed(&self) -> (Vec<(f64, [f64; 1])>, bool) {
+    pub fn speed(&self) -> (Stream<'a, 1>, bool) {
         let unit = self.unit.trim().to_lowercase();
         let scale = match unit.as_str() {
             "km/h" | "kph" | "kmh" | "km/hr" => 1.0 / 3.6,
@@ -188,27 +193,22 @@ impl Channel<'_> {
         // A robot's joints come without a unit, in rad/s.
         let is_rate = matches!(unit.as_str(), "rad/s" | "rpm" | "1/min")
             || unit.is_empty() && self.name.starts_with('/');
-        (self.numbers(scale), is_rate)
+        let speed = move |value| match value {
+            Value::Number(number) => Some([scale * number]),
+            _ => None,
+        };
+        (self.stream(speed), is_rate)
     }
 
     /// The yaw rate of any channel that has one, rad/s to the left.
-    pub fn yaw_rate(&self) -> Vec<(f64, [f64; 1])> {
+    pub fn yaw_rate(&self) -> Stream<'a, 1> {
         let unit = self.unit.trim().to_lowercase();
         let degrees = matches!(unit.as_str(), "deg/s" | "°/s" | "degree/s" | "deg/sec" | "grad/s");
         let scale = if degrees { std::f64::consts::PI / 180.0 } else { 1.0 };
-        let rate = |(seconds, value): &Sample| match value {
-            Value::Imu(_, [_, _, rate]) | Value::Odometry(_, rate) => Some((*seconds, [*rate])),
-            Value::Number(rate) => Some((*seconds, [scale * rate])),
+        self.stream(move |value| match value {
+            Value::Imu(_, [_, _, rate]) | Value::Odometry(_, rate) => Some([rate]),
+            Value::Number(rate) => Some([scale * rate]),
             Value::Position(_) => None,
-        };
-        self.samples.iter().filter_map(rate).collect()
-    }
-
-    fn numbers(&self, scale: f64) -> Vec<(f64, [f64; 1])> {
-        let number = |(seconds, value): &Sample| match value {
-            Value::Number(number) => Some((*seconds, [scale * number])),
-            _ => None,
-        };
-        self.samples.iter().filter_map(number).collect()
+        })
     }
 }

@@ -92,16 +92,8 @@ impl Time {
 /// [`TableError`]. A row that is cut short or has text where a number should be is counted.
 pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(), TableError> {
     let (header, rate) = header(input)?;
-    let split = |line: &str| -> Vec<String> {
-        let fields = match header.1 {
-            Some(separator) => {
-                line.split(separator).map(|field| field.trim().trim_matches('"')).collect::<Vec<_>>()
-            }
-            None => line.split_whitespace().collect(),
-        };
-        fields.into_iter().map(str::to_owned).collect()
-    };
-    let names = split(&header.0);
+    let (header, separator) = header;
+    let names: Vec<String> = split(&header, separator).into_iter().map(str::to_owned).collect();
     let find = |ours: &str| find(&names, columns, ours);
     let at = |name: &str| names.iter().position(|column| column == name);
     let times = match find("t_s")? {
@@ -131,7 +123,7 @@ pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(
         if line.trim().is_empty() {
             continue;
         }
-        let mut row = split(&line);
+        let mut row = split(&line, separator);
         // Some exports end each row, but not the header, with a separator.
         if row.len() == names.len() + 1 {
             row.pop_if(|last| last.is_empty());
@@ -199,6 +191,14 @@ fn header(input: &mut Input<'_>) -> Result<Header, TableError> {
         };
     }
     Err(TableError::Unknown)
+}
+
+/// Splits a row; without a separator at white space.
+fn split(line: &str, separator: Option<char>) -> Vec<&str> {
+    match separator {
+        Some(separator) => line.split(separator).map(|field| field.trim().trim_matches('"')).collect(),
+        None => line.split_whitespace().collect(),
+    }
 }
 
 /// Says where a column of ours is, and its unit in SI.
@@ -300,7 +300,7 @@ mod tests {
                     PacketCounter\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\n\
                     65535\t1\t2\t3\t0.1\t0.2\t0.3\n00000\t1\t2\t3\t0.1\t0.2\t0.3\n";
         let log = table(text, "").unwrap();
-        let imu = &log.channels["imu"];
+        let imu: Vec<_> = log.channels["imu"].iter().collect();
         assert_eq!(imu[1], (655.36, Value::Imu([1.0, 2.0, 3.0], [0.1, 0.2, 0.3])));
         assert!((imu[1].0 - imu[0].0 - 0.01).abs() < 1e-9);
     }
@@ -313,7 +313,7 @@ mod tests {
                     03584\t\t\t3.0\t5.2\t-7.7\t0.1\t0.2\t0.3\t\t\r\n";
         let log = table(text, "").unwrap();
         assert_eq!(log.channels.keys().collect::<Vec<_>>(), ["PacketCounter", "imu"]);
-        assert_eq!((log.channels["imu"].len(), log.channels["imu"][0].0), (2, 3_583.0 / 40.0));
+        assert_eq!((log.channels["imu"].len(), log.channels["imu"].first().0), (2, 3_583.0 / 40.0));
         assert!(log.dropped.is_empty(), "{log:?}");
     }
 
@@ -323,10 +323,10 @@ mod tests {
                    acc_z={name='c',unit='g'}\ngyr_x={name='d',unit='deg/s'}\ngyr_y={name='e',unit='deg/s'}\n\
                    gyr_z={name='f',unit='deg/s'}\nspeed={name='v',unit='km/h'}";
         let log = table("v;Zeit;a;b;c;d;e;f\n36;1000;0;0;1;0;0;180\n36;x;0;0;1;0;0;180\n1;2\n", map).unwrap();
-        let (seconds, Value::Imu(force, rate)) = log.channels["imu"][0] else { panic!() };
+        let (seconds, Value::Imu(force, rate)) = log.channels["imu"].first() else { panic!() };
         assert_eq!((seconds, force[2]), (1.0, 9.806_65));
         assert!((rate[2] - std::f64::consts::PI).abs() < 1e-12);
-        assert_eq!(log.channels["v"], [(1.0, Value::Number(10.0))]);
+        assert_eq!(log.channels["v"].iter().collect::<Vec<_>>(), [(1.0, Value::Number(10.0))]);
         assert_eq!(log.dropped.values().collect::<Vec<_>>(), [&1, &1]);
     }
 
