@@ -120,7 +120,8 @@ impl Counts {
 /// Returns the root of the workspace that this crate was built in: images are built from there.
 #[must_use]
 pub fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    let tools = Path::new(env!("CARGO_MANIFEST_DIR"));
+    tools.parent().unwrap_or(tools).to_owned()
 }
 
 /// Returns the folder that cargo builds in: the one that this program lies in if cargo has built it there, so that

@@ -78,7 +78,8 @@ fn gains(gain: &Gain, validation: &Gain) -> String {
         _ => "",
     };
     format!(
-        "{}<p class=\"note\">Mean and standard deviation over the drives held out; the last column is the drive that chose \
+        "{}<p class=\"note\">The angle that a rate is wrong by after 1 s, on average, over that of the gyro less its bias at rest: \
+         below 1 is better. Mean and standard deviation over the drives held out; the last column is the drive that chose \
          the epoch, and flatters. The last two rows are what the board sends with these weights, in integers; the others \
          need none.{one}</p>\n",
         table("methods", "", &header, rows)
@@ -116,7 +117,7 @@ fn courses(history: &History) -> String {
     Chart { title: "Error on the drive that chooses", axes, same_scale: false, curves: errors }.html()
         + &Chart {
             title: "Loss on the training drives",
-            axes: "in units of the gyro error's deviation, over epochs",
+            axes: "error, in the gyro error's deviation, and a tenth of the expected error's log loss; over epochs",
             same_scale: false,
             curves: curves(|seed| &seed.loss, 1.0),
         }
