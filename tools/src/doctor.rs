@@ -116,6 +116,9 @@ fn start(path: &Path) -> Finding {
     match run() {
         Ok(()) => Finding::good("start", "Static initialisation succeeds."),
         Err(reason) => {
+            let reason = reason.to_string();
+            // The page has its own name, and may be sent to others.
+            let reason = reason.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&reason);
             Finding::bad("start", format!("{reason}; `gyronet import --from` leaves out a beginning."))
         }
     }

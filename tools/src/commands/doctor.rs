@@ -70,7 +70,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
 /// Says what calibration and training would gain on this drive, or why that cannot be known.
 fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
-    let refused = |error: &dyn std::fmt::Display| format!("Cannot be said: {error}.");
+    let refused = |error: &dyn std::fmt::Display| {
+        let reason = error.to_string();
+        let reason = reason.strip_prefix(&format!("{}: ", args.file.display())).unwrap_or(&reason);
+        format!("Cannot be said: {reason}.")
+    };
     let recording = match read_drive(&args.file, common) {
         Ok(recording) => recording,
         Err(error) => return vec![("calibration and training", refused(&error))],
@@ -96,7 +100,10 @@ fn unit(args: &Args, recording: &Recording, common: Common) -> Result<String, Bo
         None => format!("{name} {value:+.4} (sigma {sigma:.4}): not told from zero"),
         Some(reason) => format!("{name}: {reason}"),
     });
-    Ok(format!("{}.", shares.collect::<Vec<_>>().join("; ")))
+    Ok(format!(
+        "Shares of the roll rate, the pitch rate and the yaw rate itself (gain) in the yaw rate's error: {}.",
+        shares.collect::<Vec<_>>().join("; ")
+    ))
 }
 
 /// The error of what is sent over that of static initialisation, by the weights in use: the figure that a training would
@@ -108,7 +115,11 @@ fn trained(args: &Args, recording: &Recording, common: Common) -> Result<String,
         let error = errors.methods[method].error;
         error.mean_1s_rad.or(error.rms_rad)
     };
-    let named = if errors.methods[Method::STATIC].error.mean_1s_rad.is_some() { "in 1 s" } else { "RMS" };
+    let named = if errors.methods[Method::STATIC].error.mean_1s_rad.is_some() {
+        "The heading is off by so much after 1 s, on average"
+    } else {
+        "The heading is off by so much over the drive, RMS"
+    };
     let (Some(still), Some(updated), Some(sent), Some(linear)) = (
         figure(Method::STATIC),
         figure(Method::STATIC_ZERO_RATE),
@@ -118,9 +129,9 @@ fn trained(args: &Args, recording: &Recording, common: Common) -> Result<String,
         return Err("the drive has no figure that compares methods".into());
     };
     Ok(format!(
-        "Error {named}: static initialisation {still:.6} rad; over it {:.2} with zero-rate updates, {:.2} sent with these \
-         weights, {:.2} by the bundled linear window. Training would have to lower these; by how much is not known from one \
-         drive: it takes several of one vehicle, one of them kept apart.",
+        "{named}: {still:.6} rad by static initialisation alone; {:.2} of that with zero-rate updates, {:.2} as sent with \
+         the weights in use, {:.2} by the library's linear window. Training would have to lower these; by how much is not \
+         known from one drive: it takes several of one vehicle, one of them kept apart.",
         updated / still,
         sent / still,
         linear / still

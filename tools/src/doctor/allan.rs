@@ -105,7 +105,7 @@ pub fn finding(noise: Option<&[Option<Noise>; 3]>, standstill: Option<&Range<usi
     Finding::note(
         "gyro noise",
         format!(
-            "About z: angular random walk {walk:.3} deg/sqrt(h), {bottom}; the engine's vibration included."
+            "About z: angular random walk {walk:.3} deg/sqrt(h), {bottom}; what shakes a standing vehicle included."
         ),
     )
 }

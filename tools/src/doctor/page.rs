@@ -115,6 +115,11 @@ fn allan_section(allan: &[Allan; 3], noise: &[Option<Noise>; 3]) -> String {
             figure(bottom.map(|(_, tau)| format!("{tau:.0}"))),
         ]
     });
-    let header = ["axis", "random walk, deg/√h", "bias instability, deg/h", "at, s"];
-    chart.log_html() + &table("methods", "", &header, rows)
+    let header =
+        ["axis", "angular random walk, deg/√h", "bias instability, deg/h", "at an averaging time of, s"];
+    chart.log_html()
+        + &table("methods", "", &header, rows)
+        + "<p class=\"note\">By the longest standstill. The random walk is the deviation at 1 s as the falling part of the curve \
+           has it, the bias instability its lowest point over 0.664 (IEEE Std 952); a dash where the curve still falls at its \
+           end. What shakes a standing vehicle is in both.</p>\n"
 }

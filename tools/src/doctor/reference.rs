@@ -10,6 +10,8 @@ use std::ops::Range;
 const WHAT: &str = "reference";
 /// A yaw rate and a course may be late by this much, s.
 const LATE: (f64, f64) = (0.015, 0.5);
+/// Seconds at rest that show a scatter.
+const LEAST_AT_REST: usize = 5;
 /// Two courses further apart than this give no yaw rate, s.
 const COURSE_GAP: f64 = 2.0;
 
@@ -33,19 +35,25 @@ fn of_rate(gyro: &align::Rate, rate: &align::Rate, percent: f64, noise: &str) ->
         Ok(Offset { seconds, coefficient }) => Finding {
             what: WHAT,
             verdict: if seconds.abs() < LATE.0 { Verdict::Good } else { Verdict::Bad },
-            text: format!(
-                "{rows}, correlation with the gyro {coefficient:.4}, {:+.1} ms late{noise}.",
-                -1e3 * seconds
-            ),
+            text: format!("{rows}, correlation with the gyro {coefficient:.4}, {}{noise}.", delay(seconds)),
         },
         Err(reason) => Finding::bad(WHAT, format!("{rows} that does not fit the gyro: {reason}{noise}.")),
     }
+}
+
+/// Says how late a reference is whose clock is to be moved so far.
+fn delay(seconds: f64) -> String {
+    let word = if seconds > 0.0 { "early" } else { "late" };
+    format!("{:.1} ms {word}", 1e3 * seconds.abs())
 }
 
 /// Says by how much the reference's angles of one second scatter at rest.
 fn scatter(reference: &[Option<f64>]) -> String {
     let angles: Vec<f64> =
         reference.chunks_exact(SECOND).map(|second| second.iter().flatten().sum::<f64>() * DT).collect();
+    if angles.len() < LEAST_AT_REST {
+        return String::new();
+    }
     let mean = angles.iter().sum::<f64>() / angles.len() as f64;
     let variance = angles.iter().map(|angle| (angle - mean).powi(2)).sum::<f64>() / angles.len() as f64;
     format!("; at rest it scatters by {:.6} rad in 1 s: smaller errors cannot be seen", variance.sqrt())
@@ -64,8 +72,8 @@ fn of_course(gyro: &align::Rate, course: &align::Rate) -> Finding {
             what: WHAT,
             verdict: if seconds.abs() < LATE.1 { Verdict::Good } else { Verdict::Note },
             text: format!(
-                "{values}; its change agrees with the gyro (correlation {coefficient:.3}), {:.0} ms late.",
-                -1e3 * seconds
+                "{values}; its change agrees with the gyro (correlation {coefficient:.3}), {}.",
+                delay(seconds)
             ),
         },
         Err(reason) => Finding::note(WHAT, format!("{values}; not laid on the gyro: {reason}.")),

@@ -3,6 +3,7 @@
 use super::finding::Finding;
 use super::recording::{Rows, SECOND};
 use crate::drive::DT;
+use gyronet::bias::STATIC_SAMPLES;
 use std::ops::Range;
 
 /// A turn of more than this counts, rad.
@@ -15,8 +16,8 @@ const NEEDED: (f64, f64) = (6.0, 300.0);
 pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
     let bias = standstills.first().map_or(0.0, |span| rows.mean_yaw_rate(span.clone()));
     let (turns, turned) = turns(rows, bias);
-    let seconds = rows.len() as f64 * DT;
-    let stops = standstills.len().saturating_sub(1);
+    let seconds = rows.seconds.last().copied().unwrap_or_default();
+    let stops = standstills.iter().filter(|span| span.start >= STATIC_SAMPLES as usize).count();
     let lacks = [
         (turned < NEEDED.0, "gain and mounting (few turns)"),
         (stops == 0, "zero-rate updates (no later stop)"),
@@ -38,7 +39,8 @@ fn turns(rows: &Rows, bias: f64) -> (usize, f64) {
     let (mut turned, mut turns, mut angle, mut last) = (0.0, 0, 0.0f64, 0.0f64);
     for second in rows.rate.chunks(SECOND) {
         let step = second.iter().map(|rate| rate[2] - bias).sum::<f64>() * DT;
-        turned += step.abs();
+        // A standing gyro's noise is no turn.
+        turned += if step.abs() < STRAIGHT { 0.0 } else { step.abs() };
         if step.abs() < STRAIGHT || step * last < 0.0 {
             turns += usize::from(angle.abs() > TURN);
             angle = 0.0;

@@ -58,7 +58,22 @@ fn a_good_recording_has_nothing_to_cure() {
     let (verdict, wheels) = found(&doctor, "wheels");
     assert!(verdict == Verdict::Good && wheels.contains("track 1.44 m"), "{wheels}");
     let (verdict, reference) = found(&doctor, "reference");
-    assert!(verdict == Verdict::Good && reference.contains("ms late"), "{reference}");
+    assert!(verdict == Verdict::Good && reference.contains(" ms early"), "{reference}");
+    let scope = found(&doctor, "what it can judge").1;
+    assert!(scope.contains("later stops: 1; length: 80 s"), "{scope}");
+}
+
+#[test]
+fn a_standing_sensor_neither_turns_nor_stops() {
+    let doctor = doctor(|k, row| {
+        row[6..].copy_from_slice(&[0.01 + 0.002 * (k % 3) as f64, 0.0, 0.0, 0.0]);
+        !(1_000..1_400).contains(&k)
+    });
+    let scope = found(&doctor, "what it can judge").1;
+    assert!(scope.starts_with("Turns of more than 45 deg: 0; turned in all: 0.0 rad;"), "{scope}");
+    assert!(scope.contains("length: 80 s"), "gaps included: {scope}");
+    let wheels = found(&doctor, "wheels").1;
+    assert!(wheels.starts_with("2 recorded; no axle has both"), "{wheels}");
 }
 
 #[test]

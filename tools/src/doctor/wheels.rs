@@ -27,14 +27,16 @@ pub fn finding(rows: &Rows) -> Finding {
     let Some(Pair { slope, correlation, offset }) = compare(rows) else {
         return Finding::note(
             what,
-            format!("{known}; no axle with both wheels turns enough to be held against the gyro."),
+            format!(
+                "{known} recorded; no axle has both of its wheels, at two speeds, in enough turns to be held against the gyro."
+            ),
         );
     };
     let radius = rows.vehicle.radius_m();
     let track = slope * radius;
     let named = rows.vehicle.wheels.track_m.map(|track| format!(" ({track} m in the vehicle file)"));
     let text = format!(
-        "{known}; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {radius} m{}, offset {offset:+.3} rad/s",
+        "{known} recorded; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {radius} m{}, {offset:+.3} rad/s apart without a turn",
         named.unwrap_or_default()
     );
     if correlation > 0.9 && (0.2..4.0).contains(&track) {
