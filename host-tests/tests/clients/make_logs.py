@@ -1,5 +1,5 @@
 """Makes logs of a drive with the writers of other people's tools: an IMU in a ROS 1 bag and in an MCAP of ROS 2, the wheels
-in a BLF on a clock of its own.
+in a BLF and in text logs of CAN, on a clock of their own.
 
 usage: make_logs.py DRIVE.csv FILE.dbc FOLDER
 """
@@ -66,12 +66,14 @@ with open(folder / "drive.mcap", "wb") as file:
     writer.finish()
 
 message = cantools.database.load_file(dbc).get_message_by_name("WHEELS")
-with can.BLFWriter(folder / "bus.blf") as log:
-    for row in rows[:: 2]:
-        if row["t_s"] < BUS_FROM:
-            continue
-        speeds = {name: 3.6 * RADIUS * abs(row[f"wheel{k}_rate"]) for k, name in ((1, "FR"), (2, "RR"), (3, "FL"), (4, "RL"))}
-        data = message.encode(speeds)
-        log.on_message_received(
-            can.Message(timestamp=START + BUS_CLOCK + row["t_s"], arbitration_id=message.frame_id, is_extended_id=False, data=data)
-        )
+for name in ("bus.blf", "bus.log", "bus.asc", "bus.trc"):
+    with can.Logger(folder / name) as log:
+        for row in rows[::2]:
+            if row["t_s"] < BUS_FROM:
+                continue
+            wheels = ((1, "FR"), (2, "RR"), (3, "FL"), (4, "RL"))
+            data = message.encode({name: 3.6 * RADIUS * abs(row[f"wheel{k}_rate"]) for k, name in wheels})
+            stamp = START + BUS_CLOCK + row["t_s"]
+            log.on_message_received(
+                can.Message(timestamp=stamp, arbitration_id=message.frame_id, is_extended_id=False, data=data, channel=0)
+            )

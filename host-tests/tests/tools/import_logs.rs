@@ -216,6 +216,14 @@ fn a_bag_and_a_bus_log_on_another_clock_become_one_drive() {
     let log = read_file(&mcap, None, &Columns::new()).unwrap();
     assert_eq!(assert_same(&log, &reference(&python, &mcap, None), false), 9_000 * 6);
 
+    let bus = Bus::parse("wheels.dbc", WHEELS).unwrap();
+    for name in ["bus.blf", "bus.log", "bus.asc", "bus.trc"] {
+        let log = read_file(&scratch(name), Some(&bus), &Columns::new()).unwrap();
+        let compared = assert_same(&log, &reference(&python, &scratch(name), Some(&dbc)), true);
+        assert_eq!(compared, 4_200 * 4, "{name}");
+        assert!(log.dropped.is_empty(), "{name}: {:?}", log.dropped);
+    }
+
     let vehicle = format!("{VEHICLE}[bus]\ndbc = '{}'\n", dbc.display());
     let truth = Recording::read(&drive).unwrap();
     for imu in [scratch("drive.bag"), mcap] {
@@ -247,7 +255,6 @@ fn a_bag_and_a_bus_log_on_another_clock_become_one_drive() {
     );
     // A BLF file with its end torn off.
     let bytes = std::fs::read(scratch("bus.blf")).unwrap();
-    let bus = Bus::parse("wheels.dbc", WHEELS).unwrap();
     let cut = read_bytes("bus.blf", &bytes[..bytes.len() - 1_000], Some(&bus), &Columns::new()).unwrap();
     assert!(cut.dropped.contains_key("the file ends within an object"), "{:?}", cut.dropped);
 }

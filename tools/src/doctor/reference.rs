@@ -10,7 +10,7 @@ use std::ops::Range;
 const WHAT: &str = "reference";
 /// A yaw rate and a course may be late by this much, s.
 const LATE: (f64, f64) = (0.015, 0.5);
-/// Seconds at rest that show a scatter.
+/// A scatter takes this many seconds at rest.
 const LEAST_AT_REST: usize = 5;
 /// Two courses further apart than this give no yaw rate, s.
 const COURSE_GAP: f64 = 2.0;

@@ -33,7 +33,7 @@ pub const WHEELS: usize = 4;
 pub const WHEEL_STANDS: f64 = 0.3;
 /// The median sample period may differ from 10 ms by at most this, microseconds.
 const PERIOD_TOLERANCE_US: u64 = 2_000;
-/// Rows that tell whether a drive of any length can begin: ten seconds.
+/// This many rows tell whether a drive of any length can begin: ten seconds.
 const BEGINNING: usize = 1_000;
 
 /// Holds one row of a recording.

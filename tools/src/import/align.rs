@@ -15,7 +15,7 @@ const COMMON: (f64, f64) = (20.0, 0.5);
 const LEAST: f64 = 0.8;
 /// A second peak this far from the first, s, must be lower by this much.
 const RIVAL: (f64, f64) = (3.0, 0.05);
-/// Time of each that is compared, from its beginning, s: all lags of more would take minutes.
+/// So much time of each is compared, from its beginning, s: all lags of more would take minutes.
 pub const LONGEST: f64 = 8_192.0;
 
 /// The offset of a clock.

@@ -122,7 +122,7 @@ impl Logs {
     }
 }
 
-/// What is known of all rows together.
+/// Holds what is known of all rows together.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seen {
     /// Their number.
@@ -239,7 +239,7 @@ fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<
     Some((courses.windows(2).filter_map(change).collect(), "the change of the course".to_owned()))
 }
 
-/// A rate as far as it is compared, with at most one value in 10 ms.
+/// Returns a rate as far as it is compared, with at most one value in 10 ms.
 fn thinned<'a>(stream: impl Fn() -> Stream<'a, 1>) -> Vec<(f64, f64)> {
     let start = stream().next().map_or(0.0, |(seconds, _)| seconds);
     let near = stream().take_while(|(seconds, _)| seconds - start < align::LONGEST);
@@ -262,7 +262,7 @@ fn thinned<'a>(stream: impl Fn() -> Stream<'a, 1>) -> Vec<(f64, f64)> {
     thin
 }
 
-/// The time of the first row and the number of rows.
+/// Returns the time of the first row and the number of rows.
 fn span(
     selection: &Selection<'_>,
     request: &Request,
@@ -311,7 +311,7 @@ fn has_odometry(
     false
 }
 
-/// The courses by the row that is nearest to each.
+/// Returns the courses by the row that is nearest to each.
 fn courses_by_row(
     selection: &Selection<'_>,
     offsets: &[f64],
@@ -381,7 +381,7 @@ impl<'a> Drive<'a> {
         (0..self.count).filter_map(row)
     }
 
-    /// A channel on the rows.
+    /// Brings a channel to the rows.
     fn grid<'s, const N: usize>(
         &'s self,
         channel: Option<&'s Channel<'a>>,

@@ -11,7 +11,7 @@ const AVERAGED_HZ: f64 = 150.0;
 /// Gaps are longer than this many periods.
 const GAP_PERIODS: f64 = 2.5;
 
-/// Periods that the rate is taken of, at most: the beginning of a long log.
+/// The rate is taken of at most this many periods: the beginning of a long log.
 const RATED: usize = 100_000;
 
 /// Samples of a vector, in rising order of time.
@@ -41,7 +41,7 @@ pub fn method(hz: f64) -> &'static str {
     }
 }
 
-/// Samples brought to `start + k * 10 ms`, row after row; `None` in gaps.
+/// Brings samples to `start + k * 10 ms`, row after row; `None` in gaps.
 pub struct Grid<'a, const N: usize> {
     stream: std::iter::Peekable<Stream<'a, N>>,
     before: Option<(f64, [f64; N])>,

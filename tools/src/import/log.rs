@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 /// Samples of one channel that are kept: over a day at 1 kHz.
 pub const MAX_SAMPLES: usize = 100_000_000;
-/// Fixes of one channel that are kept: a day at 20 Hz. A course needs them all in memory.
+/// So many fixes of one channel are kept: a day at 20 Hz. A course needs them all in memory.
 const MAX_FIXES: usize = 2_000_000;
 /// Channels of one file; a log has tens, a bus with a large DBC file some thousands of signals.
 const MAX_CHANNELS: usize = 4_096;

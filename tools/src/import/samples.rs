@@ -1,5 +1,5 @@
-//! The samples of a channel, in memory as far as they are few: beyond that they lie in a temporary file, so that a log of
-//! many gigabytes takes no more memory than a small one.
+//! The samples of a channel are in memory as far as they are few; beyond that they lie in a temporary file, so that a log
+//! of many gigabytes takes no more memory than a small one.
 
 use super::log::{Fix, Kind, Sample, Value};
 use std::cell::OnceCell;
@@ -7,9 +7,9 @@ use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Write};
 use tempfile::NamedTempFile;
 
-/// Numbers of a channel that stay in memory: 256 KiB.
+/// A channel keeps at most this many numbers in memory: 256 KiB.
 const IN_MEMORY: usize = 1 << 15;
-/// The most numbers that a sample has.
+/// A sample has at most this many numbers.
 const WIDEST: usize = 7;
 
 /// Holds the samples of a channel, all of one kind, in the order in which they came.
@@ -168,7 +168,7 @@ impl Iterator for Iter<'_> {
     }
 }
 
-/// A sample as numbers, and how many they are. What is not known is NaN.
+/// Returns a sample as numbers, and how many they are. What is not known is NaN.
 fn numbers((seconds, value): Sample) -> ([f64; WIDEST], usize) {
     match value {
         Value::Imu([fx, fy, fz], [wx, wy, wz]) => ([seconds, fx, fy, fz, wx, wy, wz], 7),
