@@ -94,7 +94,7 @@ pub struct Drive<'a> {
 const SHARES: [(&str, f64, &str); 3] = [
     ("roll", MAX_CROSS_SIGMA, "no rolling: the drives do not show it"),
     ("pitch", MAX_CROSS_SIGMA, "no pitching: the drives do not show it"),
-    ("gain", MAX_GAIN_SIGMA, "no turns: the drives do not show it"),
+    ("gain", MAX_GAIN_SIGMA, "no turns, or all alike: the drives do not tell it from a bias"),
 ];
 
 /// Fits the map of a unit to its drives.
