@@ -178,7 +178,8 @@ pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step
         input.push(&mut followed);
     }
     replay::assert_same(&sent, &followed.lines);
-    assert!(followed.followed < steps.len() as u64 / 10, "the host was busy: {}", followed.followed);
+    // Silences of a busy host are followed and compared like all else, but they must not be most of what is compared.
+    assert!(followed.followed < steps.len() as u64 / 2, "the host was busy: {}", followed.followed);
     Outcome { host, followed, sent: sent.len(), counters }
 }
 
