@@ -28,24 +28,7 @@
 //!
 //! The last two have no check on the wire at all: keep their lines short, and rely on the pipeline's own limits.
 //!
-//! # Adding a part, in six steps
-//!
-//! 1. Write down its bytes: a file of its own with `parse` and `emit` over byte slices, and an
-//!    error that says what is wrong and where. It does no input or output.
-//! 2. Say how its frames are found: [`framer::Protocol`] for a stream of bytes (header and
-//!    checksum together synchronise, a header alone does not), or a thin driver over
-//!    `embedded_hal::spi::SpiDevice` with bounded waits.
-//! 3. Turn a frame into a sample: units by the types of [`crate::units`], axes x forward, y
-//!    left, z up, time unwrapped; readings that the part marks as bad are left out, never replaced.
-//! 4. Implement [`Source`] (and [`ByteSource`] for a stream) for it, and
-//!    [`serial::Dialogue`] where it must be configured. A part without a clock of its own
-//!    takes the arrival time as an argument instead, as [`adis16465`] and [`dsp3000`] do.
-//! 5. Test it with recorded or published frames both ways, every truncation and every flipped
-//!    bit, noise with frames strewn in, a mocked bus; add a fuzz target (`host-tests/fuzz`) and
-//!    a line in the bench image (`src/bin/support/parsers.rs`).
-//! 6. For the image of this repository: a name in `store::ImuPart` or
-//!    `store::FogPart`, and an arm where the image reads its part (`imu.rs` or `output.rs` in
-//!    `src/bin/coprocessor`, the list of what it drives in `start.rs`).
+//! `src/bin/PORTING.md` has the six steps that add a part.
 
 pub mod adis16465;
 #[doc(hidden)]

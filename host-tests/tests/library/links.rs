@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGES: [&str; 12] = [
+const PAGES: [&str; 17] = [
     "README.md",
     "CHANGELOG.md",
     "host-tests/README.md",
@@ -12,10 +12,15 @@ const PAGES: [&str; 12] = [
     "host-tests/board/PERIPHERALS.md",
     "src/SAFETY.md",
     "src/bin/README.md",
+    "src/GLOSSARY.md",
+    "src/bin/GETTING_STARTED.md",
     "src/bin/PORTING.md",
+    "src/bin/SECURITY.md",
+    "src/bin/TROUBLE.md",
     "src/can/README.md",
     "tools/README.md",
     "tools/MEASUREMENTS.md",
+    "tools/PAPER.md",
     "tools/train/README.md",
 ];
 

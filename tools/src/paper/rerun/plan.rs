@@ -59,7 +59,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// The numbers of `tools/train/README.md` were made with this plan.
+    /// The numbers of `tools/PAPER.md` were made with this plan.
     pub const FULL: Self = Self {
         gyronet_epochs: 20,
         gyronet_seeds: 3,
