@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGES: [&str; 17] = [
+const PAGES: [&str; 18] = [
     "README.md",
     "CHANGELOG.md",
     "host-tests/README.md",
@@ -13,6 +13,7 @@ const PAGES: [&str; 17] = [
     "src/SAFETY.md",
     "src/bin/README.md",
     "src/GLOSSARY.md",
+    "src/bin/FOUND.md",
     "src/bin/GETTING_STARTED.md",
     "src/bin/PORTING.md",
     "src/bin/SECURITY.md",
