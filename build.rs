@@ -12,6 +12,8 @@ const SMALL: [(&str, &str); 2] = [
 ];
 /// Limits of the image that is flashed.
 const SLOTS: &str = "src/bin/stm32f405/slots.x";
+/// Start of its code (`store::layout::CODE`).
+const CODE: &str = "0x08080000";
 
 fn main() {
     println!("cargo:rerun-if-changed=memory.x");
@@ -42,6 +44,9 @@ fn main() {
         fs::copy(REGIONS, out.join("regions.x")).expect("the part's regions stand with its code");
         println!("cargo:rustc-link-search={}", out.display());
         println!("cargo:rustc-link-arg-bin=coprocessor=-T{SLOTS}");
+        for flashed in ["coprocessor", "bringup"] {
+            println!("cargo:rustc-link-arg-bin={flashed}=--defsym=_flashed_code={CODE}");
+        }
         if env::var_os("CARGO_FEATURE_RTT").is_some() {
             println!("cargo:rustc-link-arg-bin=coprocessor=-Tdefmt.x");
         }

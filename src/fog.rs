@@ -1,5 +1,5 @@
 //! This module corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
-//! bias (`lane`), or FoGNet's estimate where the configuration selects FoGNet.
+//! bias (`lane`), and FoGNet's estimate of what they leave where the configuration selects FoGNet.
 //!
 //! # FoGNet
 //!
@@ -36,6 +36,7 @@ pub use rest::{RestOutcome, RestReading};
 
 use crate::bias::Latitude;
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
+use crate::model::fognet_blob::{Gyro, Training};
 use crate::model::seconds::{
     FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow,
 };
@@ -52,9 +53,50 @@ pub enum FogNetUse {
     /// FoGNet does not run.
     #[default]
     Off,
-    /// FoGNet runs on weights that were trained on simulated drives. The rate is degraded at best, and FoGNet is dropped
-    /// where standstills show no gain by it.
+    /// FoGNet runs, on weights that were trained on simulated drives, too. The rate is degraded at best.
     Simulated,
+    /// FoGNet runs on weights that were trained on recordings of this gyro.
+    Recorded,
+}
+
+/// The reason why weights are not for the gyro that is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum NotForThisGyro {
+    /// They were trained for another gyro.
+    #[error("trained for a {trained}, the configuration has a {part} number {serial}")]
+    Other {
+        /// What they were trained on.
+        trained: Training,
+        /// The part that is configured.
+        part: Gyro,
+        /// Its number, 0 where none is configured.
+        serial: u32,
+    },
+    /// They were trained on simulated drives, and the configuration does not ask for such.
+    #[error("trained on a {0}, which runs only where the configuration says Simulated")]
+    Simulated(Training),
+}
+
+/// Checks that weights are for a gyro: trained for its part, for its number or any, and not on simulated drives unless
+/// these are asked for.
+///
+/// # Errors
+/// [`NotForThisGyro`].
+pub fn check_training(
+    trained: Training,
+    part: Gyro,
+    serial: u32,
+    wanted: FogNetUse,
+) -> Result<(), NotForThisGyro> {
+    if trained.gyro != part || trained.serial != 0 && trained.serial != serial {
+        return Err(NotForThisGyro::Other { trained, part, serial });
+    }
+    if trained.simulated && wanted != FogNetUse::Simulated {
+        return Err(NotForThisGyro::Simulated(trained));
+    }
+    Ok(())
 }
 
 /// Configures the correction of a fibre-optic gyro, and the limits within which FoGNet is used.
@@ -121,7 +163,7 @@ pub struct FogOutput {
     pub late: bool,
 }
 
-/// Applies FoGNet's corrections to the gyro, and collects its windows.
+/// Applies FoGNet's corrections to a gyro's turns, and collects its windows.
 #[derive(Debug, Clone)]
 pub struct FogCorrector {
     config: FogConfig,

@@ -20,6 +20,7 @@ pub(crate) mod record;
 #[doc(hidden)]
 pub mod slots;
 mod troubles;
+mod upload;
 mod wheels;
 
 pub use access::Access;
@@ -29,3 +30,4 @@ pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use record::{Record, Store};
 pub use slots::{Accepted, Slot};
 pub use troubles::{MOST_TROUBLES, Snapshot, StoredTrouble, Troubles};
+pub use upload::{Place, Upload};

@@ -7,7 +7,6 @@
 mod can;
 mod diagnosis;
 mod logs;
-mod ram_flash;
 mod recording;
 mod records;
 mod sensors;

@@ -8,7 +8,7 @@
 use crate::noise::Noise;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
-use gyronet::store::layout::{self, SECTORS, SLOT_SIZE, sector_at};
+use gyronet::store::layout::{FOGNET, RECORD_SECTOR, SLOT_SIZE, SLOTS, sector};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
@@ -168,7 +168,7 @@ impl F405 {
     }
 }
 
-/// Gives access to a part of the flash whose sectors are `SECTOR` bytes long; offsets count from its start.
+/// Gives access to a part of the flash whose smallest sectors are `SECTOR` bytes long; offsets count from its start.
 #[derive(Debug, Clone)]
 pub struct Region<const SECTOR: usize> {
     flash: Rc<RefCell<F405>>,
@@ -218,10 +218,12 @@ impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), MockError> {
         let range = self.absolute(from, (to - from) as usize, SECTOR)?;
-        for start in range.step_by(SECTOR) {
-            let sector = sector_at(start as u32).expect("the start of a sector");
-            assert_eq!(SECTORS[usize::from(sector)] as usize, SECTOR, "the size of sector {sector}");
-            self.flash.borrow_mut().erase_sector(start..start + SECTOR)?;
+        let mut at = range.start;
+        while at < range.end {
+            let sector = sector(at as u32).expect("the start of a sector");
+            assert!(sector.end as usize <= range.end, "sector {sector:x?} reaches beyond {range:x?}");
+            at = sector.end as usize;
+            self.flash.borrow_mut().erase_sector(sector.start as usize..at)?;
         }
         Ok(())
     }
@@ -235,43 +237,46 @@ impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
     }
 }
 
-/// Gives access to the weight slots of a flash, which can also be read in place.
+/// Gives access to the weight files of a flash, which can also be read in place.
 ///
 /// [`MappedSlots::slots`] returns a copy of the content at the last operation: the
 /// mock's bytes are behind a cell.
 #[derive(Debug)]
 pub struct MappedRegion {
-    region: Region<SLOT_SIZE>,
-    copy: [Vec<u32>; 2],
+    region: Region<RECORD_SECTOR>,
+    copy: Vec<u32>,
 }
 
 impl MappedRegion {
-    /// Returns the slots of a flash.
+    /// Returns the weight files of a flash.
     #[must_use]
     pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
-        let mut mapped = Self { region: Region::new(flash, layout::SLOTS), copy: [Vec::new(), Vec::new()] };
-        mapped.refresh();
-        mapped
+        Self { region: Region::new(flash, 0..BYTES as u32), copy: flash.borrow().words.clone() }
     }
 
-    /// The range of both slots.
+    /// The bytes of both slots.
     #[must_use]
     pub fn current(&self) -> [&[u8]; 2] {
-        self.copy.each_ref().map(|words| bytemuck::cast_slice(words))
+        self.bytes(SLOTS).split_at(SLOT_SIZE).into()
     }
 
-    fn refresh(&mut self) {
-        let flash = self.region.flash.borrow();
-        for (words, start) in self.copy.iter_mut().zip(self.region.range.clone().step_by(SLOT_SIZE)) {
-            words.clear();
-            words.extend(&flash.words[start / WORD..(start + SLOT_SIZE) / WORD]);
-        }
+    fn bytes(&self, range: Range<u32>) -> &[u8] {
+        bytemuck::cast_slice(&self.copy[range.start as usize / WORD..range.end as usize / WORD])
+    }
+
+    fn refresh(&mut self, from: u32, len: usize) {
+        let words = from as usize / WORD..(from as usize + len).min(BYTES) / WORD;
+        self.copy[words.clone()].copy_from_slice(&self.region.flash.borrow().words[words]);
     }
 }
 
 impl MappedSlots for MappedRegion {
     fn slots(&self) -> [&[u8]; 2] {
         self.current()
+    }
+
+    fn fognet(&self) -> &[u8] {
+        self.bytes(FOGNET)
     }
 }
 
@@ -293,17 +298,17 @@ impl ReadNorFlash for MappedRegion {
 
 impl NorFlash for MappedRegion {
     const WRITE_SIZE: usize = WORD;
-    const ERASE_SIZE: usize = SLOT_SIZE;
+    const ERASE_SIZE: usize = RECORD_SECTOR;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), MockError> {
         let result = self.region.erase(from, to);
-        self.refresh();
+        self.refresh(from, (to - from) as usize);
         result
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), MockError> {
         let result = self.region.write(offset, bytes);
-        self.refresh();
+        self.refresh(offset, bytes.len());
         result
     }
 }

@@ -7,6 +7,7 @@ use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::coprocessor::{self, Clock, Coprocessor, StorageFaults, TimedFrame};
 use gyronet::fog::FogCounters;
+use gyronet::fog::FogNetUse;
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::monitor::{START_US, TIMEOUT_US};
@@ -126,9 +127,13 @@ impl Board {
     pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
         let fog_blob = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
         let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
+        let has_fognet = configuration.check_training(fog_blob.training).is_ok();
+        let is_refused = configuration.fog_lane.fognet != FogNetUse::Off && !has_fognet;
         let config = coprocessor::Config {
             wheels: Some(wheels),
             clock: Clock::Sensor,
+            has_fognet,
+            storage: StorageFaults { damaged: is_refused, configuration_lost: false },
             ..configuration.coprocessor(&Calibration::NONE, 0)
         };
         Self {

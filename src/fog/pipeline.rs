@@ -12,9 +12,9 @@
 //! | the latitude on the bus contradicts the one in use | the same | Earth rate | degraded | IMPLAUSIBLE |
 //! | no latitude is known, the vehicle has stood still | less the reading at standstill | static | degraded | |
 //! | no latitude is known, and no standstill yet | as it is | raw | degraded | |
-//! | FoGNet is asked for, and an estimate is in use | less the correction | FoGNet | degraded | |
-//! | standstills show no gain by FoGNet: it is dropped until the next start | as without FoGNet | | | |
-//! | FoGNet's estimate is late, rejected, or there are no weights | as without FoGNet | | degraded | LATE, IMPLAUSIBLE, STORED |
+//! | FoGNet is configured, the latitude is known, and an estimate is in use | less the correction, too | FoGNet | as without; degraded by weights of simulated drives | |
+//! | standstills show that FoGNet does harm: it is dropped until the next start | as without FoGNet | | | |
+//! | FoGNet's estimate is late, rejected, or there are no weights for this gyro | as without FoGNet | | degraded | LATE, IMPLAUSIBLE, STORED |
 //! | increments are missing in the step, or none have come yet ([`FogPipeline::expect`]) | not available | raw | unusable | GAP |
 //! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
 //!
@@ -31,7 +31,8 @@ use crate::health::{Faults, Quality, Source, Status, count};
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::{FogFrame, SecondsWindow};
 use crate::model::window::Features;
-use crate::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
+use crate::root::sqrt;
+use crate::sample::{FogSample, PERIOD_US, RATE_HZ, Standstill, WheelSample};
 use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};
 
 /// Increments in a row, equal to the one before, after which the gyro is stuck, if they last [`STUCK_US`]. A
@@ -69,7 +70,7 @@ pub struct FogCounters {
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
-    /// Times that FoGNet was dropped, because standstills showed no gain by it: once a start at most.
+    /// Times that FoGNet was dropped, because standstills showed that it does harm: once a start at most.
     pub dropped: u32,
 }
 
@@ -207,11 +208,11 @@ impl FogPipeline {
         self.count_rest(outcome);
         let wheels = wheels.and_then(rear);
         let uses_network = self.fognet != FogNetUse::Off;
-        // FoGNet was trained on the gyro as it is.
+        let has_latitude = self.lane.latitude().is_some();
         let by_network = uses_network.then(|| {
-            let output = self.corrector.correct(&FogFrame { turn, inertial, wheels });
+            let output = self.corrector.correct(&FogFrame { turn: kept, inertial, wheels });
             self.note(&output);
-            output.turn.filter(|_| output.corrected)
+            output.turn.filter(|_| output.corrected && has_latitude)
         });
         let by_network = by_network.flatten();
         let both = kept.zip(by_network).map(|(kept, by_network)| [kept, by_network]);
@@ -221,7 +222,6 @@ impl FogPipeline {
         count(&mut self.counters.gaps, u32::from(turn.is_none()));
         let latency_us = u32::try_from(now.0.saturating_sub(step.time.0)).ok();
         let contradicted = self.lane.rest().is_contradicted();
-        let has_latitude = self.lane.latitude().is_some();
         count(&mut self.counters.no_latitude, u32::from(!has_latitude));
         let faults = self
             .estimate_faults
@@ -233,6 +233,9 @@ impl FogPipeline {
         let (status, source, quality) = match (turn, by_network) {
             (None, _) if stuck => (Status::Stuck, Source::Raw, Quality::Unusable),
             (None, _) => (Status::Silent, Source::Raw, Quality::Unusable),
+            (Some(_), Some(_)) if self.fognet == FogNetUse::Recorded && faults == Faults::NONE => {
+                (Status::Ready, Source::FogNet, Quality::Good)
+            }
             (Some(_), Some(_)) => (Status::Degraded, Source::FogNet, Quality::Degraded),
             (Some(_), None) if has_latitude && faults == Faults::NONE => {
                 (Status::Ready, Source::EarthRate, Quality::Good)
@@ -248,10 +251,14 @@ impl FogPipeline {
         };
         self.yaw.0 = self.yaw.0.wrapping_add(i64::from(rate.0));
         let (tick, yaw) = ((step.time.0 / PERIOD_US) as u32, self.yaw);
-        // FoGNet does not say how good it is.
         let [standing, moving] = self.shake;
         let shake = if standstill == Standstill::Still { standing } else { moving };
-        let sigma = (turn.is_some() && by_network.is_none()).then(|| self.lane.sigma(rate, shake));
+        // FoGNet does not say how good it is: all that it changes may be an error.
+        let changed =
+            kept.zip(by_network).map_or(0, |(kept, by_network)| kept.0.saturating_sub(by_network.0));
+        let changed = changed as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
+        let spread = sqrt(shake * shake + changed * changed);
+        let sigma = turn.is_some().then(|| self.lane.sigma(rate, spread));
         Some(YawEstimate { tick, rate, correction, yaw, sigma, status, source, quality, faults, latency_us })
     }
 

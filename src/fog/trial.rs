@@ -1,9 +1,9 @@
-//! The trial drops FoGNet where standstills show no gain by it.
+//! The trial drops FoGNet where standstills show that it does harm.
 //!
 //! A standing vehicle does not turn, so its corrected rate is all error. Each second the squares of both rates, with
 //! FoGNet and without, are compared over the same two seconds ([`super::rest`]); a sum of their differences fades over
-//! some two minutes of standing. FoGNet is dropped, until the next start, when it is clearly worse after ten seconds,
-//! or no better after thirty.
+//! some two minutes of standing. FoGNet is dropped, until the next start, when it is clearly worse. It cannot be asked to
+//! be better: the bias that it starts from was found at standstill, and what FoGNet corrects shows in turns.
 
 use super::rest::Second;
 use crate::sample::{RATE_HZ, Standstill};
@@ -11,12 +11,11 @@ use crate::units::Angle;
 
 /// After this many comparisons FoGNet must not be clearly worse.
 const SOON: u8 = 10;
-/// After this many comparisons FoGNet must be better.
-const LATE: u8 = 30;
 /// The sum remembers at most this many comparisons.
 const MEMORY: f32 = 128.0;
-/// A mean variance beyond this is clearly more than noise: 5 deg/h squared, in (rad/s)^2.
-const CLEAR: f32 = 6e-10;
+/// A sum of squares beyond this is clearly more than noise, (rad/s)^2: that of 0.25 deg/h, the bias of a DSP-1760, over
+/// [`MEMORY`]. A DSP-1760's noise beside such a correction makes half of it, 1 sigma, beside one of 0.1 deg/h a fifth.
+const CLEAR: f32 = 1.9e-10;
 
 /// Compares the rates with and without FoGNet.
 #[derive(Debug, Clone)]
@@ -52,6 +51,6 @@ impl Trial {
         let (lane, network) = (lane.triangle(next_lane), network.triangle(next_network));
         self.gain += lane * lane - network * network - self.gain / MEMORY;
         self.comparisons = self.comparisons.saturating_add(1);
-        self.comparisons >= SOON && self.gain < -CLEAR || self.comparisons >= LATE && self.gain <= 0.0
+        self.comparisons >= SOON && self.gain < -CLEAR
     }
 }

@@ -6,7 +6,7 @@
 //! | offset | type | field |
 //! |---|---|---|
 //! | 0 | 4 bytes | magic `GYRN` |
-//! | 4 | u16 | format version, 3 |
+//! | 4 | u16 | format version: 3 for GyroNet, 4 for FoGNet |
 //! | 6 | u16 | network, 1 = GyroNet, 2 = FoGNet |
 //! | 8 | u32 | length of the whole file, checksum included |
 //! | 12 | u16 x 4 | window, inputs, hidden units a direction, layers |
@@ -25,8 +25,10 @@ use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense, linear::Linear};
 
 /// A weight file begins with these bytes.
 pub const MAGIC: [u8; 4] = *b"GYRN";
-/// The format version that this code reads.
+/// The format version of GyroNet's files that this code reads.
 pub const VERSION: u16 = 3;
+/// The format version of FoGNet's files that this code reads.
+pub const FOGNET_VERSION: u16 = 4;
 /// This number in the header stands for GyroNet.
 pub const GYRONET: u16 = 1;
 /// This number in the header stands for FoGNet.
@@ -51,8 +53,13 @@ pub enum BlobError {
     #[error("weight file: this is none, it begins with {0:02x?}, not {MAGIC:02x?}")]
     Magic([u8; 4]),
     /// The file has a format version that this code does not read.
-    #[error("weight file: format version {0}, this reads {VERSION}")]
-    Version(u16),
+    #[error("weight file: format version {found}, this reads {expected}")]
+    Version {
+        /// The version in the file.
+        found: u16,
+        /// The version that this code reads of that network.
+        expected: u16,
+    },
     /// The file holds another network, or one of another shape.
     #[error(
         "weight file: network {} with window {}, {} inputs, {} units, {} layers, {} linear outputs is not \
@@ -101,6 +108,9 @@ pub enum BlobError {
         /// Unit.
         unit: u16,
     },
+    /// The gyro that the network was trained for has an unknown number.
+    #[error("weight file: trained for gyro {0}, which this code does not know")]
+    Gyro(u16),
     /// A row of the linear part could overflow its accumulator.
     #[error("weight file: output {output} of the linear part could overflow its accumulator")]
     LinearBound {
@@ -180,11 +190,11 @@ impl<const INPUTS: usize, S> Header<INPUTS, S> {
         if magic != MAGIC {
             return Err(BlobError::Magic(magic));
         }
-        let version = reader.u16()?;
-        if version != VERSION {
-            return Err(BlobError::Version(version));
+        let [version, network] = [reader.u16()?, reader.u16()?];
+        let known = if network == FOGNET { FOGNET_VERSION } else { VERSION };
+        if version != known {
+            return Err(BlobError::Version { found: version, expected: known });
         }
-        let network = reader.u16()?;
         let length = reader.i32()? as u32 as usize;
         if length != bytes.len() {
             return Err(BlobError::Length { expected: length, found: bytes.len() });
@@ -262,7 +272,7 @@ impl<'w> Reader<'w> {
         self.take(N)?.try_into().map_err(|_| BlobError::Misaligned)
     }
 
-    fn u16(&mut self) -> Result<u16, BlobError> {
+    pub fn u16(&mut self) -> Result<u16, BlobError> {
         self.array().map(|bytes| u16::from_le_bytes(*bytes))
     }
 

@@ -6,13 +6,16 @@
 //! |---|---|---|
 //! | 104 | i32 x 60 | [`FogBlob::gains`] |
 //! | 344 | i32, i32 | lower and upper half of [`FogBlob::offset`] |
-//! | 352 | P bytes | provenance, UTF-8 JSON |
-//! | 352 + P | | LSTM1's four directions, of 10 inputs: the tenth is not used |
+//! | 352 | u16 | the gyro: 1 = KVH DSP-1760, 2 = KVH DSP-3000, 3 = the rate of GyroNet |
+//! | 354 | u16 | 1 where the drives of the training are simulated, else 0 |
+//! | 356 | u32 | number of the one gyro that it was trained for; 0 = any of that part |
+//! | 360 | P bytes | provenance, UTF-8 JSON |
+//! | 360 + P | | LSTM1's four directions, of 10 inputs: the tenth is not used |
 //! | ... | i16 x 180, i32, i32 | FC1: weights, bias, multiplier to a normalised Q10 |
 //! | ... | | LSTM2's four directions, of 2 inputs |
 //! | ... | i16 x 120, i32, i32 | FC2 times FC4: weights, bias, multiplier |
 
-pub use super::file::{BlobError, FOGNET, Normalisation, Topology};
+pub use super::file::{BlobError, FOGNET, FOGNET_VERSION, Normalisation, Topology};
 
 use super::file::{Header, Reader, check_dense, check_rows, dense_len, header_len, layers_len};
 use crate::model::seconds::{self, STEPS};
@@ -30,15 +33,66 @@ pub const COLUMNS: usize = INPUTS + 1;
 /// Fraction bits of the factor that turns FC2's sum into an angle.
 pub const CORRECTION_SHIFT: u32 = 16;
 /// Bytes before the provenance text.
-pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8;
+pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8 + 8;
 /// The file's header must state this topology.
 pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2, 1];
+
+/// Names the source of the turns that a FoGNet corrects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Gyro {
+    /// A KVH DSP-1760, less the Earth's rate and its bias.
+    Dsp1760,
+    /// A KVH DSP-3000, less the Earth's rate and its bias.
+    Dsp3000,
+    /// GyroNet, the paper's pseudo-FoG.
+    PseudoFog,
+}
+
+impl Gyro {
+    /// All sources, in the order of their numbers in a file, which begin at 1.
+    pub const ALL: [Self; 3] = [Self::Dsp1760, Self::Dsp3000, Self::PseudoFog];
+}
+
+impl core::fmt::Display for Gyro {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Dsp1760 => "DSP-1760",
+            Self::Dsp3000 => "DSP-3000",
+            Self::PseudoFog => "pseudo-FoG",
+        })
+    }
+}
+
+/// Says what a FoGNet was trained on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Training {
+    /// The source of the turns.
+    pub gyro: Gyro,
+    /// The number of the one gyro that it was trained for; 0 stands for any of that part.
+    pub serial: u32,
+    /// The drives were simulated.
+    pub simulated: bool,
+}
+
+impl core::fmt::Display for Training {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let simulated = if self.simulated { "simulated " } else { "" };
+        write!(f, "{simulated}{}", self.gyro)?;
+        if self.serial == 0 { Ok(()) } else { write!(f, " number {}", self.serial) }
+    }
+}
 
 /// Gives access to a weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct FogBlob<'w> {
     /// The provenance of the weights: JSON.
     pub provenance: &'w str,
+    /// What the network was trained on.
+    pub training: Training,
     /// The scaling of each feature.
     pub normalisation: [Normalisation; INPUTS],
     /// Network inputs are clamped to +- this, Q10.
@@ -84,6 +138,13 @@ impl<'w> FogBlob<'w> {
         let gains = reader.slice(STEPS)?;
         let (low, high) = (reader.i32()? as u32, reader.i32()?);
         let offset = Angle(i64::from(high) << 32 | i64::from(low));
+        let [number, simulated] = [reader.u16()?, reader.u16()?];
+        let gyro = usize::from(number).checked_sub(1).and_then(|place| Gyro::ALL.get(place));
+        let training = Training {
+            gyro: *gyro.ok_or(BlobError::Gyro(number))?,
+            serial: reader.i32()? as u32,
+            simulated: simulated != 0,
+        };
         let provenance = reader.provenance(provenance_len)?;
         let (lstm1, fc1) = (reader.layers(HIDDEN1, COLUMNS)?, reader.dense(2 * HIDDEN1)?);
         let (lstm2, fc2) = (reader.layers(HIDDEN2, 2)?, reader.dense(2 * HIDDEN2)?);
@@ -91,7 +152,19 @@ impl<'w> FogBlob<'w> {
         check_rows(&lstm2, input_clamp.into(), 2)?;
         check_dense(&fc1)?;
         check_dense(&fc2)?;
-        Ok(Self { provenance, normalisation, input_clamp, gains, offset, lstm1, fc1, lstm2, fc2, crc })
+        Ok(Self {
+            provenance,
+            training,
+            normalisation,
+            input_clamp,
+            gains,
+            offset,
+            lstm1,
+            fc1,
+            lstm2,
+            fc2,
+            crc,
+        })
     }
 
     /// Returns the correction for a whole sum of [`FogBlob::fc2`], without the linear part.

@@ -20,7 +20,7 @@ use crate::health::{Faults, Status};
 use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{
-    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Record, Slot, Store, Troubles,
+    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Place, Record, Store, Troubles,
 };
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
@@ -38,7 +38,7 @@ pub struct SupportedHardware {
 
 /// The state that the board keeps beside the pipeline.
 ///
-/// Owns the flash: records in `R`, weight slots in `W`, `None` where nothing can be stored.
+/// Owns the flash: records in `R`, weight files in `W`, `None` where nothing can be stored.
 pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
@@ -66,6 +66,9 @@ pub struct Device<R: NorFlash, W> {
     weights: WeightSource,
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
+    /// The checksum of FoGNet's file, or why it does not run; `None` where it is off.
+    fognet: Option<Result<u32, SlotError>>,
+    fognet_gone: bool,
     uploading: Option<Uploading>,
     standstill: StandstillGate,
     sensor: Option<SensorFault>,
@@ -106,6 +109,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights: WeightSource::None,
             weights_crc: None,
             refused_slots: [None; 2],
+            fognet: None,
+            fognet_gone: false,
             uploading: None,
             standstill: StandstillGate::new(),
             sensor: None,
@@ -199,7 +204,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             }
             Request::SetWheels(wheels) => self.set_wheels(wheels),
             Request::Calibrate(what) => self.calibrate(*what),
-            Request::WeightsBegin { length } => self.weights_begin(*length),
+            Request::WeightsBegin { network, length } => self.weights_begin(*network, *length),
             Request::WeightsBlock { offset, bytes } => self.weights_block(*offset, bytes),
             Request::WeightsVerify => self.weights_verify(),
             Request::WeightsActivate => self.weights_activate(),
@@ -249,11 +254,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.log.page(after)
     }
 
-    /// Returns the slot of the upload under way, and the file's checksum, once it is checked.
+    /// Returns the place of the upload under way, and the file's checksum, once it is checked.
     #[must_use]
-    pub fn uploaded(&self) -> Option<(Slot, u32)> {
+    pub fn uploaded(&self) -> Option<(Place, u32)> {
         let Uploading { upload, checked } = self.uploading?;
-        Some((upload.slot(), checked?))
+        Some((upload.place(), checked?))
     }
 
     /// Returns whether the output may be interrupted: the vehicle is proven to stand. A board without a flash
@@ -287,6 +292,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights_crc: self.weights_crc,
             sensor: self.sensor,
             refused_slots: self.refused_slots,
+            fognet: self.fognet,
             status: self.status,
         }
     }

@@ -4,7 +4,7 @@ use super::calibrate::CalibrationFault;
 pub use super::crash::{Crash, CrashKind};
 pub use super::hardware::{CanFault, ClockFault};
 use crate::health::Status;
-use crate::store::{Slot, StoreError, slots::SlotError};
+use crate::store::{Place, Slot, StoreError, slots::SlotError};
 use heapless::{Deque, Vec};
 use serde::{Deserialize, Serialize};
 
@@ -75,6 +75,8 @@ pub enum EventKind {
     AcceptedRefused(StoreError),
     /// A weight slot is not used.
     SlotRefused(Slot, SlotError),
+    /// FoGNet's weights are not used.
+    FogNetRefused(SlotError),
     /// No weights are good: the network is off.
     NoWeights,
     /// The status has changed.
@@ -87,8 +89,8 @@ pub enum EventKind {
     CalibrationStored,
     /// A calibration ended; with why it found nothing.
     Calibrated(Option<CalibrationFault>),
-    /// The file in a slot was accepted.
-    WeightsAccepted(Slot),
+    /// The file in a place was accepted.
+    WeightsAccepted(Place),
     /// The weights in use no longer fit their checksum: the network is off.
     WeightsDamaged,
     /// Stored records are damaged: what is used is older, or built in.

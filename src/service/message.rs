@@ -10,7 +10,7 @@ use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
 /// The version of what is encoded as these types; it is raised when one changes.
-pub const PROTOCOL: u8 = 11;
+pub const PROTOCOL: u8 = 12;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -31,6 +31,8 @@ pub enum Request<'a> {
     Calibrate(Calibrate),
     /// A weight file will come.
     WeightsBegin {
+        /// Of this network.
+        network: Network,
         /// Its length, bytes.
         length: u32,
     },
@@ -64,6 +66,15 @@ impl Request<'_> {
             Self::Calibrate(Calibrate::Start(_) | Calibrate::Cancel) | Self::WeightsVerify => false,
         }
     }
+}
+
+/// The networks that have weight files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Network {
+    /// GyroNet.
+    GyroNet,
+    /// FoGNet.
+    FogNet,
 }
 
 /// The action on the calibration.
@@ -239,6 +250,8 @@ pub struct Info {
     pub sensor: Option<SensorFault>,
     /// The reason why each slot that should be used is not.
     pub refused_slots: [Option<SlotError>; 2],
+    /// The checksum of FoGNet's weights, or why they are not used; `None` where FoGNet is off.
+    pub fognet: Option<Result<u32, SlotError>>,
     /// The status of the corrected yaw rate.
     pub status: Status,
 }

@@ -11,7 +11,8 @@ use crate::can::latitude::{LatitudeConfigError, LatitudeReceiver, LatitudeSettin
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
-use crate::fog::{FogConfig, FogErrors, FogNetUse, Tilt};
+use crate::fog::{FogConfig, FogErrors, FogNetUse, NotForThisGyro, Tilt, check_training};
+use crate::model::fognet_blob::{Gyro, Training};
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
@@ -101,6 +102,8 @@ pub struct Configuration {
     pub slcan_inputs: bool,
     /// Identifiers of diagnosis.
     pub diagnosis: DiagnosisIds,
+    /// Number of the fibre-optic gyro, 0 where it is not known: FoGNet's weights for one gyro run on that one alone.
+    pub fog_serial: u32,
 }
 
 impl Configuration {
@@ -117,6 +120,7 @@ impl Configuration {
         fog_lane: FogLane { tilt_deg: 0.0, fognet: FogNetUse::Off, latitude_frame: None },
         slcan_inputs: false,
         diagnosis: DiagnosisIds::DEFAULT,
+        fog_serial: 0,
     };
 }
 
@@ -167,6 +171,18 @@ impl Configuration {
         }
     }
 
+    /// Checks that FoGNet's weights are for the gyro that is fitted.
+    ///
+    /// # Errors
+    /// [`NotForThisGyro`].
+    pub fn check_training(&self, trained: Training) -> Result<(), NotForThisGyro> {
+        let part = match self.fog {
+            Some(FogPart::Dsp3000) => Gyro::Dsp3000,
+            Some(FogPart::Dsp1760) | None => Gyro::Dsp1760,
+        };
+        check_training(trained, part, self.fog_serial, self.fog_lane.fognet)
+    }
+
     /// Makes the receiver of the vehicle's latitude; `None` where no frame carries it.
     ///
     /// # Errors
@@ -195,17 +211,18 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 4;
+    const VERSION: u8 = 5;
 
     /// Returns the bytes that older layouts lack at their end: 1 ended before `fog_ids`, which were [`FOG_IDS`], here
-    /// as varints; 2 ended before `fog_lane`, 3 before `slcan_inputs`.
+    /// as varints; 2 ended before `fog_lane`, 3 before `slcan_inputs`, 4 before `fog_serial`.
     fn missing(version: u8) -> Option<&'static [u8]> {
         const ALL: &[u8] =
-            &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0xE0, 0x0F, 0xDF, 0x0F, 0xE8, 0x0F];
+            &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0xE0, 0x0F, 0xDF, 0x0F, 0xE8, 0x0F, 0];
         match version {
             1 => Some(ALL),
             2 => ALL.get(6..),
             3 => ALL.get(12..),
+            4 => ALL.get(20..),
             _ => None,
         }
     }

@@ -4,11 +4,13 @@
 //! |---|---|---|
 //! | 0 | 16 KiB | vector table |
 //! | 1, 2 | 2 x 16 KiB | records ([`STORE`]) |
-//! | 3 to 9 | 16 + 64 + 5 x 128 KiB | code and constants, the built-in weights among them |
-//! | 10, 11 | 2 x 128 KiB | weight slots ([`SLOTS`]) |
+//! | 3 to 7 | 16 + 64 + 3 x 128 KiB | FoGNet's weight file ([`FOGNET`]) |
+//! | 8, 9 | 2 x 128 KiB | code and constants, GyroNet's built-in weights among them |
+//! | 10, 11 | 2 x 128 KiB | GyroNet's weight slots ([`SLOTS`]) |
 //!
-//! Records need small sectors of one size, and the processor needs its vectors in sector 0; so the code begins behind
-//! the records. The image's `regions.x` and `slots.x` give the linker the same layout, and a test compares them.
+//! Records need small sectors of one size, and the processor needs its vectors in sector 0. FoGNet's file has 393 KiB, so
+//! there is room for one: while another is uploaded the gyro is corrected without a network. The image's `regions.x` and
+//! `slots.x` give the linker the same layout, and a test compares them.
 
 use core::ops::Range;
 
@@ -29,8 +31,10 @@ pub const SECTORS: [u32; 12] = {
 pub const RECORD_SECTOR: usize = 16 << 10;
 /// The records lie at these offsets into the flash.
 pub const STORE: Range<u32> = 0x4000..0xC000;
+/// FoGNet's weight file lies at these offsets into the flash.
+pub const FOGNET: Range<u32> = 0xC000..0x8_0000;
 /// Offset of the first byte of the code.
-pub const CODE: u32 = 0xC000;
+pub const CODE: u32 = 0x8_0000;
 /// Offset of the first byte behind the code.
 pub const CODE_END: u32 = 0xC_0000;
 /// Size of a weight slot, one sector, bytes.
@@ -49,4 +53,11 @@ pub fn sector_at(offset: u32) -> Option<u8> {
         start += size;
     }
     None
+}
+
+/// Returns the offsets of the sector that begins at an offset; `None` where none begins.
+#[must_use]
+pub fn sector(offset: u32) -> Option<Range<u32>> {
+    let size = SECTORS.get(usize::from(sector_at(offset)?))?;
+    Some(offset..offset + size)
 }

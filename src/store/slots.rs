@@ -1,15 +1,18 @@
-//! Two slots take weight files, and a record names the file that the network runs on.
+//! Two slots take GyroNet's weight files, a third place takes FoGNet's, and a record names the files that the networks run
+//! on.
 //!
-//! A file is uploaded to the slot that is not in use, checked there, and then accepted: a record names the slot and the
-//! file's checksum. At the next start [`select`] takes the first file that passes all checks: the accepted slot, the
-//! other slot if its file was once accepted, the built-in weights. So an upload that breaks off never harms the file in
-//! use: it touches the unused slot only.
+//! A file is uploaded, checked where it lies, and then accepted: a record names its place and checksum. GyroNet's goes to
+//! the slot that is not in use. At the next start [`select`] takes the first file that passes all checks: the accepted
+//! slot, the other slot if its file was once accepted, the built-in weights. So an upload that breaks off never harms the
+//! file in use: it touches the unused slot only. FoGNet has one place ([`super::layout`]): an upload that breaks off leaves
+//! no file there that was accepted, and the gyro is corrected without a network.
 
 use super::error::{FieldError, FlashFault};
-use super::layout::SLOT_SIZE;
+use super::layout::{SLOT_SIZE, SLOTS};
 use super::record::Record;
-use crate::model::{Blob, BlobError};
-use embedded_storage::nor_flash::{NorFlash, NorFlashError};
+use super::upload::Place;
+use crate::fog::NotForThisGyro;
+use crate::model::{Blob, BlobError, FogBlob};
 use serde::{Deserialize, Serialize};
 
 /// Names one of the two slots.
@@ -35,12 +38,12 @@ impl Slot {
         }
     }
 
-    /// Returns the offset of the slot's first byte, from that of slot A.
+    /// Returns the offset of the slot's first byte into the flash.
     #[must_use]
     pub const fn offset(self) -> u32 {
         match self {
-            Self::A => 0,
-            Self::B => SLOT_SIZE as u32,
+            Self::A => SLOTS.start,
+            Self::B => SLOTS.start + SLOT_SIZE as u32,
         }
     }
 
@@ -66,28 +69,38 @@ pub struct Accepted {
     pub active: Option<Slot>,
     /// Checksum of the file that was accepted in each slot.
     pub files: [Option<u32>; 2],
+    /// Checksum of FoGNet's file that was accepted.
+    pub fognet: Option<u32>,
 }
 
 impl Accepted {
     /// No file has been accepted.
-    pub const NONE: Self = Self { active: None, files: [None; 2] };
+    pub const NONE: Self = Self { active: None, files: [None; 2], fognet: None };
 
-    /// Returns the record with a checked file added in a slot, which becomes the one to use.
+    /// Returns the record with a checked file added in its place; a slot becomes the one to use.
     #[must_use]
-    pub const fn with(mut self, slot: Slot, file: u32) -> Self {
+    pub const fn with(mut self, place: Place, file: u32) -> Self {
         let [a, b] = self.files;
-        self.files = match slot {
-            Slot::A => [Some(file), b],
-            Slot::B => [a, Some(file)],
-        };
-        self.active = Some(slot);
+        match place {
+            Place::Slot(Slot::A) => self.files = [Some(file), b],
+            Place::Slot(Slot::B) => self.files = [a, Some(file)],
+            Place::FogNet => self.fognet = Some(file),
+        }
+        if let Place::Slot(slot) = place {
+            self.active = Some(slot);
+        }
         self
     }
 }
 
 impl Record for Accepted {
     const KEY: u8 = 3;
-    const VERSION: u8 = 1;
+    const VERSION: u8 = 2;
+
+    /// Returns what layout 1 lacks at its end: it had no place for FoGNet.
+    fn missing(version: u8) -> Option<&'static [u8]> {
+        (version == 1).then_some(&[0])
+    }
 
     fn check(&self) -> Result<(), FieldError> {
         Ok(())
@@ -108,8 +121,8 @@ pub enum SlotError {
     /// The slot has not been written since it was erased.
     #[error("the slot is empty")]
     Empty,
-    /// The length is longer than a slot, or not a whole number of words.
-    #[error("{0} bytes are no whole number of words up to {SLOT_SIZE}")]
+    /// The length is longer than its place, or not a whole number of words.
+    #[error("{0} bytes are no whole number of words that has room")]
     Length(u32),
     /// The block does not continue the upload.
     #[error("the next block must begin at {expected}")]
@@ -132,21 +145,46 @@ pub enum SlotError {
     /// The file is refused.
     #[error(transparent)]
     Blob(BlobError),
+    /// FoGNet's file is not for the gyro that is fitted.
+    #[error(transparent)]
+    Gyro(NotForThisGyro),
 }
 
-/// Checks the file in a slot. Slots begin on a word.
+impl From<BlobError> for SlotError {
+    fn from(error: BlobError) -> Self {
+        Self::Blob(error)
+    }
+}
+
+/// Returns the bytes of the file in a place, by the length that it states.
 ///
 /// # Errors
-/// [`SlotError::Empty`], [`SlotError::Length`], [`SlotError::Blob`].
-pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
+/// [`SlotError::Empty`], [`SlotError::Length`].
+pub fn bytes(slot: &[u8]) -> Result<&[u8], SlotError> {
     let header = slot.first_chunk::<12>().ok_or(SlotError::Empty)?;
     if *header == [0xFF; 12] {
         return Err(SlotError::Empty);
     }
     let [.., a, b, c, d] = *header;
     let length = u32::from_le_bytes([a, b, c, d]);
-    let bytes = slot.get(..length as usize).ok_or(SlotError::Length(length))?;
-    Blob::new_checked(bytes).map_err(SlotError::Blob)
+    slot.get(..length as usize).ok_or(SlotError::Length(length))
+}
+
+/// Checks GyroNet's file in a slot. Slots begin on a word.
+///
+/// # Errors
+/// [`SlotError::Empty`], [`SlotError::Length`], [`SlotError::Blob`].
+pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
+    Ok(Blob::new_checked(bytes(slot)?)?)
+}
+
+/// Checks FoGNet's file in its place, and that it was accepted.
+///
+/// # Errors
+/// As [`file()`], and [`SlotError::NotAccepted`].
+pub fn fognet<'w>(accepted: &Accepted, place: &'w [u8]) -> Result<FogBlob<'w>, SlotError> {
+    let blob = FogBlob::new_checked(bytes(place)?)?;
+    if accepted.fognet == Some(blob.crc) { Ok(blob) } else { Err(SlotError::NotAccepted(blob.crc)) }
 }
 
 /// Says where the weights in use come from.
@@ -208,71 +246,4 @@ fn refuse(refused: &mut [Option<SlotError>; 2], slot: Slot, error: SlotError) {
         Slot::A => a,
         Slot::B => b,
     } = Some(error);
-}
-
-/// Tracks a file that is being uploaded into a slot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Upload {
-    slot: Slot,
-    length: u32,
-    written: u32,
-}
-
-impl Upload {
-    /// Erases the slot and begins an upload. The processor stands still meanwhile: one to two seconds on an F405 (its
-    /// datasheet, 128 KiB sector).
-    ///
-    /// # Errors
-    /// [`SlotError::Length`], [`SlotError::Flash`].
-    pub fn begin<F: NorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<Self, SlotError> {
-        if length as usize > SLOT_SIZE || length == 0 || !length.is_multiple_of(4) {
-            return Err(SlotError::Length(length));
-        }
-        let end = slot.offset() + SLOT_SIZE as u32;
-        flash.erase(slot.offset(), end).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
-        Ok(Self { slot, length, written: 0 })
-    }
-
-    /// Writes the next block, a whole number of words.
-    ///
-    /// # Errors
-    /// [`SlotError::Offset`] when it does not continue what is written, [`SlotError::Length`] when it is not a whole
-    /// number of words or goes beyond the announced end, [`SlotError::Flash`]; after a flash error the upload must
-    /// begin again.
-    pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
-        if offset != self.written {
-            return Err(SlotError::Offset { expected: self.written });
-        }
-        let len = bytes.len() as u32;
-        if !len.is_multiple_of(4) || len > self.length - self.written {
-            return Err(SlotError::Length(len));
-        }
-        let at = self.slot.offset() + self.written;
-        flash.write(at, bytes).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
-        self.written += len;
-        Ok(())
-    }
-
-    /// Checks the whole file in its slot and returns its checksum.
-    ///
-    /// # Errors
-    /// [`SlotError::Incomplete`], and the errors of [`file()`].
-    pub fn verify(&self, slots: [&[u8]; 2]) -> Result<u32, SlotError> {
-        if self.written != self.length {
-            return Err(SlotError::Incomplete { written: self.written });
-        }
-        file(self.slot.of(slots)).map(|blob| blob.crc)
-    }
-
-    /// Returns the slot.
-    #[must_use]
-    pub const fn slot(&self) -> Slot {
-        self.slot
-    }
-
-    /// Returns the number of bytes written.
-    #[must_use]
-    pub const fn written(&self) -> u32 {
-        self.written
-    }
 }

@@ -24,7 +24,8 @@
 //! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest counter; wrong answers; begin of the key | |
 //! | 0112 | 4 | messages of the fibre-optic gyro since the start, by themselves | |
 //! | 0113 | 4 each | requests that were refused for want of access, in the order of [`AccessCounters`] | |
-//! | 0201 to 021C | | [`super::settings`], each by itself | extended |
+//! | 0114 | 1, 4 | FoGNet: 0 off, 1 its weights are used, 2 they are refused (why: 010A); their CRC-32 | |
+//! | 0201 to 021D | | [`super::settings`], each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
 
@@ -139,6 +140,15 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
                 locked, unsigned, answers, signatures, replayed
             }),
         ),
+        0x0114 => {
+            let (state, crc) = match device.info().fognet {
+                None => (0, 0),
+                Some(Ok(crc)) => (1, crc),
+                Some(Err(_)) => (2, 0),
+            };
+            put(out, &[state])?;
+            put(out, &crc.to_be_bytes())
+        }
         _ => settings::read(id, device, out),
     }
 }

@@ -1,17 +1,21 @@
-//! A download brings a weight file into the slot that is not in use (services 0x34, 0x36, 0x37).
+//! A download brings a weight file (services 0x34, 0x36, 0x37): to address 0 one of GyroNet's, which goes into the slot that
+//! is not in use, to address 1 one of FoGNet's.
 //!
-//! The file is used only after routine FF01, and from the next start on; a download that ends anywhere before leaves
-//! the old one in use.
+//! The file is used only after routine FF01, and from the next start on. A download that ends anywhere before leaves
+//! GyroNet's old one in use; FoGNet's has one place, and FoGNet stays off.
 
 use super::response::{Nrc, Response, nrc, put};
 use super::signature::{Digest, Hasher};
-use crate::service::message::{BLOCK, Request};
+use crate::service::message::{BLOCK, Network, Request};
 use crate::service::{Device, MappedSlots};
+use crate::store::layout::{FOGNET, sector};
+use crate::store::{Place, Slot};
 use embedded_storage::nor_flash::NorFlash;
 
 /// A download under way.
 #[derive(Debug)]
 pub(super) struct Download {
+    network: Network,
     length: u32,
     offset: u32,
     /// Number of the next block; it starts at 1 and wraps around through 0.
@@ -23,7 +27,7 @@ pub(super) struct Download {
 }
 
 impl Download {
-    /// Begins from the parameters of 0x34: no compression, address 0, the length of the file.
+    /// Begins from the parameters of 0x34: no compression, the address, the length of the file.
     pub fn begin<R: NorFlash, W: MappedSlots>(
         parameters: &[u8],
         device: &mut Device<R, W>,
@@ -41,14 +45,16 @@ impl Download {
         }
         let (address, length) = rest.split_at(address_bytes);
         let number = |bytes: &[u8]| bytes.iter().fold(0u32, |sum, byte| sum << 8 | u32::from(*byte));
-        if number(address) != 0 {
-            return Err(Nrc::RequestOutOfRange);
-        }
+        let network = match number(address) {
+            0 => Network::GyroNet,
+            1 => Network::FogNet,
+            _ => return Err(Nrc::RequestOutOfRange),
+        };
         let length = number(length);
-        device.act(&Request::WeightsBegin { length }).map_err(nrc)?;
+        device.act(&Request::WeightsBegin { network, length }).map_err(nrc)?;
         let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
         put(out, &[0x20, high, low])?;
-        Ok(Self { length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
+        Ok(Self { network, length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
     }
 
     /// Takes a block. The last one again is answered again: its response may have been lost.
@@ -81,7 +87,12 @@ impl Download {
         Ok(())
     }
 
-    /// Checks the whole file where it lies; its slot and its checksum are the response.
+    /// Returns whether the next block begins a sector, which is erased first. A slot is one sector, and 0x34 erases it.
+    pub fn erases_next(&self) -> bool {
+        self.network == Network::FogNet && self.offset > 0 && sector(FOGNET.start + self.offset).is_some()
+    }
+
+    /// Checks the whole file where it lies; its place (0 slot A, 1 slot B, 2 FoGNet's) and its checksum are the response.
     pub fn finish<R: NorFlash, W: MappedSlots>(
         &mut self,
         device: &mut Device<R, W>,
@@ -91,8 +102,15 @@ impl Download {
             return Err(Nrc::RequestSequenceError);
         }
         device.act(&Request::WeightsVerify).map_err(nrc)?;
-        let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
-        put(out, &[slot as u8])?;
+        let (place, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
+        put(
+            out,
+            &[match place {
+                Place::Slot(Slot::A) => 0,
+                Place::Slot(Slot::B) => 1,
+                Place::FogNet => 2,
+            }],
+        )?;
         put(out, &crc.to_be_bytes())?;
         let hasher = &mut self.hasher;
         self.digest.get_or_insert_with(|| hasher.finish());

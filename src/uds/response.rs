@@ -40,8 +40,8 @@ pub(super) fn nrc(refusal: Refusal) -> Nrc {
             Nrc::RequestSequenceError
         }
         Refusal::Slot(SlotError::Length(_)) => Nrc::UploadDownloadNotAccepted,
-        Refusal::Slot(SlotError::Empty | SlotError::NotAccepted(_) | SlotError::Blob(_)) => {
-            Nrc::GeneralProgrammingFailure
-        }
+        Refusal::Slot(
+            SlotError::Empty | SlotError::NotAccepted(_) | SlotError::Blob(_) | SlotError::Gyro(_),
+        ) => Nrc::GeneralProgrammingFailure,
     }
 }

@@ -116,6 +116,7 @@ impl Services {
                 request,
                 [0x2E | 0x34, ..] | [0x27, 2 | 0x82, ..] | [0x31, 1, 0x02, 0x02] | [0x31, 1, 0xFF, 0x01, ..]
             )
+            || matches!(request, [0x36, ..]) && self.download.as_ref().is_some_and(Download::erases_next)
     }
 
     /// Writes the response to a request; nothing where none is wanted.

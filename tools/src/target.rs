@@ -4,7 +4,9 @@
 
 pub mod bench;
 pub mod emulator;
+pub mod largest_model;
 pub mod parser_load;
+pub mod ram_flash;
 pub mod schedule;
 pub mod size;
 pub mod stack;

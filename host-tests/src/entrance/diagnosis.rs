@@ -1,6 +1,5 @@
 //! This module tests the diagnostic server: any frames, at any times, on a board with or without flash.
 
-use super::ram_flash::RamFlash;
 use super::records::SECTOR;
 use super::{Seed, byte, take};
 use crate::noise::Noise;
@@ -10,9 +9,10 @@ use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
 use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
-use gyronet::store::layout::SLOT_SIZE;
+use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{FogPart, ImuPart, Record as _};
 use gyronet::uds::Server;
+use gyronet_tools::target::ram_flash::RamFlash;
 
 const DRIVES: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti],
@@ -20,7 +20,7 @@ const DRIVES: SupportedHardware = SupportedHardware {
     bits_per_second: &[250_000, 500_000],
 };
 
-type Board = Device<RamFlash<SECTOR>, RamFlash<SLOT_SIZE>>;
+type Board = Device<RamFlash<SECTOR>, RamFlash<RECORD_SECTOR>>;
 
 /// A server on its board, and the time in milliseconds.
 struct Bench {
@@ -42,7 +42,7 @@ impl Bench {
 pub fn frames(mut data: &[u8]) {
     let choice = byte(&mut data);
     let mut board = Board::new(&DRIVES);
-    let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(|| RamFlash::new(&[])));
+    let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(RamFlash::for_weights));
     board.begin((choice & 4 != 0).then_some(records), slots, choice & 8 == 0, Identity::UNKNOWN);
     let mut noise = Noise::new(1);
     for tick in 0..if choice & 1 != 0 { 310 } else { 0 } {

@@ -1,6 +1,5 @@
 //! This module reads records in flash: configuration, calibration, and the accepted weights.
 
-use super::ram_flash::RamFlash;
 use super::{Seed, byte, take};
 use crate::synthetic::turning;
 use embedded_storage::nor_flash::ReadNorFlash;
@@ -8,6 +7,7 @@ use gyronet::Coprocessor;
 use gyronet::model::blob::CRC;
 use gyronet::store::{Accepted, Calibration, Configuration, Level, Record, Store};
 use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet_tools::target::ram_flash::RamFlash;
 
 /// A sector has this size, smaller than the part's, so that it is soon full.
 pub const SECTOR: usize = 1024;

@@ -1,4 +1,4 @@
-"""CSV FOLDER ENDS CORRECTION SCALE ALPHA: what the trainer makes of a drive, as JSON; numpy is all it needs."""
+"""CSV ENDS CORRECTION SCALE ALPHA: what the trainer makes of a drive, as JSON; numpy is all it needs."""
 
 import json
 import sys
@@ -8,11 +8,11 @@ import numpy as np
 
 from gyronet_train.fognet_loss import fognet_losses
 from gyronet_train.recordings import STATIC_SAMPLES, load_drive, windows
-from gyronet_train.seconds import FOG, STEPS, load_grid, load_kaist, window_rows
+from gyronet_train.seconds import FOG, STEPS, load_grid, window_rows
 
-csv, folder = map(Path, sys.argv[1:3])
-ends = [int(end) for end in sys.argv[3].split(",")]
-correction, scale, alpha = map(float, sys.argv[4:])
+csv = Path(sys.argv[1])
+ends = [int(end) for end in sys.argv[2].split(",")]
+correction, scale, alpha = map(float, sys.argv[3:])
 [drive] = load_grid(csv)
 rows = [window_rows(end, "repeat") for end in ends]
 full = [window for window, end in zip(rows, ends) if end >= STEPS]
@@ -23,7 +23,6 @@ fog = fog / np.sqrt((fog[-1] ** 2).mean())
 losses = fognet_losses(np.full(len(full), correction), label, np.zeros_like(fog), fog, scale, alpha)
 made = {
     "windows": [drive.features[window].tolist() for window in rows],
-    "from_files": [load_kaist(folder).features[window].tolist() for window in rows],
     "losses": [float(loss) for loss in losses],
     "window": windows(load_drive(csv).features)[STATIC_SAMPLES].tolist(),
 }

@@ -16,9 +16,7 @@ const KEPT_OUT: u64 = 5_000;
 fn every_deadline_is_met() {
     let test = "every_deadline_is_met";
     let Some(()) = qemu::available(test) else { return };
-    let board = (bench::LARGEST_MODEL, bench::TARGET);
-    let elf = image::firmware_for(board, test, env!("CARGO_TARGET_TMPDIR"), "coprocessor");
-    let Some(elf) = elf else { return };
+    let Some(elf) = image::coprocessor(test, env!("CARGO_TARGET_TMPDIR")) else { return };
     let plugin = bench::plugin(&bench::workspace());
     let plugin = plugin.ok_or_else(|| "no C compiler for the instruction counter".to_owned());
     let Some(plugin) = wants(test, Need::Qemu, plugin) else { return };

@@ -5,6 +5,7 @@ use embedded_can::Frame;
 use gyronet::can::yaw::{DetailMessage, FOG_IDS, Quality, RateMessage, SIGMA_UNKNOWN, Source};
 use gyronet::fog::FogNetUse;
 use gyronet::health::InputCounters;
+use gyronet::model::weights;
 use gyronet::store::{Configuration, FogLane};
 use gyronet_host_tests::connected::{self, Step};
 use gyronet_host_tests::image;
@@ -22,9 +23,10 @@ fn both_networks_run_with_everything_connected() {
     let Some(path) = recordings::trial(NAME, 11) else { return };
     let Some(elf) = image::coprocessor(NAME, scratch) else { return };
     let fog_lane = FogLane { fognet: FogNetUse::Simulated, ..FogLane::default() };
-    let configuration = Configuration { fog_lane, ..Configuration::DEFAULT };
+    let configuration =
+        Configuration { fog_lane, latitude_deg: Some(36.37), fog_serial: 1, ..Configuration::DEFAULT };
     let rows = recordings::rows(&path);
-    let stored = Stored::default().record(&configuration);
+    let stored = Stored::default().record(&configuration).fognet(&weights::FOGNET.0);
     let mut board = stored.boot(&elf, connected::USARTS, scratch, NAME);
     let start = Instant::now();
     let steps: Vec<Step> =
@@ -51,6 +53,28 @@ fn both_networks_run_with_everything_connected() {
     assert_eq!((counters.pipeline.late, counters.fog.late, counters.lines.overruns), (0, 0, 0));
     assert_eq!(counters.inputs, InputCounters::default());
     assert_eq!((counters.lines.unsent, counters.lines.line_errors), (0, 0));
+}
+
+/// FoGNet's weights for another gyro do not run: the rate is that of the default lane, and says that something stored is
+/// not used.
+#[test]
+fn weights_for_another_gyro_do_not_run() {
+    const NAME: &str = "weights_for_another_gyro_do_not_run";
+    let scratch = env!("CARGO_TARGET_TMPDIR");
+    let Some(elf) = image::coprocessor(NAME, scratch) else { return };
+    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
+    let steps: Vec<Step> =
+        rows.iter().take(40).enumerate().map(|(number, row)| Step::of(number, row)).collect();
+    let fog_lane = FogLane { fognet: FogNetUse::Simulated, ..FogLane::default() };
+    let configuration =
+        Configuration { fog_lane, latitude_deg: Some(36.37), fog_serial: 2, ..Configuration::DEFAULT };
+    let stored = Stored::default().record(&configuration).fognet(&weights::FOGNET.0);
+    let mut board = stored.boot(&elf, connected::USARTS, scratch, NAME);
+    let outcome = connected::run(&mut board, &configuration, &steps);
+    let rates: Vec<RateMessage> =
+        connected::rates(&outcome.followed.lines, FOG_IDS[0]).map(|(_, rate)| rate).skip(10).collect();
+    assert!(!rates.is_empty());
+    assert!(rates.iter().all(|rate| (rate.source, rate.quality) == (Source::EarthRate, Quality::Degraded)));
 }
 
 /// The Earth's rate that is configured comes off at the image's output, to the last bit as on the host, and every rate

@@ -2,7 +2,7 @@
 //! refuses without a flash controller (what is stored: `firmware_stored`), a flood of noise, a restart.
 
 use gyronet::service::event::EventKind;
-use gyronet::service::message::{FlashState, Info, Origin, Refusal};
+use gyronet::service::message::{FlashState, Info, Network, Origin, Refusal};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, StoreError};
 use gyronet_host_tests::noise::Noise;
@@ -47,7 +47,7 @@ fn a_board_with_nothing_stored_reports_that() {
     let wild = Configuration { latitude_deg: Some(91.0), ..configuration };
     let range = FieldError::Range { field: Field::LatitudeDeg, value: 91.0, low: -90.0, high: 90.0 };
     assert_eq!(set(wild), Refusal::Store(StoreError::Field(range)));
-    match upload(&mut device, &[0; 64], |_| {}) {
+    match upload(&mut device, Network::GyroNet, &[0; 64], |_| {}) {
         Err(DeviceError::Refused(Refusal::Slot(SlotError::NoFlash))) => {}
         other => panic!("{other:?}"),
     }

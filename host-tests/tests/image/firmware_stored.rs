@@ -9,8 +9,8 @@ use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Status;
 use gyronet::model::{Blob, weights};
 use gyronet::service::event::{EventKind, SensorFault};
-use gyronet::service::message::{FlashState, Info, Origin, Refusal};
-use gyronet::store::layout::{SLOT_SIZE, SLOTS, STORE};
+use gyronet::service::message::{FlashState, Info, Network, Origin, Refusal};
+use gyronet::store::layout::{SLOT_SIZE, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Mounting, Slot, StoreError};
 use gyronet_host_tests::connected::{self, Step};
@@ -133,7 +133,7 @@ fn stored_configuration_takes_effect() {
     // What is stored can be read without a controller, but not changed.
     let set = board.device.set_configuration(&configuration);
     assert_eq!(refusal(set), Refusal::Store(StoreError::NoFlash));
-    let begun = upload(&mut board.device, &[0; 64], |_| {});
+    let begun = upload(&mut board.device, Network::GyroNet, &[0; 64], |_| {});
     assert_eq!(refusal(begun), Refusal::Slot(SlotError::NoFlash));
 }
 
@@ -251,7 +251,7 @@ fn files() -> [Vec<u8>; 2] {
 
 /// A byte of the weights in a slot.
 fn in_slot(slot: Slot) -> u32 {
-    SLOTS.start + slot.offset() + SLOT_SIZE as u32 / 2
+    slot.offset() + SLOT_SIZE as u32 / 2
 }
 
 /// Returns the lines that a board on these weights sends.

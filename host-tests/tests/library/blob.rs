@@ -80,11 +80,12 @@ fn each_header_field_is_checked() {
     let smaller = Shape { units: 56, linear: false };
     for (at, bytes, error) in [
         (0, &b"GYRX"[..], BlobError::Magic(*b"GYRX")),
-        (4, &[1, 0], BlobError::Version(1)),
-        (4, &[2, 0], BlobError::Version(2)),
-        (4, &[4, 0], BlobError::Version(4)),
-        (4, &[0, 1], BlobError::Version(256)),
-        (6, &[2, 0], topology([2, window, features, hidden, 2, 0])),
+        (4, &[1, 0], BlobError::Version { found: 1, expected: 3 }),
+        (4, &[2, 0], BlobError::Version { found: 2, expected: 3 }),
+        (4, &[4, 0], BlobError::Version { found: 4, expected: 3 }),
+        (4, &[0, 1], BlobError::Version { found: 256, expected: 3 }),
+        (6, &[2, 0], BlobError::Version { found: 3, expected: 4 }),
+        (6, &[3, 0], topology([3, window, features, hidden, 2, 0])),
         (8, &(len as u32 + 4).to_le_bytes(), length(len + 4, len)),
         (8, &[0xFF; 4], length(u32::MAX as usize, len)),
         (12, &[60, 0], topology([1, 60, features, hidden, 2, 0])),
@@ -212,7 +213,7 @@ fn every_flipped_bit_is_noticed() {
         let error = file.error();
         let expected = match bit / 8 {
             0..4 => matches!(error, BlobError::Magic(_)),
-            4..6 => matches!(error, BlobError::Version(_)),
+            4..6 => matches!(error, BlobError::Version { .. }),
             8..12 | 24..28 => matches!(error, BlobError::Length { .. }),
             // Some sizes are another network's.
             6..24 => matches!(error, BlobError::Topology { .. } | BlobError::Length { .. }),
@@ -228,7 +229,7 @@ fn every_flipped_bit_is_noticed() {
 fn refusals_say_why() {
     for (error, text) in [
         (BlobError::Magic(*b"ELF!"), "this is none, it begins with [45, 4c, 46, 21], not [47, 59, 52, 4e]"),
-        (BlobError::Version(2), "format version 2, this reads 3"),
+        (BlobError::Version { found: 2, expected: 3 }, "format version 2, this reads 3"),
         (BlobError::Length { expected: 10, found: 9 }, "9 bytes, should be 10"),
         (BlobError::Misaligned, "not on a 4-byte boundary"),
         (BlobError::Crc { computed: 1, stored: 0xABCD }, "checksum is 00000001, the file says 0000abcd"),

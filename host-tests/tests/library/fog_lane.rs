@@ -138,20 +138,23 @@ fn a_turn_on_standing_wheels_is_reported_and_not_learnt() {
     assert!((mean_deg_per_hour(&sent) - 100.0).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
 }
 
-/// The correction of a minute that FoGNet has learnt at 36.37 N.
-fn of_training() -> Angle {
-    let turn = 60.0 * EARTH * 36.37f64.to_radians().sin();
-    Angle((turn * f64::from(Angle::PER_RAD)).round() as i64)
+/// A correction of a minute that takes off so much all the time.
+fn constant(deg_per_hour: f64) -> Angle {
+    Angle((60.0 * deg_per_hour * DEG_PER_HOUR * f64::from(Angle::PER_RAD)).round() as i64)
+}
+
+fn with_fognet(fognet: FogNetUse) -> FogPipeline {
+    let config = FogConfig { latitude: Latitude::from_degrees(36.37), fognet, ..FogConfig::DEFAULT };
+    let mut fog = FogPipeline::new(config, true);
+    fog.configure(config, true);
+    fog
 }
 
 #[test]
-fn fognet_is_dropped_where_a_standstill_shows_no_gain() {
-    let latitude = Latitude::from_degrees(0.0);
-    let config = FogConfig { latitude, fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
-    let mut fog = FogPipeline::new(config, true);
-    fog.configure(config, true);
-    let mut gyro = Gyro::new(5, 0.0, 0.0);
-    gyro.correction = of_training();
+fn fognet_is_dropped_where_a_standstill_shows_harm() {
+    let mut fog = with_fognet(FogNetUse::Simulated);
+    let mut gyro = Gyro::new(5, 36.37, 0.0);
+    gyro.correction = constant(2.0);
     gyro.standstill = Standstill::Moving;
     let sent = gyro.run(&mut fog, 30);
     let last = sent.last().expect("a step");
@@ -166,19 +169,31 @@ fn fognet_is_dropped_where_a_standstill_shows_no_gain() {
 }
 
 #[test]
-fn fognet_stays_where_it_is_better() {
-    // Without a latitude, and without a standstill long enough for the bias alone.
+fn fognet_stays_where_it_does_no_harm() {
+    for (fognet, quality) in [(FogNetUse::Simulated, Quality::Degraded), (FogNetUse::Recorded, Quality::Good)]
+    {
+        let mut fog = with_fognet(fognet);
+        let mut gyro = Gyro::new(6, 36.37, 0.0);
+        gyro.correction = constant(0.05);
+        gyro.run(&mut fog, 10);
+        let sent = gyro.run(&mut fog, 600);
+        assert_eq!(fog.counters().dropped, 0);
+        assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::FogNet, quality)));
+        assert!(sent.iter().all(|yaw| yaw.sigma.is_some()), "no rate without its expected error");
+    }
+}
+
+#[test]
+fn without_a_latitude_fognet_changes_nothing() {
     let config = FogConfig { fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
     let mut fog = FogPipeline::new(config, true);
     fog.configure(config, true);
-    let mut gyro = Gyro::new(6, 36.37, 0.0);
-    gyro.correction = of_training();
+    let mut gyro = Gyro::new(7, 36.37, 0.0);
+    gyro.correction = constant(2.0);
     gyro.standstill = Standstill::Moving;
-    gyro.run(&mut fog, 10);
-    gyro.standstill = Standstill::Still;
-    let sent = gyro.run(&mut fog, 60);
-    assert_eq!(fog.counters().dropped, 0);
-    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::FogNet, Quality::Degraded)));
+    let sent = gyro.run(&mut fog, 30);
+    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Raw, Quality::Degraded)));
+    assert!((mean_deg_per_hour(&sent) - 8.9).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
 }
 
 fn settings() -> LatitudeSettings {

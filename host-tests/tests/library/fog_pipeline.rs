@@ -1,5 +1,6 @@
 //! A fibre-optic gyro's messages: what they say of its correction, of gaps, and of what is missing.
 
+use gyronet::bias::Latitude;
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::{FogConfig, FogNetUse, FogPipeline};
 use gyronet::health::{Faults, Quality, Source};
@@ -12,7 +13,14 @@ const TURN: i64 = 1 << 40;
 const NOTHING: FogEstimate =
     FogEstimate { correction: Angle(600_000_000), linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
 
-const FOGNET: FogConfig = FogConfig { fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
+/// A gyro with FoGNet at the equator, where the Earth's rate adds nothing.
+fn with_fognet(has_network: bool) -> FogPipeline {
+    let latitude = Latitude::from_degrees(0.0);
+    let config = FogConfig { latitude, fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
+    let mut fog = FogPipeline::new(config, has_network);
+    fog.configure(config, has_network);
+    fog
+}
 
 fn sample(step: u64) -> FogSample {
     FogSample {
@@ -49,13 +57,13 @@ fn run(fog: &mut FogPipeline, steps: core::ops::Range<u64>, with: impl Fn(u64) -
 
 #[test]
 fn corrected_when_an_estimate_is_in_use() {
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     let sent = run(&mut fog, 1..401, |_| true);
     assert_eq!(sent.len(), 400);
     // A window after the first second, its estimate after the second one.
     let first = sent.iter().position(|yaw| yaw.source == Source::FogNet);
     assert_eq!(first, Some(200));
-    assert!(sent[..200].iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Raw, Quality::Degraded)));
+    assert!(sent[..200].iter().all(|yaw| (yaw.source, yaw.quality) == (Source::EarthRate, Quality::Good)));
     assert!(sent[200..].iter().all(|yaw| yaw.quality == Quality::Degraded && yaw.faults == Faults::NONE));
     // The yaw is the sum of the rates.
     let sum = sent.iter().map(|yaw| i64::from(yaw.rate.0)).sum::<i64>();
@@ -65,20 +73,20 @@ fn corrected_when_an_estimate_is_in_use() {
 
 #[test]
 fn a_gap_is_no_rate_and_ends_the_window() {
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     let sent = run(&mut fog, 1..501, |step| !(301..306).contains(&step));
     let gap: Vec<_> = sent.iter().filter(|yaw| yaw.quality == Quality::Unusable).collect();
     assert!((5..=6).contains(&gap.len()), "{}", gap.len());
     assert!(gap.iter().all(|yaw| yaw.faults.0 & Faults::GAP.0 != 0 && yaw.rate.0 == 0));
     // Not by the estimate from before it.
     let behind = sent.iter().rposition(|yaw| yaw.quality == Quality::Unusable).expect("a gap") + 1;
-    assert_eq!(sent[behind].source, Source::Raw);
+    assert_eq!(sent[behind].source, Source::EarthRate);
     assert!(fog.counters().broken > 0);
 }
 
 #[test]
 fn a_gyro_that_says_the_same_is_stuck() {
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     let mut sent = run(&mut fog, 1..301, |_| true);
     // From step 301 on it repeats what it said in step 300.
     for step in 301..351 {
@@ -95,7 +103,7 @@ fn a_gyro_that_says_the_same_is_stuck() {
     let during = &sent[303..350];
     assert!(during.iter().all(|yaw| stuck(yaw) && yaw.quality == Quality::Unusable && yaw.rate.0 == 0));
     // The window has to begin again.
-    assert_eq!((sent[350].source, sent[350].quality), (Source::Raw, Quality::Degraded));
+    assert_eq!((sent[350].source, sent[350].quality), (Source::EarthRate, Quality::Good));
     assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
     assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
 }
@@ -105,7 +113,7 @@ fn a_gyro_that_says_the_same_is_stuck() {
 #[test]
 fn a_stuck_gyro_is_found_while_its_clock_drifts() {
     for ppm in [-20_000_i64, -137, 0, 137, 20_000] {
-        let mut fog = FogPipeline::new(FOGNET, true);
+        let mut fog = with_fognet(true);
         let (mut first, mut sent) = (None, 0);
         for millisecond in 1..=1_000_u64 {
             let now = Micros(millisecond * 1_000);
@@ -129,9 +137,9 @@ fn a_stuck_gyro_is_found_while_its_clock_drifts() {
 
 #[test]
 fn a_gyro_that_is_expected_is_missed_from_the_start() {
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     assert_eq!(run(&mut fog, 0..101, |_| false), []);
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     fog.expect(Micros(0));
     let sent = run(&mut fog, 0..501, |step| step > 100);
     // Step 0 is due 10 ms on; each of silence is no rate.
@@ -146,28 +154,28 @@ fn a_gyro_that_is_expected_is_missed_from_the_start() {
 
 #[test]
 fn a_missing_input_is_reported() {
-    let mut fog = FogPipeline::new(FOGNET, false);
+    let mut fog = with_fognet(false);
     let sent = run(&mut fog, 1..301, |_| true);
-    assert!(sent.iter().all(|yaw| yaw.source == Source::Raw && yaw.faults == Faults::STORED));
+    assert!(sent.iter().all(|yaw| yaw.source == Source::EarthRate && yaw.faults == Faults::STORED));
     assert!(fog.window().is_none());
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     fog.add(Micros(PERIOD_US), sample(1)).expect("the first one");
     let yaw = fog.next_step(Micros(PERIOD_US), Some([0; 6]), None).expect("a step");
     assert_eq!(yaw.faults, Faults::WHEELS);
     // Nobody runs the window in time.
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     let mut late = 0;
     for step in 1..251 {
         fog.add(Micros(step * PERIOD_US), sample(step)).expect("in order");
         let yaw = fog.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
-        late += u32::from(yaw.faults == Faults::LATE && yaw.source == Source::Raw);
+        late += u32::from(yaw.faults == Faults::LATE && yaw.source == Source::EarthRate);
     }
     assert_eq!((late, fog.counters().late), (51, 1));
 }
 
 #[test]
 fn nothing_is_sent_of_a_gyro_that_was_never_heard() {
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     assert!(run(&mut fog, 1..101, |_| false).is_empty());
 }
 
@@ -175,7 +183,7 @@ fn nothing_is_sent_of_a_gyro_that_was_never_heard() {
 /// too.
 #[test]
 fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
-    let mut fog = FogPipeline::new(FOGNET, true);
+    let mut fog = with_fognet(true);
     let mut sent = Vec::new();
     for step in 1..400 {
         let now = Micros(step * PERIOD_US + PERIOD_US / 2);

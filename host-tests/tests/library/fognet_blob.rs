@@ -6,6 +6,7 @@ use gyronet::model::fognet_blob::{
 use gyronet::model::{Blob, blob, weights};
 use gyronet::nn::Aligned;
 use gyronet::nn::lstm::DirectionWeights;
+use gyronet::store::layout;
 use gyronet_host_tests::noise::Noise;
 
 const LEN: usize = weights::FOGNET.0.len();
@@ -38,7 +39,7 @@ fn the_default_is_good_and_says_where_it_comes_from() {
     assert_eq!(blob.lstm2[1].backward.inputs(), 2 * HIDDEN2);
     assert_eq!(blob.crc.to_le_bytes(), weights::FOGNET.0[LEN - 4..]);
     println!("{LEN} bytes");
-    const { assert!(LEN <= 400 * 1024, "both networks and the image must fit 640 KB") };
+    const { assert!(LEN <= layout::FOGNET.end as usize - layout::FOGNET.start as usize) };
 }
 
 #[test]
@@ -87,7 +88,10 @@ fn rows_that_could_overflow_are_refused() {
         assert_eq!(with(row + 2 * columns, &i32::MAX.to_le_bytes()), BlobError::Scale);
     }
     assert_eq!(with(28, &0i32.to_le_bytes()), BlobError::Scale);
-    assert_eq!(HEADER_LEN, 32 + 8 * INPUTS + 4 * 60 + 8);
+    assert_eq!(with(352, &[4, 0]), BlobError::Gyro(4));
+    assert_eq!(with(352, &[0, 0]), BlobError::Gyro(0));
+    assert_eq!(with(4, &[3, 0]), BlobError::Version { found: 3, expected: 4 });
+    assert_eq!(HEADER_LEN, 32 + 8 * INPUTS + 4 * 60 + 8 + 8);
 }
 
 #[test]

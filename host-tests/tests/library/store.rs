@@ -11,8 +11,8 @@ use gyronet::sample::RATE_HZ;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
-    Accepted, Calibration, Configuration, Field, FieldError, FogLane, Level, Mounting, Record, Slot, Store,
-    StoreError,
+    Accepted, Calibration, Configuration, Field, FieldError, FogLane, Level, Mounting, Place, Record, Slot,
+    Store, StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, Duration, WheelSpeed};
 use gyronet_host_tests::flash::{F405, Region};
@@ -81,11 +81,15 @@ fn layout_is_the_linker_s() {
     let text = std::fs::read_to_string(workspace().join("src/bin/stm32f405/regions.x"))
         .expect("it is in the repository");
     assert!(text.contains(&format!("FLASH : ORIGIN = {:#010x}, LENGTH = 1024K", layout::FLASH_BASE)));
-    assert!(text.contains(&format!("_stext = ORIGIN(FLASH) + {:#06X};", layout::CODE).replace("0X", "0x")));
+    let code = format!("const CODE: &str = \"{:#010x}\";", layout::FLASH_BASE + layout::CODE);
+    let build = std::fs::read_to_string(workspace().join("build.rs")).expect("it is too");
+    assert!(build.contains(&code), "{code}");
     let limit = std::fs::read_to_string(workspace().join("src/bin/stm32f405/slots.x")).expect("it is too");
     assert!(limit.contains(&format!("ORIGIN(FLASH) + {}K,", layout::CODE_END >> 10)));
+    assert!(limit.contains(&format!("_stext == ORIGIN(FLASH) + {}K,", layout::CODE >> 10)));
     assert_eq!(SECTORS.iter().sum::<u32>(), 1 << 20);
-    assert_eq!((layout::STORE.end, layout::SLOTS.start), (layout::CODE, layout::CODE_END));
+    assert_eq!((layout::STORE.end, layout::FOGNET.end), (layout::FOGNET.start, layout::CODE));
+    assert_eq!(layout::SLOTS.start, layout::CODE_END);
     let sizes = |range: std::ops::Range<u32>, size: usize| {
         let starts: Vec<u32> = range.step_by(size).collect();
         starts
@@ -195,7 +199,7 @@ fn another_layout_is_named() {
     let flash = Flash::default();
     let mut store = open(&flash);
     store.set(&Later { value: 7 }).expect("it is stored");
-    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 5, expected: 4 }));
+    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 6, expected: 5 }));
     store.set(&Alien { value: [200; 3] }).expect("it is stored");
     assert_eq!(store.get::<Configuration>(), Err(StoreError::Encoding));
 }
@@ -329,7 +333,7 @@ fn slots_are_checked() {
     let crc = file(slots[0]).expect("a whole file").crc;
     let selection = select(&Accepted::NONE, slots, built_in);
     assert_eq!(selection.source, gyronet::store::slots::WeightSource::BuiltIn);
-    let selection = select(&Accepted::NONE.with(Slot::A, crc ^ 1), slots, built_in);
+    let selection = select(&Accepted::NONE.with(Place::Slot(Slot::A), crc ^ 1), slots, built_in);
     assert_eq!(selection.source, gyronet::store::slots::WeightSource::BuiltIn);
     assert_eq!(selection.refused, [Some(SlotError::NotAccepted(crc)), None]);
 }

@@ -2,7 +2,7 @@
 //! what standstills add to the Earth's rate, and whether the expected errors are as large as the true ones.
 
 use gyronet_host_tests::dead_reckoning::error;
-use gyronet_tools::paper::fog_replay::{default_config, run_default};
+use gyronet_tools::paper::fog_replay::{default_config, run_board};
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::fog::{self, Fog};
 use gyronet_tools::simulate::layout::{self, Layout, Set, Spec};
@@ -59,7 +59,7 @@ impl Errors {
 
     fn add(&mut self, spec: &Spec) {
         let sequence = sequence(spec);
-        let (sent, _) = run_default(&sequence, default_config(&sequence));
+        let (sent, _) = run_board(&sequence, default_config(&sequence), None);
         let quiet = fog::Config { angle_walk: 0.0, ..spec.layout.vehicle().fog };
         let [.., bias] = Fog::of_device(&quiet, spec.device, spec.run).increment([0.0; 3], 1.0);
         let earth = EARTH_RATE * sequence.latitude_deg().to_radians().sin();

@@ -1,6 +1,8 @@
 //! Cycles of the networks on this chip, by DWT_CYCCNT: the figures that the cycle model predicts.
+#![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
 use crate::report::Report;
+use crate::stm32f405::flash::Flash;
 use crate::stm32f405::watchdog;
 use core::hint::black_box;
 use cortex_m::peripheral::{DCB, DWT};
@@ -9,6 +11,8 @@ use gyronet::model::gyronet::GyroNetState;
 use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
+use gyronet::store::layout::FOGNET;
+use gyronet::store::slots::{self, SlotError};
 use gyronet::units::Angle;
 
 /// Counts a window of each network.
@@ -35,8 +39,15 @@ fn gyronet(report: &mut Report) {
 fn fognet(report: &mut Report) {
     let Some(state) = cortex_m::singleton!(: FogNetState = FogNetState::ZERO) else { return };
     let Some(minute) = cortex_m::singleton!(: Minute = Minute::EMPTY) else { return };
-    let Ok(blob) = FogBlob::new_checked(&weights::FOGNET.0) else {
-        return report.fail("FoGNet", format_args!("the weight file is refused"));
+    // SAFETY: inside the flash, and nothing writes there.
+    let place = unsafe { Flash::mapped(FOGNET.start, FOGNET.len()) };
+    let found = slots::bytes(place).and_then(|file| Ok(FogBlob::new_checked(file)?));
+    let blob = match found {
+        Ok(blob) => blob,
+        Err(SlotError::Empty) => {
+            return report.look("FoGNet", format_args!("no weight file in its place: not tried"));
+        }
+        Err(error) => return report.fail("FoGNet", format_args!("{error}")),
     };
     let mut network = FogNet::new(blob, state);
     for _ in 0..STEPS {

@@ -6,7 +6,7 @@
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::pause;
-use crate::regions::{Records, Slots};
+use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::serial;
 use crate::stm32f405::{rng, timer};
@@ -115,7 +115,7 @@ impl Diagnosis {
 
     /// Takes the frames that have come, answers a request, and sends the frames that are due.
     #[inline(never)]
-    pub fn turn(&mut self, device: &mut Device<Records, Slots>, counters: &AllCounters) {
+    pub fn turn(&mut self, device: &mut Device<Records, Weights>, counters: &AllCounters) {
         let now = timer::milliseconds();
         let Self { tester, service, port } = self;
         service.advance();

@@ -27,9 +27,14 @@ enum Stage {
 }
 
 impl FogNetwork {
-    /// Begins without a window; without good weights none is ever taken.
+    /// Begins without a window; without weights none is ever taken.
     pub fn new(parts: Option<&'static mut FogParts>) -> Self {
         Self { parts, stage: Stage::Waiting }
+    }
+
+    /// Stops for good: its weights are being replaced.
+    pub fn stop(&mut self) {
+        *self = Self::new(None);
     }
 
     /// Returns whether it could take a window.

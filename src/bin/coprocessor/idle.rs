@@ -4,7 +4,7 @@
 use crate::diagnosis::Diagnosis;
 use crate::fog_network::{FogNetwork, FogParts};
 use crate::imu::BringUp;
-use crate::regions::{Records, Slots};
+use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::stm32f405::{clocks, timer};
 use gyronet::health::{Faults, Status};
@@ -36,7 +36,7 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
 
 /// Holds the state of the idle task.
 pub struct Idle {
-    device: &'static mut Device<Records, Slots>,
+    device: &'static mut Device<Records, Weights>,
     check: Option<BackgroundCheck<'static>>,
     diagnosis: Diagnosis,
     fog_network: FogNetwork,
@@ -48,7 +48,7 @@ pub struct Idle {
 }
 
 /// The stored data, and the check of the weights in use.
-pub type Stored = (&'static mut Device<Records, Slots>, Option<BackgroundCheck<'static>>);
+pub type Stored = (&'static mut Device<Records, Weights>, Option<BackgroundCheck<'static>>);
 
 impl Idle {
     #[inline(never)]
@@ -72,6 +72,9 @@ impl Idle {
         }
         counters.lines.service_errors = self.diagnosis.refused();
         self.diagnosis.turn(self.device, counters);
+        if self.device.fognet_is_gone() {
+            self.fog_network.stop();
+        }
         self.retry_clock();
         self.check()
     }

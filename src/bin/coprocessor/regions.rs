@@ -1,4 +1,4 @@
-//! The two regions of the flash that are written: records and weight slots.
+//! The regions of the flash that are written: records and weight files.
 #![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
 use crate::pause;
@@ -6,23 +6,45 @@ use crate::stm32f405::flash::{Flash, FlashError, WORD};
 use core::ops::Range;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use gyronet::service::MappedSlots;
-use gyronet::store::layout::{RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE};
+use gyronet::store::layout::{FOGNET, RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector};
 
-/// An offset into a region as one into the flash.
-fn absolute(region: &Range<u32>, offset: u32, len: usize, unit: usize) -> Result<u32, FlashError> {
-    let start = region.start.checked_add(offset).ok_or(FlashError::OutOfBounds)?;
-    let end = u32::try_from(len).ok().and_then(|len| start.checked_add(len));
-    if end.is_none_or(|end| end > region.end) {
-        return Err(FlashError::OutOfBounds);
-    }
-    let aligned = (start as usize).is_multiple_of(unit) && len.is_multiple_of(unit);
-    if aligned { Ok(start) } else { Err(FlashError::NotAligned) }
+/// Returns the range of so many bytes from an offset into the flash on, which is to lie in one of the regions.
+fn inside(regions: &[Range<u32>], offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
+    let end =
+        u32::try_from(len).ok().and_then(|len| offset.checked_add(len)).ok_or(FlashError::OutOfBounds)?;
+    let holds = |region: &Range<u32>| region.start <= offset && end <= region.end;
+    if regions.iter().any(holds) { Ok(offset..end) } else { Err(FlashError::OutOfBounds) }
+}
+
+/// Returns a range whose ends are multiples of a unit.
+fn aligned(range: Range<u32>, unit: usize) -> Result<Range<u32>, FlashError> {
+    let fits = (range.start as usize).is_multiple_of(unit) && range.len().is_multiple_of(unit);
+    if fits { Ok(range) } else { Err(FlashError::NotAligned) }
+}
+
+/// Erases a range of whole sectors, once the buses have been told.
+fn erase(flash: &Flash, range: Range<u32>) -> Result<(), FlashError> {
+    pause::announced(|| {
+        let mut at = range.start;
+        while at < range.end {
+            let sector = sector(at).filter(|sector| sector.end <= range.end).ok_or(FlashError::NotAligned)?;
+            flash.erase(sector.start)?;
+            at = sector.end;
+        }
+        Ok(())
+    })
 }
 
 macro_rules! region {
-    ($name:ident, $range:expr, $sector:expr, $doc:literal) => {
+    ($name:ident, $base:expr, $regions:expr, $smallest:expr, $doc:literal) => {
         #[doc = $doc]
         pub struct $name(pub &'static Flash);
+
+        impl $name {
+            fn inside(offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
+                inside(&$regions, offset.checked_add($base).ok_or(FlashError::OutOfBounds)?, len)
+            }
+        }
 
         impl ErrorType for $name {
             type Error = FlashError;
@@ -32,39 +54,48 @@ macro_rules! region {
             const READ_SIZE: usize = 1;
 
             fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-                self.0.read(absolute(&$range, offset, bytes.len(), 1)?, bytes);
+                self.0.read(Self::inside(offset, bytes.len())?.start, bytes);
                 Ok(())
             }
 
             fn capacity(&self) -> usize {
-                $range.len()
+                $regions.iter().map(|region| (region.end - $base) as usize).max().unwrap_or(0)
             }
         }
 
         impl NorFlash for $name {
             const WRITE_SIZE: usize = WORD;
-            const ERASE_SIZE: usize = $sector;
+            const ERASE_SIZE: usize = $smallest;
 
             fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
                 let len = to.checked_sub(from).ok_or(FlashError::OutOfBounds)? as usize;
-                let start = absolute(&$range, from, len, $sector)?;
-                let sectors = || (start..start + len as u32).step_by($sector);
-                pause::announced(|| sectors().try_for_each(|sector| self.0.erase(sector)))
+                erase(self.0, Self::inside(from, len)?)
             }
 
             fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-                self.0.write(absolute(&$range, offset, bytes.len(), WORD)?, bytes)
+                let range = aligned(Self::inside(offset, bytes.len())?, WORD)?;
+                self.0.write(range.start, bytes)
             }
         }
     };
 }
 
-region!(Records, STORE, RECORD_SECTOR, "The sectors of records.");
-region!(Slots, SLOTS, SLOT_SIZE, "The weight slots.");
+region!(
+    Records,
+    STORE.start,
+    [STORE],
+    RECORD_SECTOR,
+    "The sectors of records; offsets count from their start."
+);
+region!(Weights, 0, [FOGNET, SLOTS], RECORD_SECTOR, "The weight files; offsets are those into the flash.");
 
-impl MappedSlots for Slots {
+impl MappedSlots for Weights {
     fn slots(&self) -> [&[u8]; 2] {
         slots_at_start()
+    }
+
+    fn fognet(&self) -> &[u8] {
+        fognet_at_start()
     }
 }
 
@@ -72,4 +103,10 @@ impl MappedSlots for Slots {
 pub fn slots_at_start() -> [&'static [u8]; 2] {
     // SAFETY: inside the flash; see above.
     [SLOTS.start, SLOTS.start + SLOT_SIZE as u32].map(|offset| unsafe { Flash::mapped(offset, SLOT_SIZE) })
+}
+
+/// Gives the place of FoGNet's file as it is. Idle stops FoGNet before it does anything else once the file is written.
+pub fn fognet_at_start() -> &'static [u8] {
+    // SAFETY: inside the flash; see above.
+    unsafe { Flash::mapped(FOGNET.start, FOGNET.len()) }
 }

@@ -6,7 +6,7 @@ use crate::diagnosis;
 use crate::fog_network::FogParts;
 use crate::idle::Stored;
 use crate::output::OutputParts;
-use crate::regions::{self, Records, Slots};
+use crate::regions::{self, Records, Weights};
 use crate::stm32f405::{can::BITS_PER_SECOND, flash::Flash, pac};
 use core::mem::MaybeUninit;
 use gyronet::align::clock_ratio::ClockRatioConfig;
@@ -27,8 +27,7 @@ const DRIVES: SupportedHardware = SupportedHardware {
 };
 
 /// The weights that run where no slot has any that are good.
-const BUILT_IN: &[u8] =
-    if cfg!(feature = "paper-weights") { &weights::GYRONET.0 } else { &weights::DEFAULT.0 };
+const BUILT_IN: &[u8] = &weights::DEFAULT.0;
 
 /// Has CAN receive the frames that the configuration names.
 fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings, config: &Config) {
@@ -59,16 +58,16 @@ pub fn parts(board: &Board) -> Option<Parts> {
     // SAFETY: the clock tree is done with the controller, and this runs once.
     let registers = unsafe { pac::FLASH::steal() };
     let flash = &*cortex_m::singleton!(: Flash = Flash::new(registers))?;
-    let device = cortex_m::singleton!(: Device<Records, Slots> = const { Device::new(&DRIVES) })?;
-    device.begin(Some(Records(flash)), Some(Slots(flash)), flash.writable(), board.identity);
+    let device = cortex_m::singleton!(: Device<Records, Weights> = const { Device::new(&DRIVES) })?;
+    device.begin(Some(Records(flash)), Some(Weights(flash)), flash.writable(), board.identity);
     // Without good weights the pipeline still runs: the status says degraded, and the rate is
     // the gyro's less its static bias.
     let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
     let check = blob.as_ref().map(BackgroundCheck::new);
+    let fog_network = device.fognet(regions::fognet_at_start()).and_then(fog_network);
     let configuration = device.configuration();
     let weights = blob.map_or(0, |blob| blob.crc);
     let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
-    let fog_network = fog_network();
     let config = Config {
         wheels: WheelReceiver::new(*device.wheels()).ok(),
         has_gyronet: blob.is_some(),
@@ -97,11 +96,10 @@ pub fn parts(board: &Board) -> Option<Parts> {
     })
 }
 
-/// FoGNet on its built-in weights; `None` when they are damaged.
+/// Makes FoGNet on its weights; `None` when it has been made before.
 #[inline(never)]
-fn fog_network() -> Option<&'static mut FogParts> {
+fn fog_network(blob: FogBlob<'static>) -> Option<&'static mut FogParts> {
     let state = cortex_m::singleton!(: FogNetState = FogNetState::ZERO)?;
-    let blob = FogBlob::new_checked(&weights::FOGNET.0).ok()?;
     let network = FogNet::new(blob, state);
     cortex_m::singleton!(: FogParts = FogParts { network, window: WindowCopy::EMPTY })
 }

@@ -1,17 +1,21 @@
-//! The board runs on one weight file, while another one is written to the slot that is not in use.
+//! GyroNet runs on one weight file, while another one is written to the slot that is not in use. FoGNet's file has one
+//! place, and FoGNet stops when another one is written there.
 
 use super::Device;
-use crate::model::Blob;
+use crate::fog::FogNetUse;
+use crate::model::{Blob, FogBlob};
 use crate::service::event::EventKind;
-use crate::service::message::{BLOCK, Refusal};
-use crate::store::Slot;
-use crate::store::slots::{Selection, SlotError, Upload, WeightSource, select};
+use crate::service::message::{BLOCK, Network, Refusal};
+use crate::store::slots::{self, Selection, SlotError, WeightSource, select};
+use crate::store::{Place, Slot, Upload};
 use embedded_storage::nor_flash::NorFlash;
 
-/// The flash of the weight slots, which the processor can also read in place.
+/// The flash of the weight files, which the processor can also read in place. Offsets are those into the whole flash.
 pub trait MappedSlots: NorFlash {
     /// Returns both slots, each on a word boundary.
     fn slots(&self) -> [&[u8]; 2];
+    /// Returns the place of FoGNet's file, on a word boundary.
+    fn fognet(&self) -> &[u8];
 }
 
 /// An upload, and its file's checksum once checked.
@@ -40,6 +44,26 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         weights
     }
 
+    /// Selects FoGNet's weights from its place as the processor reads it; `None` where FoGNet is off, or the file is
+    /// refused, which is noted.
+    pub fn fognet<'w>(&mut self, place: &'w [u8]) -> Option<FogBlob<'w>> {
+        if self.configuration.fog_lane.fognet == FogNetUse::Off {
+            return None;
+        }
+        let found = slots::fognet(&self.accepted, place).and_then(|blob| {
+            let fits = self.configuration.check_training(blob.training);
+            fits.map(|()| blob).map_err(SlotError::Gyro)
+        });
+        self.fognet = Some(found.map(|blob| blob.crc));
+        found.map_err(|error| self.refuse(EventKind::FogNetRefused(error))).ok()
+    }
+
+    /// Returns whether FoGNet's file has been erased since the start: what runs on it must stop.
+    #[must_use]
+    pub fn fognet_is_gone(&self) -> bool {
+        self.fognet_gone
+    }
+
     /// Notes that the weights in use no longer fit their checksum; they are not used until the next start, which
     /// checks all files again.
     pub fn weights_damaged(&mut self) {
@@ -57,11 +81,16 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    pub(super) fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
-        let slot = self.unused_slot();
+    pub(super) fn weights_begin(&mut self, network: Network, length: u32) -> Result<(), Refusal> {
+        let place = match network {
+            Network::GyroNet => Place::Slot(self.unused_slot()),
+            Network::FogNet => Place::FogNet,
+        };
         self.uploading = None;
         let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        let upload = Upload::begin(flash, slot, length)?;
+        // An erase that fails may have erased a part.
+        self.fognet_gone |= network == Network::FogNet;
+        let upload = Upload::begin(flash, place, length)?;
         self.uploading = Some(Uploading { upload, checked: None });
         Ok(())
     }
@@ -88,18 +117,18 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub(super) fn weights_verify(&mut self) -> Result<(), Refusal> {
         let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-        uploading.checked = Some(uploading.upload.verify(flash.slots())?);
+        uploading.checked = Some(uploading.upload.verify(flash.slots(), flash.fognet())?);
         Ok(())
     }
 
     pub(super) fn weights_activate(&mut self) -> Result<(), Refusal> {
         let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
         let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
-        let accepted = self.accepted.with(upload.slot(), file);
+        let accepted = self.accepted.with(upload.place(), file);
         self.store()?.set(&accepted)?;
         self.accepted = accepted;
         self.uploading = None;
-        self.note(EventKind::WeightsAccepted(upload.slot()));
+        self.note(EventKind::WeightsAccepted(upload.place()));
         Ok(())
     }
 }

@@ -46,12 +46,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let image = bench::build(&workspace, "coprocessor", &folder)?;
     let coprocessor = ImageSize::read(&image)?;
-    let tasks = if counts.exact() {
-        let image = bench::build_with_largest_model(&workspace, &folder)?;
-        Some(schedule(&workspace, &image, &counts)?)
-    } else {
-        None
-    };
+    let tasks = if counts.exact() { Some(schedule(&workspace, &image, &counts)?) } else { None };
     let out = &mut io::stdout().lock();
     let written = if common.json {
         writeln!(out, "{}", json(&counts, &coprocessor, tasks.as_ref().map(|(_, schedule)| schedule)))

@@ -6,6 +6,7 @@ use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::vehicle::Vehicle;
 use gyronet_tools::import::drive::{Logs, Request, Seen};
+use gyronet_tools::paper::fog_replay;
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::paper::tables::pictures;
 use gyronet_tools::simulate::layout::Layout;
@@ -64,8 +65,8 @@ pub struct Args {
     /// Leave out this many seconds at the start.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     from: f64,
-    /// Write a drive to train with, of a sequence: without the steps in a gap of any file. One that starts moving is an
-    /// error.
+    /// Write a drive to train with, of a sequence: without the steps in a gap of any file, and with the fibre-optic gyro
+    /// less the Earth's rate and its bias, as FoGNet receives it. One that starts moving is an error.
     #[arg(long, requires = "out")]
     training: bool,
     /// Write a picture of the times between stamps of each file of a sequence (the paper's Fig. 11).
@@ -218,7 +219,7 @@ fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
         let file = File::create(path).map_err(&error)?;
         let out = BufWriter::new(file);
         let rows = if args.training {
-            sequence::write_whole(sequence, out)
+            sequence::write_whole(&fog_replay::after_lane(sequence), out)
         } else {
             sequence::write_csv(sequence, out)
         };

@@ -119,9 +119,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for folder in &folders {
         let sequence = import::read(folder, common)?;
-        let bar = progress::bar(common, 5 * sequence.steps.len(), &sequence.name);
+        let bar = progress::bar(common, 3 * sequence.steps.len(), &sequence.name);
         let mut estimates = estimates::run(&sequence, &mut network, || bar.inc(1));
-        estimates.add_fognet(&sequence, &mut fognet, || bar.inc(1));
+        estimates.add_fognet(&sequence, &mut fognet, fog_blob.training);
         estimates.add_pseudo_fog(&sequence, &mut pseudo_fog, || bar.inc(1));
         bar.finish_and_clear();
         if let Some((_, joint)) = joint.iter().find(|(layout, _)| *layout == sequence.layout) {

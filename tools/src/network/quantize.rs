@@ -12,6 +12,7 @@ mod rows;
 use crate::network::checkpoint::{Checkpoint, GyroNet};
 use crate::network::tensors::Tensors;
 use gyronet::model::blob::{self, Blob, LINEAR_INPUTS, Shape, Topology};
+use gyronet::model::fognet_blob::{FOGNET, FOGNET_VERSION};
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2, linear::Linear};
 use gyronet::units::{AngularRate, SpecificForce};
@@ -42,6 +43,9 @@ pub enum QuantizeError {
         /// Its value.
         value: f64,
     },
+    /// The provenance does not name the gyro that FoGNet was trained for.
+    #[error("the checkpoint names no gyro: train with --gyro, and --serial where it is for one alone")]
+    Gyro,
     /// The result does not pass the library's own checks.
     #[error(transparent)]
     Blob(#[from] blob::BlobError),
@@ -143,7 +147,8 @@ fn header(
     codes: &[f64],
 ) -> Result<Vec<u8>, QuantizeError> {
     let mut out = blob::MAGIC.to_vec();
-    out.extend(blob::VERSION.to_le_bytes());
+    let version = if network == FOGNET { FOGNET_VERSION } else { blob::VERSION };
+    out.extend(version.to_le_bytes());
     out.extend(network.to_le_bytes());
     out.extend((file_len as u32).to_le_bytes());
     sizes.iter().for_each(|number| out.extend(number.to_le_bytes()));

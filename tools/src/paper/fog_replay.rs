@@ -1,18 +1,21 @@
-//! This module runs a sequence through the coprocessor, for the turns that the board sends by default, and through
-//! FoGNet alone on the uncorrected gyro, as in the paper.
+//! This module runs a sequence through the coprocessor, for the turns that the board sends with FoGNet or without, and
+//! through FoGNet alone on the turns of the sequence.
 
 use crate::drive::DT;
 use crate::drive::wheel_frames;
 use crate::paper::sequence::{Sequence, Step};
 use crate::simulate::layout::Layout;
 use gyronet::bias::Latitude;
-use gyronet::coprocessor::{Config, Coprocessor};
+use gyronet::coprocessor::{Clock, Config, Coprocessor};
 use gyronet::estimate::YawEstimate;
-use gyronet::fog::{FogConfig, FogCorrector, FogCounters, FogErrors};
+use gyronet::fog::{
+    FogConfig, FogCorrector, FogCounters, FogErrors, FogNetUse, NotForThisGyro, check_training,
+};
 use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::fognet_blob::{Gyro, Training};
 use gyronet::model::seconds::FogFrame;
 use gyronet::model::window::Features;
-use gyronet::sample::{FogSample, PERIOD_US, RATE_HZ};
+use gyronet::sample::{FogSample, ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
 
 /// Static initialisation takes this many steps: 3 s.
@@ -35,7 +38,7 @@ pub struct FogReplay {
     pub broken: u64,
 }
 
-/// Runs a sequence; `tick` is called for each step.
+/// Runs a sequence through FoGNet alone; `tick` is called for each step.
 pub fn run(
     sequence: &Sequence,
     network: &mut impl MinuteNetwork,
@@ -83,14 +86,37 @@ pub fn default_config(sequence: &Sequence) -> FogConfig {
     FogConfig { errors, latitude, ..FogConfig::DEFAULT }
 }
 
-/// Runs a sequence through the coprocessor without FoGNet, wheels by frames as the board receives them; returns the rate
-/// that is sent for each step (zero for the first, whose beginning no sample has), and the counters.
+/// Returns whether weights are for the gyro of a sequence. A simulated one has the number of its device; a recorded one is
+/// taken for the one that the weights name.
+///
+/// # Errors
+/// [`NotForThisGyro`].
+pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), NotForThisGyro> {
+    let part = match sequence.layout {
+        Layout::Kaist => Gyro::Dsp1760,
+        Layout::Nclt => Gyro::Dsp3000,
+    };
+    let serial = sequence.simulated.as_ref().map_or(trained.serial, |spec| spec.device as u32);
+    check_training(trained, part, serial, FogNetUse::Simulated)
+}
+
+/// Runs a sequence through the coprocessor, wheels by frames as the board receives them, and FoGNet where it is given;
+/// returns the rate that is sent for each step (zero for the first, whose beginning no sample has), and the counters.
 #[must_use]
-pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>, FogCounters) {
+pub fn run_board(
+    sequence: &Sequence,
+    config: FogConfig,
+    mut fognet: Option<&mut dyn MinuteNetwork>,
+) -> (Vec<YawEstimate>, FogCounters) {
     let mut coprocessor = Coprocessor::new(Config {
-        fog: config,
+        fog: FogConfig {
+            fognet: if fognet.is_some() { FogNetUse::Simulated } else { FogNetUse::Off },
+            ..config
+        },
         wheels: Some(wheel_frames::receiver()),
-        has_fognet: false,
+        has_fognet: fognet.is_some(),
+        has_gyronet: false,
+        clock: Clock::Sensor,
         ..Config::DEFAULT
     });
     let mut way = [0.0; 2];
@@ -108,9 +134,19 @@ pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>,
                 let _ = coprocessor.can(&frame, time);
             }
         }
+        if let Some([fx, fy, fz, rx, ry, rz]) = codes(step).filter(|_| !step.imu_gap) {
+            let sample = ImuSample {
+                time,
+                specific_force: [fx, fy, fz].map(SpecificForce),
+                angular_rate: [rx, ry, rz].map(AngularRate),
+                temperature: None,
+                validity: Validity::Good,
+            };
+            // Times are in order, so no sample is refused.
+            let _ = coprocessor.imu(sample, time);
+        }
         let increment = [None, None, Some(angle(step.fog))];
         let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
-        // Times are in order, so no sample is refused.
         let _ = coprocessor.fog(sample, time);
         while coprocessor.next_frame().is_some() {
             let Some(estimate) = coprocessor.fog_estimate() else { continue };
@@ -118,18 +154,37 @@ pub fn run_default(sequence: &Sequence, config: FogConfig) -> (Vec<YawEstimate>,
             let place = (estimate.tick as usize).checked_sub(1).and_then(|row| sent.get_mut(row));
             place.into_iter().for_each(|place| *place = *estimate);
         }
+        if let (Some(network), Some((number, window))) = (&mut fognet, coprocessor.fog_window()) {
+            let estimate = network.estimate(&window);
+            // It comes in time.
+            let _ = coprocessor.deliver_fog(number, estimate);
+        }
     }
     (sent, *coprocessor.fog_counters())
+}
+
+/// Returns the sequence with the gyro less the Earth's rate and its bias, as the board computes it and FoGNet receives
+/// it.
+#[must_use]
+pub fn after_lane(sequence: &Sequence) -> Sequence {
+    let (sent, _) = run_board(sequence, default_config(sequence), None);
+    let mut corrected = sequence.clone();
+    for (step, sent) in corrected.steps.iter_mut().zip(sent) {
+        step.fog = sent.rate.rad_per_sec() * DT;
+    }
+    corrected
+}
+
+/// Returns the inertial sensor's reading in codes; `None` beyond the range of any part.
+fn codes(step: &Step) -> Option<Features> {
+    let [fx, fy, fz] = step.specific_force.map(|f| SpecificForce::from_metre_per_sec2(f).ok());
+    let [rx, ry, rz] = step.angular_rate.map(|rate| AngularRate::from_rad_per_sec(rate).ok());
+    Some([fx?.0, fy?.0, fz?.0, rx?.0, ry?.0, rz?.0])
 }
 
 /// Returns the inertial sensor's features of each step, its gyro less its mean over the first 3 s; `None` for a reading
 /// beyond the range of any part.
 fn features(sequence: &Sequence) -> Vec<Option<Features>> {
-    let codes = |step: &Step| {
-        let [fx, fy, fz] = step.specific_force.map(|f| SpecificForce::from_metre_per_sec2(f).ok());
-        let [rx, ry, rz] = step.angular_rate.map(|rate| AngularRate::from_rad_per_sec(rate).ok());
-        Some([fx?.0, fy?.0, fz?.0, rx?.0, ry?.0, rz?.0])
-    };
     let mut features: Vec<Option<Features>> = sequence.steps.iter().map(codes).collect();
     let first = || features.iter().take(STATIC_STEPS).flatten();
     let count = first().count().max(1) as i64;

@@ -346,7 +346,11 @@ impl Files {
     }
 }
 
-fn marker(folder: &Path) -> Result<Option<Spec>, DataError> {
+/// Reads the specification of a simulated sequence; `None` for a recorded one.
+///
+/// # Errors
+/// [`DataError`].
+pub fn marker(folder: &Path) -> Result<Option<Spec>, DataError> {
     let path = folder.join(MARKER);
     let error = |fault| DataError::of(path.display(), fault);
     match fs::read(&path) {

@@ -20,8 +20,6 @@ const POLL: Duration = Duration::from_millis(5);
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
 /// These images are flashed.
 const FLASHED: [&str; 2] = ["coprocessor", "bringup"];
-/// The features of the image with the largest model.
-pub const LARGEST_MODEL: &str = "netduino-plus-2,paper-weights";
 /// The emulated board.
 pub const MACHINE: &str = "netduinoplus2";
 /// The image's target.
@@ -163,14 +161,6 @@ pub fn target_installed(target: &str) -> Result<(), String> {
 /// [`BenchError`] with the compiler's output.
 pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
     build_for(("netduino-plus-2", TARGET), workspace, image, folder)
-}
-
-/// Builds the image that is flashed with the largest model that it can run as its built-in weights.
-///
-/// # Errors
-/// [`BenchError`] with the compiler's output.
-pub fn build_with_largest_model(workspace: &Path, folder: &Path) -> Result<PathBuf, BenchError> {
-    build_for((LARGEST_MODEL, TARGET), workspace, "coprocessor", &folder.join("largest-model"))
 }
 
 /// Builds an image for a board, named by its features, and its target.

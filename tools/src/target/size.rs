@@ -3,8 +3,8 @@
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
 
-/// An image with both networks and everything else must stay within these limits, bytes: flash, static RAM, stack.
-pub const BUDGETS: [u64; 3] = [768 << 10, 96 << 10, 12 << 10];
+/// An image must stay within these limits, bytes: flash (sectors 8 and 9), static RAM, stack.
+pub const BUDGETS: [u64; 3] = [256 << 10, 96 << 10, 12 << 10];
 
 /// Holds the sizes of one image, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

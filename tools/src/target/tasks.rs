@@ -6,6 +6,7 @@ mod symbols;
 
 use crate::target::bench::{BenchError, field};
 use crate::target::emulator::EmulatorError;
+use crate::target::largest_model;
 use std::path::Path;
 use symbols::Symbols;
 
@@ -137,7 +138,7 @@ impl std::fmt::Display for Tasks {
     }
 }
 
-/// Runs the image with the plugin and returns the counts of all its handlers.
+/// Runs the image with the plugin and the largest model, and returns the counts of all its handlers.
 ///
 /// # Errors
 /// [`BenchError`], also when the image does not answer.
@@ -151,7 +152,10 @@ pub fn measure(image: &Path, plugin: &Path) -> Result<Tasks, BenchError> {
         program: image.display().to_string(),
         output: error.to_string(),
     };
-    let printed = drive::run(image, &options).map_err(failed)?;
+    let folder = tempfile::tempdir().map_err(|error| BenchError::Line(error.to_string()))?;
+    let loaded =
+        largest_model::arguments(folder.path()).map_err(|error| BenchError::Line(error.to_string()))?;
+    let printed = drive::run(image, &options, &loaded).map_err(failed)?;
     for line in printed.lines() {
         let (what, rest) = line.split_once(' ').unwrap_or_default();
         let number = |key| field(line, key).ok_or_else(|| BenchError::Line(line.to_owned()));

@@ -6,10 +6,10 @@ units of the corrections' RMS, the second as the mean over the window in units o
 increments' RMS: in radians and summed it would be a thousand times the first. Some windows are
 padded ones (Fig. 8), labelled with the truth of the rows that they repeat. The rate follows one
 cycle, weights are averaged over the last steps, and the epoch that does best on the validation
-drive is kept. Test drives are never read here.
+drive is kept. Of a gyro whose bias is known the correction's constant part is taken out at the end. Test drives are never read here.
 
-LAYOUT kaist: folders in the KAIST Urban layout, real or simulated. LAYOUT drives: files that `gyronet
-import kaist` or `nclt` wrote, used in pieces where they have gaps. LAYOUT kingston: the Kingston
+LAYOUT drives: files that `gyronet import kaist --training` or `nclt` wrote, with the gyro less the Earth's rate and
+its bias, used in pieces where they have gaps. LAYOUT kingston: the Kingston
 2008 recording, of which only the first 60 % are read, the last sixth of these to validate.
 """
 
@@ -28,7 +28,7 @@ from tqdm import tqdm
 from .export import export
 from .fognet_loss import fognet_losses
 from .fognet_model import FoGNet
-from .seconds import FOG, STEPS, Seconds, load_grid, load_kaist, load_kingston, window_rows
+from .seconds import FOG, STEPS, Seconds, load_grid, load_kingston, window_rows
 
 ADAPT_SHARE, VALIDATE_SHARE = 0.6, 1 / 6
 AVERAGE = 0.995  # of the weights, a step
@@ -37,12 +37,14 @@ SETTINGS = ("epochs", "windows", "batch", "lr", "alpha", "padded", "weight_decay
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train.fognet", description=__doc__)
-    parser.add_argument("layout", choices=["kaist", "drives", "kingston"])
+    parser.add_argument("layout", choices=["drives", "kingston"])
     parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="PATH")
     parser.add_argument("--validate", type=Path, nargs="+", metavar="PATH", help="the drives to validate with")
     parser.add_argument(
         "--rates", type=Path, metavar="FOLDER", help="rates of `gyronet replay --csv`, DRIVE.csv each, in place of the FoG's"
     )
+    parser.add_argument("--gyro", choices=["DSP-1760", "DSP-3000", "pseudo-FoG"], help="part that the weights are for")
+    parser.add_argument("--serial", type=int, default=0, help="number of the one gyro that they are for; 0 any of the part")
     parser.add_argument("--simulated", action="store_true", help="say in the provenance that the drives are")
     parser.add_argument("--init", type=Path, metavar="FILE", help="checkpoint to go on from")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
@@ -66,8 +68,7 @@ def load(args: argparse.Namespace) -> tuple[list[Seconds], list[Seconds]]:
     """The drives to train on and to validate with; pieces of a drive count as drives."""
     if args.layout != "kingston":
         rates = lambda path: args.rates and args.rates / path.name
-        grid = lambda path: load_grid(path, rates(path))
-        pieces = grid if args.layout == "drives" else lambda folder: [load_kaist(folder)]
+        pieces = lambda path: load_grid(path, rates(path))
         train = [piece for path in tqdm(args.train, "reading", disable=None) for piece in pieces(path)]
         return train, [piece for path in args.validate or [] for piece in pieces(path)]
     drive = load_kingston(args.train[0])
@@ -175,16 +176,21 @@ def main() -> None:
             best = (error, epoch, copy.deepcopy(average.state_dict()))
     model.load_state_dict(best[2])
     model.eval()
+    constant = 0.0 if args.layout == "kingston" else take_out_constant(model, data)
+    print(f"a constant of {constant:+.7f} rad a minute is taken out")
     provenance = {
         "network": "fognet",
         "train": list(dict.fromkeys(d.name for d in train)),
         "validate": ", ".join(dict.fromkeys(d.name for d in validate)),
+        "gyro": args.gyro,
+        "serial": args.serial,
         "simulated": args.simulated,
         "sha256": {d.name: d.sha256 for d in [*train, *validate]},
         "validation_mean_60s_rad": round(best[0], 8),
         "validation_uncorrected_mean_60s_rad": round(none, 8),
         "init": args.init.name if args.init else None,
         "epoch": best[1],
+        "constant_taken_out_rad": round(constant, 8),
         **{name: getattr(args, name) for name in SETTINGS},
         "torch": torch.__version__.split("+")[0],
         "date": datetime.date.today().isoformat(),
@@ -192,6 +198,21 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     for path in export(model, provenance, args.out, args.stem):
         print(path)
+
+
+@torch.no_grad()
+def take_out_constant(model: FoGNet, data: Windows) -> float:
+    """Takes the mean of what is not linear in the gyro's increments out of the correction, and returns it, rad a minute. The
+    bias was taken off before, by standstills of the drive itself: a constant that is left is one of the training drives."""
+    total = 0.0
+    for rows in data.full.split(256):
+        x, _ = data.take(rows)
+        layers = model.layers(x)
+        linear = layers["f3"] - model.fc3.bias
+        total += (layers["correction"] - model.correction_scale * model.fc4.weight[0, 1] * linear).sum().item()
+    mean = total / len(data.full)
+    model.fc4.bias -= mean / model.correction_scale
+    return mean
 
 
 @torch.no_grad()

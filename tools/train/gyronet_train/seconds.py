@@ -66,30 +66,6 @@ def kaist_files(folder: Path):
     return (imu, fog, encoder, pose), scale, digest
 
 
-def load_kaist(folder: Path) -> Seconds:
-    """Read a sequence in the KAIST Urban layout. Raises ValueError that names what is wrong."""
-    (imu, fog, encoder, pose), scale, digest = kaist_files(folder)
-    start = max(t[0, 0] for t in (imu, fog, encoder, pose))
-    count = int((min(t[-1, 0] for t in (imu, fog, encoder, pose)) - start) // 10**9)
-    edges = start + 10**9 * np.arange(count + 1)
-
-    def at_edges(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-        return np.interp((edges - start) / 1e9, (times - start) / 1e9, values)
-
-    force, gyro = imu[:, 11:14], imu[:, 8:11]
-    gyro = gyro - gyro[imu[:, 0] < start + STATIC_S * 1e9].mean(axis=0)
-    means = [second_means(imu[:, 0], column, edges) for column in (*force.T, *gyro.T)]
-    wheels = [np.diff(at_edges(encoder[:, 0], encoder[:, 1 + k] * scale[k])) for k in range(2)]
-    increments = np.diff(at_edges(fog[:, 0], np.cumsum(fog[:, 3])))
-    yaw = np.unwrap(np.arctan2(pose[:, 5].astype(float), pose[:, 1].astype(float)))
-    return Seconds(
-        name=folder.name,
-        sha256=digest.hexdigest(),
-        features=np.stack([*means, *wheels, increments], axis=1).astype(np.float64),
-        turn=np.diff(at_edges(pose[:, 0], yaw)),
-    )
-
-
 def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
     """Read a drive that `gyronet import kaist` or `nclt` wrote: the pieces of whole seconds between its gaps, on the grid
     of seconds from its first row. The rates for navigation of `gyronet replay --csv` stand in for the fibre-optic gyro

@@ -9,7 +9,7 @@ use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
 use gyronet::service::Request;
 use gyronet::service::event::EventKind;
-use gyronet::service::message::{Calibrate, FlashState, Origin, Refusal};
+use gyronet::service::message::{Calibrate, FlashState, Network, Origin, Refusal};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, FogPart, ImuPart, Mounting, StoreError};
@@ -50,7 +50,7 @@ fn configuration_is_kept_whole() {
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
     assert_eq!(ask(&mut board, &set(&with_fog)), refused(FieldError::PartNotInImage));
     let request = Request::SetConfiguration { version: 9, configuration: &wanted };
-    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 4 }));
+    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 5 }));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 
@@ -111,7 +111,7 @@ fn what_is_stored_is_read_without_a_controller() {
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
     assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { network: Network::GyroNet, length: 64 }), no_slot);
     assert_eq!(flash.borrow().operations(), before);
 }
 
@@ -124,7 +124,7 @@ fn nothing_is_stored_without_flash() {
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
     assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { network: Network::GyroNet, length: 64 }), no_slot);
     assert_eq!(ask(&mut board, &Request::WeightsVerify), no_slot);
     assert_eq!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(SlotError::NotBegun)));
 }
@@ -183,7 +183,7 @@ fn flash_is_written_at_standstill_alone() {
     assert!(storable(&mut board, 0..0, 0.0, Standstill::Unknown), "a bench without a sensor");
     board.observe(None, 701, (Status::Silent, Faults::NONE), Standstill::Moving);
     for request in [
-        Request::WeightsBegin { length: 64 },
+        Request::WeightsBegin { network: Network::GyroNet, length: 64 },
         Request::WeightsBlock { offset: 0, bytes: &[] },
         Request::WeightsActivate,
         Request::Calibrate(Calibrate::Store),

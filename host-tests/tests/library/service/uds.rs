@@ -133,7 +133,7 @@ fn what_is_wrong_with_a_request_has_the_standard_s_code() {
         (&[0x34, 0x10, 0x11, 0, 4], 0x31),
         (&[0x34, 0, 0x55, 0, 4], 0x31),
         (&[0x34, 0, 0x11, 0], 0x13),
-        (&[0x34, 0, 0x11, 1, 4], 0x31),
+        (&[0x34, 0, 0x11, 2, 4], 0x31),
         (&[0x36, 1, 0], 0x24),
         (&[0x37], 0x24),
     ] {
@@ -418,7 +418,7 @@ fn settings_are_read_and_written_one_by_one() {
     bench.expect(&[0x2E, 2, 0x04, 0, 0], &[0x7F, 0x2E, 0x13]);
     bench.expect(&[0x2E, 2, 0x01, 9], &[0x7F, 0x2E, 0x13]);
     bench.expect(&[0x2E, 2, 0x00, 0], &[0x7F, 0x2E, 0x31]);
-    bench.expect(&[0x2E, 2, 0x1D, 0], &[0x7F, 0x2E, 0x31]);
+    bench.expect(&[0x2E, 2, 0x1E, 0], &[0x7F, 0x2E, 0x31]);
     assert_eq!(start(&flash).configuration().mounting.yaw_deg, 90.0);
 }
 
@@ -430,7 +430,7 @@ fn every_setting_has_a_data_identifier() {
     bench.stand();
     let read = |name: &str| std::fs::read_to_string(workspace().join(name)).expect("it is there");
     let (description, table) = (read("tools/gyronet_uds.yaml"), read("tools/README.md"));
-    for id in 0x01..=0x1C {
+    for id in 0x01..=0x1D {
         let value = bench.ask(&[0x22, 2, id]).expect("a response");
         assert_eq!(value[..3], [0x62, 2, id]);
         bench.expect(&[&[0x2E, 2, id][..], &value[3..]].concat(), &[0x6E, 2, id]);

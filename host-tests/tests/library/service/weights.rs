@@ -1,16 +1,25 @@
 //! Weights are uploaded block by block, checked, and used after the next start.
 
 use super::{Board, ask, info, start};
-use gyronet::model::weights;
+use gyronet::fog::{FogNetUse, NotForThisGyro};
+use gyronet::model::fognet_blob::{BlobError, FOGNET};
+use gyronet::model::{FogBlob, weights};
 use gyronet::service::Request;
-use gyronet::service::message::Refusal;
-use gyronet::store::Slot;
+use gyronet::service::message::{Network, Refusal};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
+use gyronet::store::{Accepted, Configuration, FogLane, FogPart, Place, Slot};
 use gyronet_host_tests::flash::{Cut, F405};
-use gyronet_host_tests::stored::other_weights;
+use gyronet_host_tests::stored::{open, other_weights};
 use std::cell::RefCell;
 use std::rc::Rc;
+
+/// The request that begins the upload of a file.
+fn begin(file: &[u8]) -> Request<'static> {
+    let is_fognet = file[6..8] == FOGNET.to_le_bytes();
+    let network = if is_fognet { Network::FogNet } else { Network::GyroNet };
+    Request::WeightsBegin { network, length: file.len() as u32 }
+}
 
 #[test]
 fn weights_are_replaced() {
@@ -19,7 +28,7 @@ fn weights_are_replaced() {
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     for (round, slot) in [Slot::A, Slot::B, Slot::A].into_iter().enumerate() {
         let mut board = start(&flash);
-        assert_eq!(ask(&mut board, &Request::WeightsBegin { length: file.len() as u32 }), Ok(()));
+        assert_eq!(ask(&mut board, &begin(file)), Ok(()));
         for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
             let request = Request::WeightsBlock { offset, bytes: block };
             let written = offset + block.len() as u32;
@@ -37,21 +46,21 @@ fn weights_are_replaced() {
         }
         assert_eq!(board.uploaded(), None);
         assert_eq!(ask(&mut board, &Request::WeightsVerify), Ok(()));
-        assert_eq!(board.uploaded(), Some((slot, crc)));
+        assert_eq!(board.uploaded(), Some((Place::Slot(slot), crc)));
         assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
         let about = info(&mut start(&flash));
         assert_eq!((about.weights, about.weights_crc), (WeightSource::Slot(slot), Some(crc)), "{round}");
     }
     // A bad file is not accepted, and what ran before runs on.
     let mut board = start(&flash);
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 256 }), Ok(()));
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { network: Network::GyroNet, length: 256 }), Ok(()));
     assert_eq!(ask(&mut board, &Request::WeightsBlock { offset: 0, bytes: &[0x55; 256] }), Ok(()));
     assert!(matches!(ask(&mut board, &Request::WeightsVerify), Err(Refusal::Slot(_))));
     assert!(matches!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(_))));
     assert_eq!(info(&mut start(&flash)).weights, WeightSource::Slot(Slot::A));
     // Both slots damaged: the built-in weights, and both are named.
     for slot in [Slot::A, Slot::B] {
-        flash.borrow_mut().damage(layout::SLOTS.start as usize + slot.offset() as usize + 70_000, 0x10);
+        flash.borrow_mut().damage(slot.offset() as usize + 70_000, 0x10);
     }
     let mut board = start(&flash);
     let about = info(&mut board);
@@ -61,7 +70,7 @@ fn weights_are_replaced() {
 
 /// Uploads a file and has it checked.
 fn upload(board: &mut Board, file: &[u8]) {
-    assert_eq!(ask(board, &Request::WeightsBegin { length: file.len() as u32 }), Ok(()));
+    assert_eq!(ask(board, &begin(file)), Ok(()));
     for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
         assert_eq!(ask(board, &Request::WeightsBlock { offset, bytes: block }), Ok(()));
     }
@@ -93,4 +102,126 @@ fn a_power_cut_during_activation_leaves_the_old_or_the_new_weights() {
     };
     assert_eq!(changed_over, Ok(()));
     assert!(cuts > 3, "{cuts} operations to cut");
+}
+
+/// A configuration with FoGNet for the gyro with a number.
+fn with_fognet(fognet: FogNetUse, fog: FogPart, fog_serial: u32) -> Configuration {
+    let fog_lane = FogLane { fognet, ..FogLane::default() };
+    Configuration { fog_lane, fog: Some(fog), fog_serial, ..Configuration::DEFAULT }
+}
+
+/// FoGNet's weights after a start with a configuration.
+fn fognet(flash: &Rc<RefCell<F405>>, configuration: &Configuration) -> Option<Result<u32, SlotError>> {
+    open(flash).and_then(|mut store| store.set(configuration)).expect("it is stored");
+    info(&mut start(flash)).fognet
+}
+
+#[test]
+fn fognets_weights_run_on_the_gyro_that_they_were_trained_for() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let trained = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
+    let (crc, training) = (trained.crc, trained.training);
+    assert_eq!((training.serial, training.simulated), (1, true));
+    let own = with_fognet(FogNetUse::Simulated, FogPart::Dsp1760, 1);
+    assert_eq!(fognet(&flash, &own), Some(Err(SlotError::Empty)));
+    let mut board = start(&flash);
+    upload(&mut board, &weights::FOGNET.0);
+    assert_eq!(board.uploaded(), Some((Place::FogNet, crc)));
+    assert!(board.fognet_is_gone());
+    // It is there, but nobody has accepted it.
+    assert_eq!(fognet(&flash, &own), Some(Err(SlotError::NotAccepted(crc))));
+    let mut board = start(&flash);
+    upload(&mut board, &weights::FOGNET.0);
+    assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+    assert_eq!(fognet(&flash, &own), Some(Ok(crc)));
+    assert_eq!(info(&mut start(&flash)).weights, WeightSource::BuiltIn, "GyroNet's are not touched");
+    assert_eq!(fognet(&flash, &with_fognet(FogNetUse::Off, FogPart::Dsp1760, 1)), None);
+    for (other, why) in [
+        (
+            with_fognet(FogNetUse::Simulated, FogPart::Dsp1760, 0),
+            "trained for a simulated DSP-1760 number 1, the configuration has a DSP-1760 number 0",
+        ),
+        (
+            with_fognet(FogNetUse::Simulated, FogPart::Dsp1760, 2),
+            "trained for a simulated DSP-1760 number 1, the configuration has a DSP-1760 number 2",
+        ),
+        (
+            with_fognet(FogNetUse::Recorded, FogPart::Dsp1760, 1),
+            "trained on a simulated DSP-1760 number 1, which runs only where the configuration says Simulated",
+        ),
+    ] {
+        let refused = fognet(&flash, &other).expect("it is asked for").expect_err("for another gyro");
+        assert!(matches!(
+            refused,
+            SlotError::Gyro(NotForThisGyro::Other { .. } | NotForThisGyro::Simulated(_))
+        ));
+        assert_eq!(refused.to_string(), why);
+        assert!(start(&flash).stored_damaged(), "the status reports it");
+    }
+    flash.borrow_mut().damage(layout::FOGNET.start as usize + 300_000, 1);
+    let damaged = fognet(&flash, &own).expect("it is asked for");
+    assert!(matches!(damaged, Err(SlotError::Blob(BlobError::Crc { .. }))), "{damaged:?}");
+    // GyroNet's file in FoGNet's place is refused.
+    let file = &weights::GYRONET.0;
+    let mut board = start(&flash);
+    let length = file.len() as u32;
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { network: Network::FogNet, length }), Ok(()));
+    for (bytes, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
+        assert_eq!(ask(&mut board, &Request::WeightsBlock { offset, bytes }), Ok(()));
+    }
+    let refused = ask(&mut board, &Request::WeightsVerify);
+    assert!(
+        matches!(refused, Err(Refusal::Slot(SlotError::Blob(BlobError::Topology { .. })))),
+        "{refused:?}"
+    );
+}
+
+/// FoGNet's file has one place: a cut leaves the new file, or none that would run.
+#[test]
+fn a_power_cut_during_the_upload_of_fognet_leaves_none() {
+    let old = &weights::FOGNET.0;
+    let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
+    let mut new = old.to_vec();
+    let end = new.len() - 4;
+    // The network runs on other gains.
+    new[104] ^= 1;
+    let checksum = gyronet::model::blob::CRC.checksum(&new[..end]);
+    new[end..].copy_from_slice(&checksum.to_le_bytes());
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let own = with_fognet(FogNetUse::Simulated, FogPart::Dsp1760, 1);
+    let mut board = start(&flash);
+    upload(&mut board, old);
+    assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+    assert_eq!(fognet(&flash, &own), Some(Ok(crc(old))));
+    let before = flash.borrow().clone();
+    let replace = |flash: &Rc<RefCell<F405>>| {
+        let mut board = start(flash);
+        board.act(&begin(&new))?;
+        for (bytes, offset) in new.chunks(256).zip((0u32..).step_by(256)) {
+            board.act(&Request::WeightsBlock { offset, bytes })?;
+        }
+        board.act(&Request::WeightsVerify)?;
+        board.act(&Request::WeightsActivate)
+    };
+    let whole = Rc::new(RefCell::new(before.clone()));
+    assert_eq!(replace(&whole), Ok(()));
+    let operations = whole.borrow().operations() - before.operations();
+    // Five sectors, each erased when the file reaches it; the record at the end.
+    let sectors = [0, 1, 4_097, 20_482, 53_251, 86_020].map(|after| after..after + 3);
+    let last = operations - 8..operations;
+    for after in sectors.into_iter().chain([last]).flatten() {
+        let cut = Cut::ALL[after as usize % Cut::ALL.len()];
+        let flash = Rc::new(RefCell::new(before.clone()));
+        flash.borrow_mut().cut_after(after, cut);
+        assert!(replace(&flash).is_err(), "cut {cut:?} at operation {after} of {operations}");
+        assert!(flash.borrow_mut().restore());
+        let found = info(&mut start(&flash)).fognet.expect("it is asked for");
+        let untouched = after == 0 && found == Ok(crc(old));
+        assert!(untouched || found.is_err() || found == Ok(crc(&new)), "{cut:?} at {after}: {found:?}");
+        let accepted = open(&flash).and_then(|mut store| store.get::<Accepted>()).expect("records are whole");
+        assert!(accepted.is_some_and(|accepted| accepted.active.is_none()));
+        // The board takes the file again.
+        assert_eq!(replace(&flash), Ok(()));
+        assert_eq!(fognet(&flash, &own), Some(Ok(crc(&new))));
+    }
 }

@@ -1,35 +1,40 @@
-//! The upload of a weight file into the board's unused slot.
+//! The upload of a weight file.
 
 use super::requests::USE_DOWNLOAD;
 use super::{Device, DeviceError};
 use crate::client::bus::Bus;
-use gyronet::service::message::BLOCK;
-use gyronet::store::Slot;
+use gyronet::service::message::{BLOCK, Network};
+use gyronet::store::{Place, Slot};
 use gyronet::uds::Session;
 
 /// A file that the board has accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Uploaded {
-    /// The slot that holds it.
-    pub slot: Slot,
+    /// The place that holds it.
+    pub place: Place,
     /// The checksum that the board computed.
     pub crc: u32,
 }
 
-/// Downloads a file into the board, has the board check it, and has it used from the next start on. `progress` is called
+/// Downloads a file of a network into the board, has the board check it, and has it used from the next start on. `progress` is called
 /// with the bytes that are there.
 ///
 /// # Errors
-/// [`DeviceError`]; the weights in use have not been touched then.
+/// [`DeviceError`]; GyroNet's weights in use have not been touched then, FoGNet's may be gone.
 pub fn upload<B: Bus>(
     device: &mut Device<B>,
+    network: Network,
     file: &[u8],
     mut progress: impl FnMut(usize),
 ) -> Result<Uploaded, DeviceError> {
     let length = u32::try_from(file.len()).map_err(|_| DeviceError::TooLong)?;
     device.enter(Session::Programming)?;
-    // Four bytes of address, zero, and four of length.
-    device.ask(&[&[0x34, 0, 0x44, 0, 0, 0, 0][..], &length.to_be_bytes()].concat())?;
+    let address = match network {
+        Network::GyroNet => 0,
+        Network::FogNet => 1,
+    };
+    // Four bytes of address, and four of length.
+    device.ask(&[&[0x34, 0, 0x44, 0, 0, 0, address][..], &length.to_be_bytes()].concat())?;
     let mut number = 0u8;
     for (block, end) in file.chunks(BLOCK).zip((BLOCK..).step_by(BLOCK)) {
         number = number.wrapping_add(1);
@@ -37,9 +42,10 @@ pub fn upload<B: Bus>(
         progress(end.min(file.len()));
     }
     let response = device.ask(&[0x37])?;
-    let [slot, crc @ ..] = <[u8; 5]>::try_from(response).map_err(|_| DeviceError::Mismatch)?;
-    let slot = Slot::ALL.into_iter().find(|known| *known as u8 == slot).ok_or(DeviceError::Mismatch)?;
+    let [place, crc @ ..] = <[u8; 5]>::try_from(response).map_err(|_| DeviceError::Mismatch)?;
+    let places = [Place::Slot(Slot::A), Place::Slot(Slot::B), Place::FogNet];
+    let place = *places.get(usize::from(place)).ok_or(DeviceError::Mismatch)?;
     let trailer = device.trailer(USE_DOWNLOAD, file)?;
     device.ask(&[&[0x31, 1][..], &USE_DOWNLOAD.to_be_bytes(), &trailer].concat())?;
-    Ok(Uploaded { slot, crc: u32::from_be_bytes(crc) })
+    Ok(Uploaded { place, crc: u32::from_be_bytes(crc) })
 }

@@ -3,8 +3,9 @@
 
 use super::{QuantizeError, Report, fixed, header, provenance, rows, seal};
 use crate::network::checkpoint::{Checkpoint, FogNet};
+use crate::network::tensors::Tensors;
 use gyronet::model::fognet::GAIN_FRACTION_BITS;
-use gyronet::model::fognet_blob::{self, CORRECTION_SHIFT, FogBlob, INPUTS};
+use gyronet::model::fognet_blob::{self, CORRECTION_SHIFT, FogBlob, Gyro, INPUTS, Training};
 use gyronet::nn::{HIDDEN_MAX, dense::Dense};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 
@@ -42,6 +43,7 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     let f2 = (tensors.tensor("fc2.weight"), 0.0);
     rows::dense(&mut body, "FC2", f2, (of_f2 * f64::from(Angle::PER_RAD), CORRECTION_SHIFT))?;
 
+    let training = training(tensors)?;
     let provenance = provenance(tensors);
     let lengths = (fognet_blob::file_len(provenance.len()), provenance.len());
     let force = f64::from(SpecificForce::PER_METRE_PER_SEC2);
@@ -63,10 +65,28 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     let offset = Angle::from_rad(offset as f32)
         .map_err(|_| QuantizeError::Constant { what: "offset".to_owned(), value: offset })?;
     file.extend(offset.0.to_le_bytes());
+    let number = Gyro::ALL.iter().position(|gyro| *gyro == training.gyro).map_or(0, |place| place + 1);
+    file.extend((number as u16).to_le_bytes());
+    file.extend(u16::from(training.simulated).to_le_bytes());
+    file.extend(training.serial.to_le_bytes());
     file.extend(provenance);
     file.extend(body);
     let words = seal(&mut file);
     report.bytes = file.len();
     FogBlob::new_checked(bytemuck::cast_slice(&words))?;
     Ok((file, report))
+}
+
+/// Returns what the network was trained on, by the provenance.
+fn training(tensors: &Tensors) -> Result<Training, QuantizeError> {
+    #[derive(serde::Deserialize)]
+    struct Found {
+        gyro: String,
+        serial: u32,
+        simulated: bool,
+    }
+    let Found { gyro, serial, simulated } =
+        serde_json::from_str(&tensors.provenance).map_err(|_| QuantizeError::Gyro)?;
+    let gyro = Gyro::ALL.into_iter().find(|known| known.to_string() == gyro).ok_or(QuantizeError::Gyro)?;
+    Ok(Training { gyro, serial, simulated })
 }

@@ -169,14 +169,20 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
         .text(&[&"--validate"])
         .given(of(validate, None, &|member| csv(&member.name)));
     steps.push(gyronet.makes(networks.join("gyronet.safetensors")));
-    let simulated = split.members.iter().any(|member| member.simulated);
+    // The sequences of a data set have one gyro; of simulated ones a network is for the device that it was trained on.
+    let device = used(train).find_map(|member| member.device);
+    let part = match split.layout {
+        Layout::Kaist => "DSP-1760",
+        Layout::Nclt => "DSP-3000",
+    };
+    let serial = device.unwrap_or(0);
     let drive = |member: &super::split::Member| show(&drives.join(csv(&member.name)));
     let fognet = |name: &str, suffix: &str, options: &[&dyn ToString]| {
         Builder::new(step(name), Program::Python)
             .text(&[&"-m", &"gyronet_train.fognet", &"drives", &"--out", &show(&networks)])
             .text(&[&"--stem", &name, &"--epochs", &effort.fognet_epochs])
             .text(options)
-            .given(simulated.then(|| Argument::Always("--simulated".into())))
+            .given(device.is_some().then(|| Argument::Always("--simulated".into())))
             .text(&[&"--train"])
             .given(left(suffix, train, None, &drive))
             .text(&[&"--validate"])
@@ -194,7 +200,11 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
         let file = show(&networks.join(format!("{network}.blob")));
         Argument::If(step(&format!("{network}-weights")), vec![option.to_owned(), file])
     };
-    steps.extend([fognet("fognet", "", &[]), quantize("gyronet"), quantize("fognet")]);
+    steps.extend([
+        fognet("fognet", "", &[&"--gyro", &part, &"--serial", &serial]),
+        quantize("gyronet"),
+        quantize("fognet"),
+    ]);
 
     // The pseudo-FoG: a FoGNet on the rate that GyroNet makes of the inertial sensor.
     let rates = out.join("rates");
@@ -207,7 +217,7 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
             .needs(step(&member.name));
         steps.push(replay.makes(file));
     }
-    steps.push(fognet("pseudo_fog", RATES, &[&"--rates", &show(&rates)]));
+    steps.push(fognet("pseudo_fog", RATES, &[&"--gyro", &"pseudo-FoG", &"--rates", &show(&rates)]));
     steps.push(quantize("pseudo_fog"));
 
     let mut methods = Vec::new();

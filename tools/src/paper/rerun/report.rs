@@ -74,7 +74,7 @@ impl Report {
     /// None but the formatter's.
     pub fn markdown(&self, out: &Path) -> Result<String, fmt::Error> {
         let mut text = String::from("# The paper's tables, run again\n\n");
-        if self.sets.iter().any(|set| set.split.members.iter().any(|member| member.simulated)) {
+        if self.sets.iter().any(|set| set.split.members.iter().any(|member| member.device.is_some())) {
             writeln!(text, "**Some sequences are simulated: none of their figures is one of a road.**\n")?;
         }
         if self.effort != Effort::FULL {

@@ -4,7 +4,7 @@
 
 use crate::drive::error::{DataError, DataFault};
 use crate::paper::sequence;
-use crate::simulate::layout::{Layout, MARKER};
+use crate::simulate::layout::Layout;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -63,8 +63,8 @@ pub struct Member {
     pub folder: PathBuf,
     /// Its use.
     pub role: Role,
-    /// Says whether it is simulated.
-    pub simulated: bool,
+    /// The number of the simulated device; `None` for a recorded one.
+    pub device: Option<u64>,
 }
 
 /// Holds what was found of a data set.
@@ -137,8 +137,13 @@ impl Split {
                 let name = name(&folder);
                 match sequence::layout(&folder) {
                     Ok(found) if found == layout && members.len() == before => {
-                        let simulated = folder.join(MARKER).is_file();
-                        members.push(Member { name, folder, role: *role, simulated });
+                        match sequence::marker(&folder) {
+                            Ok(spec) => {
+                                let device = spec.map(|spec| spec.device);
+                                members.push(Member { name, folder, role: *role, device });
+                            }
+                            Err(error) => unused.push(error.to_string()),
+                        }
                     }
                     Ok(found) if found == layout => unused.push(format!("{name}: a second {expected}")),
                     Ok(found) => unused.push(format!("{name}: has the layout of {found:?}")),

@@ -23,6 +23,7 @@ use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
 use gyronet::fog::FogConfig;
 use gyronet::model::WindowNetwork;
 use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::fognet_blob::Training;
 use gyronet::model::seconds::Padding;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
@@ -66,29 +67,33 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl
     let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
     estimates.add(Method::FOG_EARTH, || fog.iter().map(|rate| rate - earth).collect());
     estimates.add(Method::FOG_DEFAULT, || {
-        let (sent, _) = fog_replay::run_default(sequence, fog_replay::default_config(sequence));
+        let (sent, _) = fog_replay::run_board(sequence, fog_replay::default_config(sequence), None);
         sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
     });
     estimates
 }
 
 impl Estimates {
-    /// Adds FoGNet, padded and not, where there is an inertial sensor; `tick` is called for each step of both.
-    pub fn add_fognet(
-        &mut self,
-        sequence: &Sequence,
-        network: &mut impl MinuteNetwork,
-        mut tick: impl FnMut(),
-    ) {
+    /// Adds the rates that the board sends with FoGNet, padded and not, where there is an inertial sensor. Where the
+    /// weights are for another gyro the board does not run them.
+    pub fn add_fognet(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, trained: Training) {
         if !sequence.has_gyro {
             return;
+        }
+        let fits = fog_replay::check_weights(sequence, trained);
+        if let Err(error) = fits {
+            let before = self.refused.take().map(|before| before + "; ").unwrap_or_default();
+            self.refused = Some(format!("{before}FoGNet's weights were not run: {error}"));
         }
         for (method, padding) in
             [(Method::FOGNET, FogConfig::DEFAULT.padding), (Method::FOGNET_NOPAD, Padding::None)]
         {
-            let config = FogConfig { padding, ..FogConfig::DEFAULT };
-            let (drive, run_time) = timed(|| fog_replay::run(sequence, network, config, &mut tick));
-            self.push(method, drive.turns[self.start..].to_vec(), run_time);
+            let config = FogConfig { padding, ..fog_replay::default_config(sequence) };
+            let network: Option<&mut dyn MinuteNetwork> = if fits.is_ok() { Some(network) } else { None };
+            self.add(method, || {
+                let (sent, _) = fog_replay::run_board(sequence, config, network);
+                sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
+            });
         }
     }
 

@@ -12,7 +12,9 @@ pub const BUNDLED: [&str; 2] = [
 ];
 
 /// The remarks on every table with FoGNet in it.
-const FOGNET: [&str; 2] = [
+const FOGNET: [&str; 3] = [
+    "FoGNet corrects what the Earth's rate and the bias leave, and runs on the gyro that its weights were trained for alone; \
+     elsewhere its row is the default's.",
     "Our FoGNet gives what the gyro has erred by, which is taken off; the paper's gives the prediction less the \
      measurement, which is added.",
     BUNDLED[1],
@@ -22,7 +24,9 @@ const FOGNET: [&str; 2] = [
 pub fn with_fognet(set: &[&SequenceErrors], notes: &[&str]) -> Vec<String> {
     let mut fitted: Vec<String> = set.iter().filter_map(|sequence| sequence.fitted.clone()).collect();
     fitted.dedup();
-    notes.iter().chain(&FOGNET).map(|note| (*note).to_owned()).chain(fitted).chain(left_out(set)).collect()
+    let refused = set.iter().filter_map(|s| Some(format!("{}: {}", s.name, s.refused.as_ref()?)));
+    let notes = notes.iter().chain(&FOGNET).map(|note| (*note).to_owned());
+    notes.chain(fitted).chain(refused).chain(left_out(set)).collect()
 }
 
 /// Makes the remarks on Table I.
@@ -47,7 +51,6 @@ pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
     if set.iter().any(|sequence| !sequence.methods.contains_key(Method::VENDOR.key)) {
         notes.push("VQF stands in for the vendor's filter, whose heading these data do not have.".into());
     }
-    notes.extend(set.iter().filter_map(|s| Some(format!("{}: {}", s.name, s.refused.as_ref()?))));
     notes.extend(with_fognet(set, &[]));
     notes
 }

@@ -36,13 +36,13 @@ const SLCAN: usize = 2;
 const GYRO: usize = 3;
 const SERVICE: usize = 6;
 
-/// Feeds the image, again where the host was so slow that the image found its sensor silent, which is another load;
+/// Feeds the image, whose flash `loaded` fills, again where the host was so slow that the image found its sensor silent, which is another load;
 /// returns the plugin's output.
-pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
-    let (mut silences, mut output) = attempt(image, plugin)?;
+pub fn run(image: &Path, plugin: &str, loaded: &[String]) -> Result<String, EmulatorError> {
+    let (mut silences, mut output) = attempt(image, plugin, loaded)?;
     for _ in 1..ATTEMPTS {
         if silences > 0 {
-            (silences, output) = attempt(image, plugin)?;
+            (silences, output) = attempt(image, plugin, loaded)?;
         }
     }
     Ok(output)
@@ -50,8 +50,10 @@ pub fn run(image: &Path, plugin: &str) -> Result<String, EmulatorError> {
 
 /// Sends everything, one sample after the other, and ends the emulator; returns how often the sensor was found silent,
 /// and the plugin's output.
-fn attempt(image: &Path, plugin: &str) -> Result<(u32, String), EmulatorError> {
-    let mut board = Board::boot(image, SERVICE, &["-icount", ICOUNT, "-plugin", plugin])?;
+fn attempt(image: &Path, plugin: &str, loaded: &[String]) -> Result<(u32, String), EmulatorError> {
+    let mut arguments = vec!["-icount", ICOUNT, "-plugin", plugin];
+    arguments.extend(loaded.iter().map(String::as_str));
+    let mut board = Board::boot(image, SERVICE, &arguments)?;
     // The end of a line, once the image listens.
     board.send(SERVICE, b"\r", TURN)?;
     let address = board.serve(SERVICE)?.to_string();

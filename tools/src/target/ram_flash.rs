@@ -1,22 +1,35 @@
-//! This module keeps a flash in RAM, fast enough for fuzzing. [`crate::flash`] checks the rules of the real one.
+//! This module keeps a flash in RAM, fast enough for fuzzing; it does not check the rules of the real one.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
-use gyronet::store::layout::SLOT_SIZE;
+use gyronet::store::layout::{FOGNET, SLOT_SIZE, SLOTS};
 
-/// Simulates a flash of two sectors.
-#[derive(Clone)]
+/// Simulates a flash; its smallest sectors are `SECTOR` bytes long.
+#[derive(Debug, Clone)]
 pub struct RamFlash<const SECTOR: usize> {
     words: Vec<u32>,
 }
 
 impl<const SECTOR: usize> RamFlash<SECTOR> {
-    /// Returns a flash that begins with these bytes and is erased behind them.
+    /// Returns an erased flash for weight files.
+    #[must_use]
+    pub fn for_weights() -> Self {
+        Self { words: vec![u32::MAX; SLOTS.end as usize / 4] }
+    }
+
+    /// Returns a flash of two sectors that begins with these bytes and is erased behind them.
+    #[must_use]
     pub fn new(content: &[u8]) -> Self {
         let mut flash = Self { words: vec![u32::MAX; 2 * SECTOR / 4] };
         let len = content.len().min(2 * SECTOR);
         flash.bytes_mut()[..len].copy_from_slice(&content[..len]);
         flash
+    }
+
+    /// Returns the content.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.words)
     }
 
     fn bytes_mut(&mut self) -> &mut [u8] {
@@ -42,7 +55,7 @@ impl<const SECTOR: usize> ReadNorFlash for RamFlash<SECTOR> {
     }
 
     fn capacity(&self) -> usize {
-        2 * SECTOR
+        4 * self.words.len()
     }
 }
 
@@ -70,9 +83,12 @@ impl<const SECTOR: usize> NorFlash for RamFlash<SECTOR> {
     }
 }
 
-impl MappedSlots for RamFlash<SLOT_SIZE> {
+impl<const SECTOR: usize> MappedSlots for RamFlash<SECTOR> {
     fn slots(&self) -> [&[u8]; 2] {
-        let (a, b) = bytemuck::cast_slice(&self.words).split_at(SLOT_SIZE);
-        [a, b]
+        self.bytes()[SLOTS.start as usize..SLOTS.end as usize].split_at(SLOT_SIZE).into()
+    }
+
+    fn fognet(&self) -> &[u8] {
+        &self.bytes()[FOGNET.start as usize..FOGNET.end as usize]
     }
 }

@@ -1,0 +1,122 @@
+//! A weight file is uploaded block by block to its place in the flash; whole sectors are erased as the file reaches them.
+
+use super::error::FlashFault;
+use super::layout::{FOGNET, SLOT_SIZE, sector};
+use super::slots::{Slot, SlotError, bytes, file};
+use crate::model::FogBlob;
+use core::ops::Range;
+use embedded_storage::nor_flash::{NorFlash, NorFlashError};
+use serde::{Deserialize, Serialize};
+
+/// Names a place for a weight file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Place {
+    /// A slot for GyroNet's.
+    Slot(Slot),
+    /// The place for FoGNet's.
+    FogNet,
+}
+
+impl Place {
+    /// Returns its offsets into the flash: whole sectors.
+    #[must_use]
+    pub const fn range(self) -> Range<u32> {
+        match self {
+            Self::Slot(slot) => slot.offset()..slot.offset() + SLOT_SIZE as u32,
+            Self::FogNet => FOGNET,
+        }
+    }
+}
+
+impl core::fmt::Display for Place {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Slot(slot) => write!(f, "slot {slot}"),
+            Self::FogNet => f.write_str("FoGNet's place"),
+        }
+    }
+}
+
+/// Tracks a file that is being uploaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Upload {
+    place: Place,
+    length: u32,
+    written: u32,
+}
+
+impl Upload {
+    /// Begins an upload and erases the first sector of its place; the others follow with the blocks that begin them. The
+    /// processor stands still meanwhile: one to two seconds on an F405 (its datasheet, 128 KiB sector). Offsets of `flash`
+    /// are those into the whole flash.
+    ///
+    /// # Errors
+    /// [`SlotError::Length`], [`SlotError::Flash`].
+    pub fn begin<F: NorFlash>(flash: &mut F, place: Place, length: u32) -> Result<Self, SlotError> {
+        if length as usize > place.range().len() || length == 0 || !length.is_multiple_of(4) {
+            return Err(SlotError::Length(length));
+        }
+        let upload = Self { place, length, written: 0 };
+        upload.erase_sector(flash)?;
+        Ok(upload)
+    }
+
+    /// Writes the next block, a whole number of words.
+    ///
+    /// # Errors
+    /// [`SlotError::Offset`] when it does not continue what is written, [`SlotError::Length`] when it is not a whole
+    /// number of words, goes beyond the announced end or over the end of a sector, [`SlotError::Flash`]; after a flash
+    /// error the upload must begin again.
+    pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
+        if offset != self.written {
+            return Err(SlotError::Offset { expected: self.written });
+        }
+        let len = bytes.len() as u32;
+        let at = self.place.range().start + self.written;
+        let crosses = (1..len).any(|further| sector(at + further).is_some());
+        if !len.is_multiple_of(4) || len > self.length - self.written || crosses {
+            return Err(SlotError::Length(len));
+        }
+        if self.written > 0 {
+            self.erase_sector(flash)?;
+        }
+        flash.write(at, bytes).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
+        self.written += len;
+        Ok(())
+    }
+
+    /// Erases the sector that begins where the next block goes, if one does.
+    fn erase_sector<F: NorFlash>(&self, flash: &mut F) -> Result<(), SlotError> {
+        let Some(sector) = sector(self.place.range().start + self.written) else { return Ok(()) };
+        flash
+            .erase(sector.start, sector.end)
+            .map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))
+    }
+
+    /// Checks the whole file where it lies and returns its checksum.
+    ///
+    /// # Errors
+    /// [`SlotError::Incomplete`], and the errors of [`file()`].
+    pub fn verify(&self, slots: [&[u8]; 2], fognet: &[u8]) -> Result<u32, SlotError> {
+        if self.written != self.length {
+            return Err(SlotError::Incomplete { written: self.written });
+        }
+        match self.place {
+            Place::Slot(slot) => file(slot.of(slots)).map(|blob| blob.crc),
+            Place::FogNet => Ok(FogBlob::new_checked(bytes(fognet)?)?.crc),
+        }
+    }
+
+    /// Returns the place.
+    #[must_use]
+    pub const fn place(&self) -> Place {
+        self.place
+    }
+
+    /// Returns the number of bytes written.
+    #[must_use]
+    pub const fn written(&self) -> u32 {
+        self.written
+    }
+}
