@@ -3,7 +3,7 @@
 
 use gyronet::odometry::Track;
 use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::require::skipped;
+use gyronet_host_tests::require::python;
 use gyronet_tools::evaluate::trajectory_error::Point;
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::paper::tables::estimates::Estimates;
@@ -142,12 +142,7 @@ fn ten_poses_a_second_are_enough() {
 #[test]
 fn evo_finds_the_same_error() {
     let test = "evo_finds_the_same_error";
-    let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    // evo brings 300 MB of packages with it, so no machine must have it.
-    let check = Command::new(&python).args(["-c", "import evo"]).output();
-    if !check.is_ok_and(|output| output.status.success()) {
-        return skipped(test, &format!("{python} has no evo"));
-    }
+    let Some(python) = python(test, &["evo"]) else { return };
     let scratch = Scratch::new("evo");
     let sequence = scratch.sequence(Layout::Kaist, "k");
     let mut track = Track { position: [0.0; 2], yaw: sequence.steps[0].yaw };
