@@ -163,16 +163,13 @@ mod tests {
 
     #[test]
     fn keys_are_written_once_and_read_again() {
-        let folder = std::env::temp_dir().join(format!("gyronet-keys-{}", std::process::id()));
-        fs::create_dir_all(&folder).expect("there is room");
+        let folder = tempfile::tempdir().expect("there is room");
+        let name = folder.path().join("fleet");
         let key = PrivateKey::generate().expect("random numbers");
-        let [private, public] = key.write(&folder.join("fleet")).expect("it is new");
+        let [private, public] = key.write(&name).expect("it is new");
         assert_eq!(PrivateKey::read(&private).expect("as written").public(), key.public());
         assert_eq!(read_public(&public).expect("as written"), key.public());
-        assert!(
-            matches!(key.write(&folder.join("fleet")), Err(KeyError::File { .. })),
-            "none is overwritten"
-        );
+        assert!(matches!(key.write(&name), Err(KeyError::File { .. })), "none is overwritten");
         assert!(matches!(PrivateKey::read(&public), Err(KeyError::Content { .. })));
         #[cfg(unix)]
         {
@@ -180,7 +177,6 @@ mod tests {
             let mode = fs::metadata(&private).expect("it is there").permissions().mode();
             assert_eq!(mode & 0o777, 0o600);
         }
-        fs::remove_dir_all(&folder).expect("it is ours");
         assert_ne!(PrivateKey::generate().expect("random numbers").public(), key.public());
     }
 }

@@ -151,9 +151,8 @@ fn bash_completes() {
 
 #[test]
 fn tables_fit_to_training_sequences_and_take_other_methods() {
-    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("tables");
-    let _ = std::fs::remove_dir_all(&folder);
-    let [sequence, methods] = ["one", "methods"].map(|name| folder.join(name).display().to_string());
+    let folder = tempfile::tempdir().unwrap();
+    let [sequence, methods] = ["one", "methods"].map(|name| folder.path().join(name).display().to_string());
     std::fs::create_dir_all(&methods).unwrap();
     let made = gyronet(&["simulate", "--layout", "kaist", "--minutes", "1", "--out", &sequence]);
     assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
@@ -167,5 +166,4 @@ fn tables_fit_to_training_sequences_and_take_other_methods() {
     let twice = gyronet(&["tables", &sequence, "--method", &mine, "--method", &mine]);
     assert_eq!(twice.status.code(), Some(1));
     assert!(text(&twice.stderr).contains("given twice"), "{}", text(&twice.stderr));
-    std::fs::remove_dir_all(&folder).unwrap();
 }

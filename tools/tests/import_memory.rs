@@ -3,7 +3,6 @@
 
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};
-use std::path::Path;
 use std::process::Command;
 
 /// Address space that the command gets, KiB: its own code and stacks, and some MiB.
@@ -13,10 +12,9 @@ const ROWS: u32 = 720_000;
 
 #[test]
 fn a_log_larger_than_the_memory_is_imported() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("import_memory");
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    let log = folder.join("log.csv");
+    // 100 MB, so not in memory.
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let log = folder.path().join("log.csv");
     let mut file = BufWriter::new(std::fs::File::create(&log).unwrap());
     writeln!(file, "zeit;acc_x;acc_y;acc_z;gyr_x;gyr_y;gyr_z;wheel2_rate").unwrap();
     let mut line = String::new();
@@ -31,9 +29,10 @@ fn a_log_larger_than_the_memory_is_imported() {
         file.write_all(line.as_bytes()).unwrap();
     }
     file.into_inner().unwrap();
-    std::fs::write(folder.join("log.toml"), "[columns]\nt_s = { name = 'zeit', unit = 'ms' }\n").unwrap();
+    std::fs::write(folder.path().join("log.toml"), "[columns]\nt_s = { name = 'zeit', unit = 'ms' }\n")
+        .unwrap();
 
-    let out = folder.join("drive.csv");
+    let out = folder.path().join("drive.csv");
     let output = Command::new("sh")
         .args([
             "-c",
@@ -52,5 +51,4 @@ fn a_log_larger_than_the_memory_is_imported() {
     assert!(said.starts_with(&format!("7199.99 s, {ROWS} rows, 0 records dropped")), "{said}");
     assert!(!said.contains("refuse"), "{said}");
     assert!(std::fs::metadata(&out).unwrap().len() > u64::from(KIB) * 512);
-    std::fs::remove_dir_all(&folder).unwrap();
 }

@@ -223,12 +223,11 @@ mod tests {
 
     #[test]
     fn a_constant_bias_comes_off_every_corrected_step() {
-        let folder = std::env::temp_dir().join(format!("gyronet-fog-drive-{}", std::process::id()));
+        let folder = tempfile::tempdir().unwrap();
         let spec =
             Spec { layout: Layout::Kaist, name: String::from("short"), seconds: 40, device: 1, run: 1 };
-        layout::write(&spec, &folder, || {}).unwrap();
-        let sequence = Sequence::read(&folder, |_| {}).unwrap();
-        std::fs::remove_dir_all(&folder).unwrap();
+        layout::write(&spec, folder.path(), || {}).unwrap();
+        let sequence = Sequence::read(folder.path(), |_| {}).unwrap();
         let fog = run(&sequence, &mut Bias, FogConfig::DEFAULT, || {});
         assert_eq!((fog.windows, fog.broken), (39, 0));
         let raw: f64 = sequence.steps.iter().map(|step| step.fog).sum();

@@ -9,33 +9,16 @@ use crate::simulate::layout::{self, Layout, Spec};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use tempfile::{TempDir, tempdir};
 
-/// A folder that is removed with it.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("gyronet-rerun-{name}-{}", std::process::id()));
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).unwrap();
-        Self(folder)
+/// Makes folders that look like sequences of KAIST Urban.
+fn tree(folder: &TempDir, names: &[&str]) -> PathBuf {
+    let root = folder.path().join("kaist");
+    for name in names {
+        fs::create_dir_all(root.join(name).join("sensor_data")).unwrap();
+        fs::write(root.join(name).join("global_pose.csv"), "1").unwrap();
     }
-
-    /// Makes folders that look like sequences of KAIST Urban.
-    fn tree(&self, names: &[&str]) -> PathBuf {
-        let root = self.0.join("kaist");
-        for name in names {
-            fs::create_dir_all(root.join(name).join("sensor_data")).unwrap();
-            fs::write(root.join(name).join("global_pose.csv"), "1").unwrap();
-        }
-        root
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
+    root
 }
 
 /// Makes the output of each step, but for those that are to fail, and remembers their commands.
@@ -84,8 +67,9 @@ const NAMES: [&str; 4] = ["urban06", "urban07-city", "urban14", "urban18"];
 
 #[test]
 fn sequences_are_split_as_in_the_paper_and_missing_ones_named() {
-    let scratch = Scratch::new("split");
-    let root = scratch.tree(&["urban06", "urban06-again", "urban13", "urban17", "urban28-pankyo", "urban38"]);
+    let scratch = tempdir().unwrap();
+    let root =
+        tree(&scratch, &["urban06", "urban06-again", "urban13", "urban17", "urban28-pankyo", "urban38"]);
     fs::create_dir_all(root.join("urban20")).unwrap();
     let split = Split::find(Layout::Kaist, &root).unwrap();
     let members: Vec<_> = split.members.iter().map(|member| (member.name.as_str(), member.role)).collect();
@@ -107,22 +91,22 @@ fn sequences_are_split_as_in_the_paper_and_missing_ones_named() {
 
 #[test]
 fn dates_of_nclt_are_split_as_in_the_paper() {
-    let scratch = Scratch::new("nclt");
+    let scratch = tempdir().unwrap();
     for date in ["2012-01-08", "2012-08-20", "2013-04-05"] {
-        fs::create_dir_all(scratch.0.join(date)).unwrap();
-        fs::write(scratch.0.join(date).join("kvh.csv"), "").unwrap();
+        fs::create_dir_all(scratch.path().join(date)).unwrap();
+        fs::write(scratch.path().join(date).join("kvh.csv"), "").unwrap();
     }
-    let split = Split::find(Layout::Nclt, &scratch.0).unwrap();
+    let split = Split::find(Layout::Nclt, scratch.path()).unwrap();
     let roles: Vec<_> = split.members.iter().map(|member| member.role).collect();
     assert_eq!((roles, split.missing.len()), (vec![Role::Train, Role::Validate, Role::Test], 24));
-    let steps = plan(&split, Effort::FULL, &scratch.0, |_| Vec::new());
+    let steps = plan(&split, Effort::FULL, scratch.path(), |_| Vec::new());
     assert!(steps.iter().all(|step| !step.name.contains("lwoi") && !step.name.contains("rinsw")));
 }
 
 #[test]
 fn a_tree_without_a_validation_sequence_is_refused_with_their_names() {
-    let scratch = Scratch::new("none");
-    let error = Split::find(Layout::Kaist, &scratch.tree(&["urban06", "urban18"])).unwrap_err().to_string();
+    let scratch = tempdir().unwrap();
+    let error = Split::find(Layout::Kaist, &tree(&scratch, &["urban06", "urban18"])).unwrap_err().to_string();
     assert!(
         error.ends_with("no sequence to validate with, of urban14, urban15, urban16, urban17"),
         "{error}"
@@ -133,8 +117,8 @@ fn a_tree_without_a_validation_sequence_is_refused_with_their_names() {
 
 #[test]
 fn a_second_run_repeats_what_has_changed_and_nothing_else() {
-    let scratch = Scratch::new("resume");
-    let (root, out) = (scratch.tree(&NAMES), scratch.0.join("out"));
+    let scratch = tempdir().unwrap();
+    let (root, out) = (tree(&scratch, &NAMES), scratch.path().join("out"));
     let split = Split::find(Layout::Kaist, &root).unwrap();
     let steps = plan(&split, Effort::FULL, &out, sequence::files);
     let (first, ran) = go(&steps, &out, "");
@@ -167,8 +151,8 @@ fn a_second_run_repeats_what_has_changed_and_nothing_else() {
 
 #[test]
 fn a_step_that_fails_is_named_and_tried_again_and_the_tables_go_on_without_it() {
-    let scratch = Scratch::new("fail");
-    let (root, out) = (scratch.tree(&NAMES), scratch.0.join("out"));
+    let scratch = tempdir().unwrap();
+    let (root, out) = (tree(&scratch, &NAMES), scratch.path().join("out"));
     let split = Split::find(Layout::Kaist, &root).unwrap();
     let steps = plan(&split, Effort::FULL, &out, sequence::files);
     let (outcomes, ran) = go(&steps, &out, "kaist-fognet.log");
@@ -195,8 +179,8 @@ fn a_step_that_fails_is_named_and_tried_again_and_the_tables_go_on_without_it() 
 
 #[test]
 fn an_unreadable_sequence_is_trained_on_by_nobody() {
-    let scratch = Scratch::new("unreadable");
-    let (root, out) = (scratch.tree(&NAMES), scratch.0.join("out"));
+    let scratch = tempdir().unwrap();
+    let (root, out) = (tree(&scratch, &NAMES), scratch.path().join("out"));
     let split = Split::find(Layout::Kaist, &root).unwrap();
     let steps = plan(&split, Effort::FULL, &out, sequence::files);
     let (outcomes, ran) = go(&steps, &out, "kaist-urban07-city.log");
@@ -208,8 +192,8 @@ fn an_unreadable_sequence_is_trained_on_by_nobody() {
 
 #[test]
 fn a_training_drive_has_no_step_in_a_gap_and_no_start_on_the_move() {
-    let scratch = Scratch::new("gaps");
-    let folder = scratch.0.join("urban06");
+    let scratch = tempdir().unwrap();
+    let folder = scratch.path().join("urban06");
     let spec = Spec { layout: Layout::Kaist, name: "urban06".into(), seconds: 60, device: 1, run: 1 };
     layout::write(&spec, &folder, || {}).unwrap();
     let steps = Sequence::read(&folder, |_| {}).unwrap().steps.len();

@@ -1,39 +1,32 @@
 use super::*;
 use crate::simulate::layout;
-use std::path::PathBuf;
+use tempfile::{TempDir, tempdir};
 
-/// Holds a sequence in a folder of its own, which is removed with it.
-struct Scratch(PathBuf);
+/// Holds a sequence in a folder of its own.
+struct Scratch(TempDir);
 
 impl Scratch {
     fn new(name: &str, layout: Layout, seconds: u32) -> Self {
-        let folder = std::env::temp_dir().join(format!("gyronet-sequence-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&folder);
+        let folder = tempdir().unwrap();
         let spec = Spec { layout, name: name.into(), seconds, device: 1, run: 5 };
-        layout::write(&spec, &folder, || {}).unwrap();
+        layout::write(&spec, folder.path(), || {}).unwrap();
         Self(folder)
     }
 
     /// Changes the lines of a file.
     fn edit(&self, file: &str, change: impl FnOnce(&mut Vec<String>)) {
-        let path = self.0.join(file);
+        let path = self.0.path().join(file);
         let mut lines: Vec<String> = fs::read_to_string(&path).unwrap().lines().map(Into::into).collect();
         change(&mut lines);
         fs::write(path, lines.join("\n") + "\n").unwrap();
     }
 
     fn read(&self) -> Result<Sequence, DataError> {
-        Sequence::read(&self.0, |_| {})
+        Sequence::read(self.0.path(), |_| {})
     }
 
     fn error(&self) -> String {
         self.read().unwrap_err().to_string()
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
     }
 }
 
@@ -58,7 +51,7 @@ fn kaist_is_read_whole() {
     assert_eq!(sequence.simulated.as_ref().map(|spec| spec.run), Some(5));
     assert!(!sequence.has_vendor, "the heading of a simulation is no vendor's");
     // The gyro's turn is the sum of its file.
-    let text = fs::read_to_string(scratch.0.join(FOG)).unwrap();
+    let text = fs::read_to_string(scratch.0.path().join(FOG)).unwrap();
     let all: f64 = text.lines().map(|l| l.rsplit(',').next().unwrap().parse::<f64>().unwrap()).sum();
     let steps: f64 = sequence.steps.iter().map(|step| step.fog).sum();
     assert!((all - steps).abs() < 2e-4, "but for both ends: {all} {steps}");
@@ -123,7 +116,7 @@ fn a_missing_file_is_named() {
         (Layout::Nclt, "groundtruth_missing.csv"),
     ] {
         let scratch = Scratch::new("missing", layout, 10);
-        fs::remove_file(scratch.0.join(file)).unwrap();
+        fs::remove_file(scratch.0.path().join(file)).unwrap();
         let (error, name) = (scratch.error(), file.split(['_', '.']).next().unwrap());
         assert!(error.contains(name) && error.ends_with(": missing"), "{error}");
     }
@@ -147,7 +140,7 @@ fn the_early_sequences_have_no_gyro() {
             *line = line.split(',').take(8).collect::<Vec<_>>().join(",");
         }
     });
-    fs::remove_file(scratch.0.join(MARKER)).unwrap();
+    fs::remove_file(scratch.0.path().join(MARKER)).unwrap();
     let sequence = scratch.read().unwrap();
     assert!(!sequence.has_gyro && sequence.has_vendor && sequence.simulated.is_none());
     let error = sequence.recording().unwrap_err().to_string();
@@ -205,7 +198,7 @@ fn a_value_beyond_sense_is_an_error_and_no_nan() {
 #[test]
 fn an_empty_file_is_an_error() {
     let scratch = Scratch::new("empty", Layout::Kaist, 10);
-    fs::write(scratch.0.join(ENCODER), "").unwrap();
+    fs::write(scratch.0.path().join(ENCODER), "").unwrap();
     assert!(scratch.error().ends_with("encoder.csv: holds no samples"));
     let scratch = Scratch::new("short", Layout::Kaist, 10);
     scratch.edit(ENCODER, |lines| lines.truncate(200));
@@ -278,10 +271,10 @@ fn a_silent_sensor_is_marked() {
 
 #[test]
 fn neither_data_set() {
-    let folder = std::env::temp_dir();
-    let path = folder.join(format!("gyronet-nothing-{}", std::process::id()));
-    fs::create_dir_all(&path).unwrap();
-    assert!(matches!(Sequence::read(&path, |_| {}), Err(DataError { fault: DataFault::UnknownLayout, .. })));
-    assert!(matches!(find(&path), Err(DataError { fault: DataFault::UnknownLayout, .. })));
-    fs::remove_dir(path).unwrap();
+    let empty = tempdir().unwrap();
+    assert!(matches!(
+        Sequence::read(empty.path(), |_| {}),
+        Err(DataError { fault: DataFault::UnknownLayout, .. })
+    ));
+    assert!(matches!(find(empty.path()), Err(DataError { fault: DataFault::UnknownLayout, .. })));
 }

@@ -25,12 +25,10 @@ impl WindowNetwork for Nothing {
 
 /// Returns a sequence that is simulated and read back.
 fn sequence(name: &str, layout: Layout, seconds: u32) -> Sequence {
-    let folder = std::env::temp_dir().join(format!("gyronet-tables-{}-{name}", std::process::id()));
+    let folder = tempfile::tempdir().unwrap();
     let spec = Spec { layout, name: name.into(), seconds, device: 1, run: 3 };
-    layout::write(&spec, &folder, || {}).unwrap();
-    let sequence = Sequence::read(&folder, |_| {}).unwrap();
-    std::fs::remove_dir_all(folder).unwrap();
-    sequence
+    layout::write(&spec, folder.path(), || {}).unwrap();
+    Sequence::read(folder.path(), |_| {}).unwrap()
 }
 
 /// Returns a sequence that dead reckoning of the truth reproduces.

@@ -1,12 +1,6 @@
 use super::*;
 use std::fs;
-use std::path::PathBuf;
-
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("gyronet-layout-{}-{name}", std::process::id()));
-    let _ = fs::remove_dir_all(&folder);
-    folder
-}
+use tempfile::tempdir;
 
 fn spec(layout: Layout, seconds: u32) -> Spec {
     Spec { layout, name: "one".into(), seconds, device: 1, run: 7 }
@@ -24,9 +18,9 @@ fn rows(path: &Path) -> Vec<(i64, Vec<f64>)> {
 
 #[test]
 fn kaist_has_its_columns_and_rates() {
-    let folder = folder("kaist");
+    let folder = tempdir().unwrap();
     let mut ticks = 0;
-    write(&spec(Layout::Kaist, 120), &folder, || ticks += 1).unwrap();
+    write(&spec(Layout::Kaist, 120), folder.path(), || ticks += 1).unwrap();
     assert_eq!(ticks, 12_000);
     for (file, count, columns) in [
         ("sensor_data/xsens_imu.csv", 12_000, 16),
@@ -34,30 +28,29 @@ fn kaist_has_its_columns_and_rates() {
         ("sensor_data/encoder.csv", 12_000, 2),
         ("global_pose.csv", 12_000, 12),
     ] {
-        let rows = rows(&folder.join(file));
+        let rows = rows(&folder.path().join(file));
         assert_eq!(rows.len(), count, "{file}");
         assert!(rows.iter().all(|(_, fields)| fields.len() == columns), "{file}");
         assert!(rows.windows(2).all(|pair| pair[0].0 < pair[1].0), "{file}: time rises");
         assert!(rows[0].0 > 1_500_000_000_000_000_000, "{file}: nanoseconds");
     }
-    let parameters = fs::read_to_string(folder.join("calibration/EncoderParameter.txt")).unwrap();
+    let parameters = fs::read_to_string(folder.path().join("calibration/EncoderParameter.txt")).unwrap();
     assert_eq!(
         parameters,
         "Encoder calibrated parameter\nEncoder resolution: 4096\n\
          Encoder left wheel diameter: 0.623022\nEncoder right wheel diameter: 0.622356\n\
          Encoder wheel base: 1.5285\n"
     );
-    fs::remove_dir_all(folder).unwrap();
 }
 
 /// The sum of the increments is the turn of the pose, except for the Earth's rate and the gyro's errors, and the counts
 /// give its way.
 #[test]
 fn kaist_sensors_agree_with_the_pose() {
-    let folder = folder("agree");
-    write(&spec(Layout::Kaist, 600), &folder, || {}).unwrap();
-    let fog: f64 = rows(&folder.join("sensor_data/fog.csv")).iter().map(|row| row.1[2]).sum();
-    let poses = rows(&folder.join("global_pose.csv"));
+    let folder = tempdir().unwrap();
+    write(&spec(Layout::Kaist, 600), folder.path(), || {}).unwrap();
+    let fog: f64 = rows(&folder.path().join("sensor_data/fog.csv")).iter().map(|row| row.1[2]).sum();
+    let poses = rows(&folder.path().join("global_pose.csv"));
     let mut yaw = 0.0;
     let mut metres = 0.0;
     for pair in poses.windows(2) {
@@ -69,26 +62,25 @@ fn kaist_sensors_agree_with_the_pose() {
     }
     let earth = 600.0 * 7.292_115e-5 * libm::sin(36.37f64.to_radians());
     assert!((fog - yaw - earth).abs() < 0.02, "{fog} {yaw} {earth}");
-    let counts = rows(&folder.join("sensor_data/encoder.csv"));
+    let counts = rows(&folder.path().join("sensor_data/encoder.csv"));
     let last = &counts[counts.len() - 1].1;
     let wheels = (last[0] * 0.623_022 + last[1] * 0.622_356) / 2.0 / 4096.0 * std::f64::consts::PI;
     assert!(metres > 1_500.0, "{metres}");
     assert!((wheels / metres - 1.0).abs() < 0.005, "{wheels} {metres}");
-    fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
 fn nclt_points_down_and_jitters() {
-    let folder = folder("nclt");
-    write(&spec(Layout::Nclt, 300), &folder, || {}).unwrap();
-    let imu = rows(&folder.join("ms25.csv"));
+    let folder = tempdir().unwrap();
+    write(&spec(Layout::Nclt, 300), folder.path(), || {}).unwrap();
+    let imu = rows(&folder.path().join("ms25.csv"));
     let hz = (imu.len() - 1) as f64 / ((imu[imu.len() - 1].0 - imu[0].0) as f64 * 1e-6);
     assert!((hz - 47.1).abs() < 0.1, "{hz}");
     assert!(imu.iter().all(|(_, fields)| fields.len() == 9));
     let down = imu.iter().map(|row| row.1[5]).sum::<f64>() / imu.len() as f64;
     assert!((down + 9.8).abs() < 0.1, "specific force points up: {down}");
-    let poses = rows(&folder.join("groundtruth_one.csv"));
-    let headings = rows(&folder.join("kvh.csv"));
+    let poses = rows(&folder.path().join("groundtruth_one.csv"));
+    let headings = rows(&folder.path().join("kvh.csv"));
     let change = |rows: &[(i64, Vec<f64>)], column: usize| {
         let step = |pair: &[(i64, Vec<f64>)]| {
             let step = pair[1].1[column] - pair[0].1[column];
@@ -99,11 +91,10 @@ fn nclt_points_down_and_jitters() {
     let (gyro, truth) = (change(&headings, 0), change(&poses, 5));
     assert!((gyro - truth).abs() < 0.05, "both clockwise: {gyro} {truth}");
     assert!(headings.iter().all(|row| (0.0..std::f64::consts::TAU + 1e-9).contains(&row.1[0])));
-    let wheels = rows(&folder.join("wheels.csv"));
+    let wheels = rows(&folder.path().join("wheels.csv"));
     let gaps: Vec<i64> = wheels.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     assert!(gaps.iter().all(|gap| *gap > 0));
     assert!(gaps.iter().max().unwrap() > &50_000, "blocked now and then");
-    fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
