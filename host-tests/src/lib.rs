@@ -4,7 +4,6 @@
 pub mod board;
 pub mod browser;
 pub mod connected;
-pub mod dead_reckoning;
 pub mod entrance;
 pub mod flash;
 pub mod golden;
@@ -17,6 +16,7 @@ pub mod qemu;
 pub mod recordings;
 pub mod replay;
 pub mod require;
+pub mod sequence;
 pub mod stored;
 pub mod stream;
 pub mod synthetic;

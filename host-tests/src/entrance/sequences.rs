@@ -3,8 +3,9 @@
 use super::Seed;
 use gyronet_tools::paper::sequence::{Sequence, write_csv};
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
-use std::{env, fs, io, process, thread};
+use std::path::Path;
+use std::{fs, io};
+use tempfile::{TempDir, tempdir};
 
 const KAIST: [&str; 5] = [
     "sensor_data/xsens_imu.csv",
@@ -17,35 +18,27 @@ const NCLT: [&str; 4] = ["ms25.csv", "kvh.csv", "wheels.csv", "groundtruth_2012-
 
 /// Holds a folder for each thread; only changed files are written again.
 struct Folder {
-    path: PathBuf,
+    root: TempDir,
     files: Vec<Vec<u8>>,
 }
 
 impl Folder {
     fn new(name: &str, files: usize) -> Self {
-        let thread = format!("{:?}", thread::current().id()).replace(['(', ')'], "-");
-        let path = env::temp_dir().join(format!("gyronet-entrance-{}-{thread}{name}", process::id()));
+        let root = tempdir().expect("a folder of our own");
         for sub in ["sensor_data", "calibration"].iter().take(if name == "kaist" { 2 } else { 0 }) {
-            fs::create_dir_all(path.join(sub)).expect("a folder of our own");
+            fs::create_dir_all(root.path().join(sub)).expect("a folder of our own");
         }
-        fs::create_dir_all(&path).expect("a folder of our own");
-        Self { path, files: vec![vec![0]; files] }
+        Self { root, files: vec![vec![0]; files] }
     }
 
     fn write(&mut self, names: &[&str], content: &[&[u8]]) -> io::Result<()> {
         for ((name, content), written) in names.iter().zip(content).zip(&mut self.files) {
             if written != content {
-                fs::write(self.path.join(name), content)?;
+                fs::write(self.root.path().join(name), content)?;
                 *written = content.to_vec();
             }
         }
         Ok(())
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.path);
     }
 }
 
@@ -65,7 +58,7 @@ pub fn folder(data: &[u8]) {
     FOLDERS.with_borrow_mut(|folders| {
         let folder = &mut folders[layout];
         folder.write(names, &content).expect("a folder of our own");
-        check(&folder.path);
+        check(folder.root.path());
     });
 }
 

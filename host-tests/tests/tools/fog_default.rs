@@ -1,13 +1,11 @@
 //! The default lane of a fibre-optic gyro on simulated sequences that stop now and then, each of a device of its own:
 //! what standstills add to the Earth's rate, and whether the expected errors are as large as the true ones.
 
-use gyronet_host_tests::dead_reckoning::error;
+use gyronet_host_tests::sequence::{path_error, simulate};
 use gyronet_tools::paper::fog_replay::{default_config, run_board};
-use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::simulate::fog::{self, Fog};
-use gyronet_tools::simulate::layout::{self, Layout, Set, Spec};
+use gyronet_tools::simulate::layout::{Layout, Set, Spec};
 use gyronet_tools::simulate::world::EARTH_RATE;
-use std::path::Path;
 
 /// Devices of each part. One device says little: its scale, 200 ppm, makes as much of a drive's net turn as its bias.
 const DEVICES: u64 = 16;
@@ -58,15 +56,16 @@ impl Errors {
     }
 
     fn add(&mut self, spec: &Spec) {
-        let sequence = sequence(spec);
+        let sequence = simulate(spec);
         let (sent, _) = run_board(&sequence, default_config(&sequence), None);
         let quiet = fog::Config { angle_walk: 0.0, ..spec.layout.vehicle().fog };
         let [.., bias] = Fog::of_device(&quiet, spec.device, spec.run).increment([0.0; 3], 1.0);
         let earth = EARTH_RATE * sequence.latitude_deg().to_radians().sin();
-        let less = |rate: f64| error(&sequence, sequence.steps.iter().map(|step| step.fog - 0.01 * rate));
+        let less =
+            |rate: f64| path_error(&sequence, sequence.steps.iter().map(|step| step.fog - 0.01 * rate));
         self.by_earth += less(earth);
         self.by_truth += less(earth + bias);
-        self.by_default += error(&sequence, sent.iter().map(|sent| 0.01 * sent.rate.rad_per_sec()));
+        self.by_default += path_error(&sequence, sent.iter().map(|sent| 0.01 * sent.rate.rad_per_sec()));
         // The last steps are not over when the sequence ends.
         let reading = sent[sent.len() - 10].correction.rad_per_sec() - earth;
         self.off += ((reading - bias) * DEG_PER_HOUR).powi(2);
@@ -81,15 +80,6 @@ impl Errors {
             self.seconds += 1;
         }
     }
-}
-
-fn sequence(spec: &Spec) -> Sequence {
-    let name = format!("fog_default_{:?}_{}", spec.layout, spec.name);
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    layout::write(spec, &folder, || {}).expect("there is room");
-    let sequence = Sequence::read(&folder, |_| {}).expect("it has just been written");
-    std::fs::remove_dir_all(&folder).expect("it is ours");
-    sequence
 }
 
 /// The bias walks by 0.03 deg/h on the way, five minutes of standing show 0.04, and the street's tilt adds to it.

@@ -5,10 +5,10 @@ use gyronet::estimate::YawEstimate;
 use gyronet::fog::NotForThisGyro;
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::{FogBlob, FogNet, weights};
+use gyronet_host_tests::sequence::simulate;
 use gyronet_tools::paper::fog_replay::{check_weights, default_config, run_board};
 use gyronet_tools::paper::sequence::Sequence;
-use gyronet_tools::simulate::layout::{self, Layout, Spec};
-use std::path::Path;
+use gyronet_tools::simulate::layout::{Layout, Spec};
 
 const SECONDS: u32 = 10 * 60;
 /// Runs of the gyro that FoGNet was trained for; none of them is in a set.
@@ -17,12 +17,7 @@ const RUNS: std::ops::Range<u64> = 501..503;
 const RATIO: f64 = 0.9;
 
 fn simulated(device: u64, run: u64) -> Sequence {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("fognet_simulated_{device}_{run}"));
-    let spec = Spec { layout: Layout::Kaist, name: "made".into(), seconds: SECONDS, device, run };
-    layout::write(&spec, &folder, || {}).expect("there is room");
-    let sequence = Sequence::read(&folder, |_| {}).expect("it has just been written");
-    std::fs::remove_dir_all(&folder).expect("it is ours");
-    sequence
+    simulate(&Spec { layout: Layout::Kaist, name: "made".into(), seconds: SECONDS, device, run })
 }
 
 /// The sum over a drive's minutes of the error of each one's turn, rad.

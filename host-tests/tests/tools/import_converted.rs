@@ -10,13 +10,6 @@ use gyronet_tools::import::drive::Request;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("import_converted").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
 fn request(file: PathBuf, toml: &str) -> Request {
     let vehicle = Vehicle::parse("vehicle.toml", toml).unwrap();
     Request { files: vec![file], vehicle, ..Request::default() }
@@ -35,19 +28,20 @@ fn a_ros_2_bag_in_sqlite_is_converted_by_the_command_in_the_message() {
     let bag = self::folder().join("logs/jackal.bag");
     let found = if bag.is_file() { Ok(bag) } else { Err("no logs/jackal.bag".to_owned()) };
     let Some(bag) = wants(test, Need::Data, found) else { return };
-    let folder = scratch("sqlite");
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
     let bag_path = bag.to_str().unwrap();
     let converter = ["-m", "rosbags.convert"];
     run(
         &python,
         &[&converter[..], &["--src", bag_path, "--dst", "drive", "--dst-storage", "sqlite3"]].concat(),
-        &folder,
+        folder,
     );
 
     let refused = import(&request(folder.join("drive/drive.db3"), "")).unwrap_err().to_string();
     let (_, command) = refused.split_once("&& rosbags-convert ").expect("a command");
     let command = command.replace("FOLDER", "drive").replace("CONVERTED", "converted");
-    run(&python, &[&converter[..], &command.split(' ').collect::<Vec<_>>()].concat(), &folder);
+    run(&python, &[&converter[..], &command.split(' ').collect::<Vec<_>>()].concat(), folder);
     let converted = import(&request(folder.join("converted/converted.mcap"), "")).unwrap();
     let direct = import(&request(bag, "")).unwrap();
     assert!(converted.rows.len() == 6_121 && converted.rows == direct.rows, "{:?}", converted.report);
@@ -57,14 +51,15 @@ fn a_ros_2_bag_in_sqlite_is_converted_by_the_command_in_the_message() {
 fn an_mf4_is_converted_by_the_command_in_the_message() {
     let test = "an_mf4_is_converted_by_the_command_in_the_message";
     let Some(python) = python(test, &["asammdf"]) else { return };
-    let folder = scratch("mf4");
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
     let script = workspace().join("host-tests/tests/clients/make_mf4.py");
     let drive = workspace().join("tools/data/simulated_drive.csv");
-    run(&python, &[script.to_str().unwrap(), drive.to_str().unwrap(), "drive.mf4"], &folder);
+    run(&python, &[script.to_str().unwrap(), drive.to_str().unwrap(), "drive.mf4"], folder);
 
     let refused = import(&request(folder.join("drive.mf4"), "")).unwrap_err().to_string();
     let program = refused.split('"').nth(1).expect("a program in quotation marks");
-    run(&python, &["-c", &program.replace("FILE", "drive.mf4")], &folder);
+    run(&python, &["-c", &program.replace("FILE", "drive.mf4")], folder);
     let columns = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
         .map(|name| format!("{name} = {{ name = 'IMU_{name}' }}\n"));
     let toml = format!(

@@ -12,9 +12,8 @@ use gyronet_tools::paper::fog_replay;
 use gyronet_tools::paper::sequence::{self, Sequence};
 use gyronet_tools::simulate::layout::{self, Layout, Spec};
 use serde::Deserialize;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::BufWriter;
-use std::path::Path;
 use std::process::Command;
 
 const FEATURES: usize = 9;
@@ -63,11 +62,11 @@ impl MinuteNetwork for Windows {
 fn python_and_the_library_make_the_same_windows_and_losses() {
     let test = "python_and_the_library_make_the_same_windows_and_losses";
     let Some(python) = require::python(test, &["numpy"]) else { return };
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python_seconds");
-    let _ = fs::remove_dir_all(&folder);
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
     let spec = Spec { layout: Layout::Kaist, name: "made".into(), seconds: 90, device: 1, run: 4 };
-    layout::write(&spec, &folder, || {}).unwrap();
-    let sequence = Sequence::read(&folder, |_| {}).unwrap();
+    layout::write(&spec, folder, || {}).unwrap();
+    let sequence = Sequence::read(folder, |_| {}).unwrap();
     let csv = folder.join("made.csv");
     sequence::write_csv(&sequence, BufWriter::new(File::create(&csv).unwrap())).unwrap();
     let mut windows = Windows::default();
@@ -119,7 +118,6 @@ fn python_and_the_library_make_the_same_windows_and_losses() {
         }
     }
     assert_eq!(python.window.len(), 10);
-    fs::remove_dir_all(&folder).unwrap();
 }
 
 fn features(sample: &gyronet::sample::ImuSample) -> [f64; 6] {

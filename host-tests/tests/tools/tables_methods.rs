@@ -4,47 +4,38 @@
 use gyronet::odometry::Track;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require::python;
+use gyronet_host_tests::sequence::simulate;
 use gyronet_tools::evaluate::trajectory_error::Point;
 use gyronet_tools::paper::sequence::Sequence;
 use gyronet_tools::paper::tables::estimates::Estimates;
 use gyronet_tools::paper::tables::given::Given;
 use gyronet_tools::paper::tables::results::{Errors, Results, SequenceErrors};
 use gyronet_tools::paper::tables::table;
-use gyronet_tools::simulate::layout::{self, Layout, Spec};
+use gyronet_tools::simulate::layout::{Layout, Spec};
 use std::fmt::Write;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
+use tempfile::{TempDir, tempdir};
 
 /// The methods are compared from here on.
 const START: usize = 300;
 const NAME: &str = "other program";
 
-/// A folder that is removed with it.
-struct Scratch(PathBuf);
+/// The folder of the other program's trajectories.
+struct Scratch(TempDir);
 
 impl Scratch {
-    fn new(name: &str) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("tables_methods_{name}"));
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).unwrap();
-        Self(folder)
-    }
-
-    /// Simulates a sequence of two minutes.
-    fn sequence(&self, layout: Layout, name: &str) -> Sequence {
-        let spec = Spec { layout, name: name.into(), seconds: 120, device: 1, run: 5 };
-        let folder = self.0.join(format!("{layout:?}")).join(name);
-        layout::write(&spec, &folder, || {}).unwrap();
-        Sequence::read(&folder, |_| {}).unwrap()
+    fn new() -> Self {
+        Self(tempdir().unwrap())
     }
 
     fn given(&self) -> Given {
-        format!("{NAME}={}", self.0.display()).parse().unwrap()
+        format!("{NAME}={}", self.0.path().display()).parse().unwrap()
     }
 
     fn write(&self, sequence: &Sequence, rows: &[String]) {
-        fs::write(self.0.join(format!("{}.txt", sequence.name)), rows.join("\n")).unwrap();
+        fs::write(self.0.path().join(format!("{}.txt", sequence.name)), rows.join("\n")).unwrap();
     }
 
     fn errors(&self, sequence: &Sequence) -> SequenceErrors {
@@ -66,10 +57,9 @@ impl Scratch {
     }
 }
 
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
+/// Simulates a sequence of two minutes.
+fn sequence(layout: Layout, name: &str) -> Sequence {
+    simulate(&Spec { layout, name: name.into(), seconds: 120, device: 1, run: 5 })
 }
 
 /// Returns a row of the format for each step; places are from the sequence's first.
@@ -91,9 +81,9 @@ fn truth(sequence: &Sequence) -> Vec<String> {
 
 #[test]
 fn the_truth_has_no_error_in_either_layout() {
-    let scratch = Scratch::new("truth");
+    let scratch = Scratch::new();
     for (layout, name) in [(Layout::Kaist, "k"), (Layout::Nclt, "n")] {
-        let sequence = scratch.sequence(layout, name);
+        let sequence = sequence(layout, name);
         // As lwoi writes: whole seconds, so a little less than the sequence.
         let mut rows = truth(&sequence);
         rows.truncate(rows.len() - 95);
@@ -107,8 +97,8 @@ fn the_truth_has_no_error_in_either_layout() {
 
 #[test]
 fn a_known_error_is_found() {
-    let scratch = Scratch::new("known");
-    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let scratch = Scratch::new();
+    let sequence = sequence(Layout::Kaist, "k");
     let steps = &sequence.steps;
     let shifted = rows(&sequence, |k| {
         let ([x, y], turned) = (steps[k].position, if k > 5_000 { 0.02 } else { 0.0 });
@@ -131,8 +121,8 @@ fn a_known_error_is_found() {
 
 #[test]
 fn ten_poses_a_second_are_enough() {
-    let scratch = Scratch::new("slow");
-    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let scratch = Scratch::new();
+    let sequence = sequence(Layout::Kaist, "k");
     let slow: Vec<String> = truth(&sequence).into_iter().step_by(10).collect();
     scratch.write(&sequence, &slow);
     let errors = scratch.compared(&sequence);
@@ -143,8 +133,8 @@ fn ten_poses_a_second_are_enough() {
 fn evo_finds_the_same_error() {
     let test = "evo_finds_the_same_error";
     let Some(python) = python(test, &["evo"]) else { return };
-    let scratch = Scratch::new("evo");
-    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let scratch = Scratch::new();
+    let sequence = sequence(Layout::Kaist, "k");
     let mut track = Track { position: [0.0; 2], yaw: sequence.steps[0].yaw };
     let path: Vec<Track> = sequence
         .steps
@@ -156,10 +146,11 @@ fn evo_finds_the_same_error() {
         .collect();
     scratch.write(&sequence, &rows(&sequence, |k| (path[k].position, path[k].yaw)));
     let errors = scratch.compared(&sequence);
-    let truth_file = scratch.0.join("truth.tum");
+    let truth_file = scratch.0.path().join("truth.tum");
     fs::write(&truth_file, truth(&sequence)[START..].join("\n")).unwrap();
     let script = workspace().join("host-tests/tests/clients/evo_ate.py");
-    let output = Command::new(python).arg(script).arg(truth_file).arg(scratch.0.join("k.txt")).output();
+    let output =
+        Command::new(python).arg(script).arg(truth_file).arg(scratch.0.path().join("k.txt")).output();
     let output = output.unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let evo: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -178,8 +169,8 @@ fn evo_finds_the_same_error() {
 
 #[test]
 fn what_cannot_be_compared_is_left_out_and_named() {
-    let scratch = Scratch::new("bad");
-    let sequence = scratch.sequence(Layout::Kaist, "k");
+    let scratch = Scratch::new();
+    let sequence = sequence(Layout::Kaist, "k");
     let good = truth(&sequence);
     let steps = &sequence.steps;
     let shifted = |seconds: f64| {
@@ -224,15 +215,15 @@ fn what_cannot_be_compared_is_left_out_and_named() {
         assert!(why.contains(expected), "{why}\nis not {expected}");
         assert!(errors.methods.is_empty() && errors.order.is_empty());
     }
-    fs::remove_file(scratch.0.join("k.txt")).unwrap();
+    fs::remove_file(scratch.0.path().join("k.txt")).unwrap();
     let why = &scratch.errors(&sequence).left_out[NAME];
     assert!(why.ends_with("k.txt: missing"), "{why}");
 }
 
 #[test]
 fn the_tables_count_what_was_left_out() {
-    let scratch = Scratch::new("counted");
-    let sequences = ["a", "b"].map(|name| scratch.sequence(Layout::Kaist, name));
+    let scratch = Scratch::new();
+    let sequences = ["a", "b"].map(|name| sequence(Layout::Kaist, name));
     scratch.write(&sequences[0], &truth(&sequences[0]));
     let both = sequences.each_ref().map(|sequence| scratch.errors(sequence));
     let tables = table::tables(&Results::new(both.to_vec()));

@@ -1,15 +1,29 @@
-//! This module does dead reckoning of a simulated sequence with turns from any source.
+//! This module simulates sequences, and does dead reckoning of them with turns from any source.
 
 use gyronet::odometry::Track;
 use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
 use gyronet_tools::paper::sequence::Sequence;
+use gyronet_tools::simulate::layout::{self, Spec};
+use tempfile::tempdir;
+
+/// Returns a sequence that is simulated, written and read back.
+///
+/// # Panics
+/// When there is no room for its files.
+#[must_use]
+pub fn simulate(spec: &Spec) -> Sequence {
+    let parent = tempdir().expect("there is room");
+    let folder = parent.path().join(&spec.name);
+    layout::write(spec, &folder, || {}).expect("there is room");
+    Sequence::read(&folder, |_| {}).expect("it has just been written")
+}
 
 /// Returns the root mean square distance from the true path of dead reckoning with these turns, m.
 ///
 /// # Panics
 /// When the sequence has no step, or there are fewer turns than steps.
 #[must_use]
-pub fn error(sequence: &Sequence, turns: impl Iterator<Item = f64>) -> f64 {
+pub fn path_error(sequence: &Sequence, turns: impl Iterator<Item = f64>) -> f64 {
     let yaw = sequence.steps.first().expect("it has steps").yaw;
     let mut track = Track { yaw, ..Track::default() };
     let walked = sequence.steps.iter().zip(turns).map(|(step, turn)| {
