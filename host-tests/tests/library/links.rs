@@ -4,8 +4,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGES: [&str; 18] = [
+const PAGES: [&str; 19] = [
     "README.md",
+    "CONTRIBUTING.md",
     "CHANGELOG.md",
     "host-tests/README.md",
     "host-tests/board/README.md",
