@@ -145,7 +145,7 @@ impl Tensors {
             }
             tensors.insert(tensor, values);
         }
-        let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let sha256 = format!("{:x}", Sha256::digest(bytes));
         Ok(Self { tensors, provenance, sha256 })
     }
 
