@@ -1,9 +1,9 @@
-//! The data that the binary carries, so that it works from anywhere: the simulated drive and the f32 checkpoints of
-//! GyroNet and FoGNet.
+//! The data that the binary carries, so that it works from anywhere: the simulated drive, the f32 checkpoint of
+//! GyroNet and the weights of FoGNet.
 
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
-use crate::network::checkpoint::{Checkpoint, CheckpointError, FogNet, GyroNet};
+use crate::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
 use crate::network::weight_file::WeightFileError;
 use gyronet::model::FogBlob;
 use gyronet::model::weights::FOGNET;
@@ -13,13 +13,6 @@ pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
 
 /// The checkpoint that [`gyronet::model::weights::GYRONET`] was made from.
 const CHECKPOINT: &[u8] = include_bytes!("../weights/gyronet.safetensors");
-
-/// The checkpoint that [`gyronet::model::weights::DEFAULT`] was made from.
-#[cfg(test)]
-const DEFAULT_CHECKPOINT: &[u8] = include_bytes!("../weights/default.safetensors");
-
-/// The checkpoint that [`gyronet::model::weights::FOGNET`] was made from.
-const FOG_CHECKPOINT: &[u8] = include_bytes!("../weights/fognet.safetensors");
 
 /// The simulated drive.
 ///
@@ -37,14 +30,6 @@ pub fn checkpoint() -> Result<Checkpoint<GyroNet>, CheckpointError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
 }
 
-/// FoGNet's f32 checkpoint.
-///
-/// # Errors
-/// Never, unless the repository is broken.
-pub fn fog_checkpoint() -> Result<Checkpoint<FogNet>, CheckpointError> {
-    Checkpoint::parse("fognet.safetensors", FOG_CHECKPOINT)
-}
-
 /// FoGNet's weights.
 ///
 /// # Errors
@@ -58,6 +43,7 @@ pub fn fog_blob() -> Result<FogBlob<'static>, WeightFileError> {
 mod tests {
     use super::*;
     use crate::simulate::{Config, csv};
+    use std::path::Path;
 
     #[test]
     fn simulated_drive_is_what_simulate_writes() {
@@ -79,10 +65,12 @@ mod tests {
     fn weights_are_what_quantize_makes() {
         let (bytes, _) = crate::network::quantize::quantize(&checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::GYRONET.0, "run: gyronet quantize");
-        let default = Checkpoint::parse("default.safetensors", DEFAULT_CHECKPOINT).unwrap();
+        let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
+        let default = Checkpoint::read(&weights.join("default.safetensors")).unwrap();
         let (bytes, _) = crate::network::quantize::quantize(&default).unwrap();
         assert!(bytes == gyronet::model::weights::DEFAULT.0, "run: gyronet quantize");
-        let (bytes, _) = crate::network::quantize::fognet::quantize(&fog_checkpoint().unwrap()).unwrap();
+        let fognet = Checkpoint::read(&weights.join("fognet.safetensors")).unwrap();
+        let (bytes, _) = crate::network::quantize::fognet::quantize(&fognet).unwrap();
         assert!(bytes == gyronet::model::weights::FOGNET.0, "run: gyronet quantize");
     }
 }

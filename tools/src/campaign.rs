@@ -87,8 +87,6 @@ pub struct Run {
     pub drive: String,
     /// The part.
     pub part: Part,
-    /// The rows of the drive that it covers.
-    pub span: Span,
     /// The one or two faults.
     pub faults: Vec<Fault>,
     /// The outcome, or the message of a panic.
@@ -183,7 +181,7 @@ fn one(seed: u64, number: usize, scenes: &[Scene<'_>], networks: &mut Integer<'_
         let text = panic.downcast_ref::<String>().cloned();
         text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap_or_default()
     });
-    Run { number, drive: scene.drive.name.clone(), part: scene.part, span, faults, outcome }
+    Run { number, drive: scene.drive.name.clone(), part: scene.part, faults, outcome }
 }
 
 /// Makes `count` results on some threads, each with a tool of its own, and returns them in order.

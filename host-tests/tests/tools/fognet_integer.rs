@@ -8,6 +8,8 @@ use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
+use gyronet_host_tests::recordings::workspace;
+use gyronet_tools::network::checkpoint::{self, Checkpoint};
 
 /// Features in m/s^2, rad/s, m and rad.
 type Window = [[f32; INPUTS]; STEPS];
@@ -49,7 +51,8 @@ fn rms(values: impl Iterator<Item = f64> + Clone) -> f64 {
 
 #[test]
 fn every_input_counts_as_in_f32() {
-    let checkpoint = gyronet_tools::bundled::fog_checkpoint().expect("the committed checkpoint");
+    let file = workspace().join("tools/weights/fognet.safetensors");
+    let checkpoint = Checkpoint::<checkpoint::FogNet>::read(&file).expect("the committed checkpoint");
     let mut float = checkpoint.network();
     let mut state = FogNetState::ZERO;
     let mut integer = FogNet::new(FogBlob::new_checked(&weights::FOGNET.0).expect("checked"), &mut state);

@@ -111,8 +111,6 @@ pub struct AgainstTruth {
 pub struct Times {
     /// First row of the run.
     pub from: usize,
-    /// The row after the last one.
-    pub to: usize,
     /// The time of the fault's first effect, microseconds.
     pub begin: u64,
     /// The time at which the fault is over, or the end of the run if it lasts.

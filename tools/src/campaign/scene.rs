@@ -125,7 +125,7 @@ impl<'d> Scene<'d> {
         let over = faults.iter().map(|fault| at(fault.from + fault.rows));
         let end = over.max().unwrap_or(last);
         let begin = begin.unwrap_or(last);
-        let times = Times { from: span.from, to: span.to, begin, end, last };
+        let times = Times { from: span.from, begin, end, last };
         let mut outcome = self.baseline.judge(&seen, times);
         outcome.counted = board.events() != self.baseline.events(span.to - 1);
         outcome
