@@ -1,15 +1,19 @@
-//! This module makes bytes of an Xsens MTi, and the samples that the driver delivers for them.
+//! This module makes bytes of an Xsens MTi, and the samples that a part's driver delivers for bytes.
 
 use gyronet::sample::ImuSample;
+use gyronet::sensor::ByteSource;
 use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
+use std::borrow::Borrow;
 
-/// Reads bytes that are written in hexadecimal, with blanks between them.
+/// Reads bytes that are written in hexadecimal, with or without blanks between them.
 ///
 /// # Panics
 /// When they are not.
 #[must_use]
 pub fn bytes(hex: &str) -> Vec<u8> {
-    hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("hex")).collect()
+    let digits: String = hex.split_whitespace().collect();
+    let byte = |at| u8::from_str_radix(&digits[at..at + 2], 16).expect("hex");
+    (0..digits.len()).step_by(2).map(byte).collect()
 }
 
 /// Returns a frame of a real MTi with 98 bytes of payload.
@@ -44,12 +48,15 @@ pub fn message(time: u32) -> MtData2 {
     }
 }
 
-/// Returns the samples that a driver delivers for these bytes.
-pub fn feed(mti: &mut Mti, bytes: impl IntoIterator<Item = u8>) -> Vec<Result<ImuSample, XsensError>> {
+/// Returns what a part's driver delivers for these bytes.
+pub fn feed<P: ByteSource>(
+    part: &mut P,
+    bytes: impl IntoIterator<Item = impl Borrow<u8>>,
+) -> Vec<Result<P::Sample, P::Error>> {
     let mut samples = Vec::new();
     for byte in bytes {
-        mti.receive(byte);
-        samples.extend(std::iter::from_fn(|| mti.next_sample()));
+        part.receive(*byte.borrow());
+        samples.extend(std::iter::from_fn(|| part.next_sample()));
     }
     samples
 }

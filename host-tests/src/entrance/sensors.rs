@@ -1,7 +1,7 @@
 //! This module gives bytes to the parsers and dialogues of the five sensors.
 
 use super::Seed;
-use crate::wire::{bytes, message, synthetic_frame};
+use crate::wire::{bytes, feed, message, synthetic_frame};
 use gyronet::sensor::adis16465::{BURST, Burst, Model};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::command::{Command, Reply, setup};
@@ -20,12 +20,9 @@ use gyronet::units::Micros;
 
 /// Takes bytes as a stream from an MTi, to its dialogue, and as the data of a message.
 pub fn xsens(data: &[u8]) {
-    let mut mti = Mti::new();
+    let samples = feed(&mut Mti::new(), data);
     let mut dialogue = XsensDialogue::new();
-    let mut samples = Vec::new();
     for (now, byte) in (0..).zip(data) {
-        mti.receive(*byte);
-        samples.extend(core::iter::from_fn(|| mti.next_sample()));
         dialogue.receive(*byte);
         let _ = dialogue.poll(Micros(now * 10_000));
     }
@@ -58,12 +55,9 @@ pub fn xsens_seeds() -> Vec<Seed> {
 /// Takes bytes as a stream to the parser and to the dialogue, as a message, and as a message whose checksum
 /// is made to fit.
 pub fn dsp1760(data: &[u8]) {
-    let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
-    let mut samples = Vec::new();
+    let samples = feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), data);
     let mut dialogue = KvhDialogue::new(Dsp1760Config::DEFAULT);
     for (now, byte) in (0..).zip(data) {
-        part.receive(*byte);
-        samples.extend(core::iter::from_fn(|| part.next_sample()));
         dialogue.receive(*byte);
         let _ = dialogue.poll(Micros(now * 10_000));
     }

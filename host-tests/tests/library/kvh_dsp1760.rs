@@ -9,6 +9,7 @@ use gyronet::sensor::dsp1760::{
     AngleUnit, Dsp1760, Dsp1760Config, Dsp1760Error, OutputRate, Rotation, TemperatureUnit,
 };
 use gyronet::units::{Angle, CentiCelsius, Micros};
+use gyronet_host_tests::wire::{bytes, feed};
 use proptest::prelude::*;
 
 /// The bytes of a message that a real part has sent.
@@ -19,21 +20,6 @@ const HUNDREDTHS: &str = "fe81ff55 0000000000000000 3727c5ac 0000000000000000000
 const HUNDREDTHS_Z_BAD: &str =
     "fe81ff55 0000000000000000 3727c5ac 000000000000000000000000 030509e6 9d94bcf3";
 const TIMED: &str = "fe81ff56 0000000000000000 379268A8 0000000000000000 3f800000 075bcd15 77010019 5d9c71b2";
-
-fn bytes(hex: &str) -> Vec<u8> {
-    let digits: Vec<u8> = hex.bytes().filter(u8::is_ascii_hexdigit).collect();
-    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).expect("ascii"), 16).expect("hex");
-    digits.chunks(2).map(byte).collect()
-}
-
-fn feed(part: &mut Dsp1760, bytes: &[u8]) -> Vec<Result<FogSample, Dsp1760Error>> {
-    let mut samples = Vec::new();
-    for byte in bytes {
-        part.receive(*byte);
-        samples.extend(std::iter::from_fn(|| part.next_sample()));
-    }
-    samples
-}
 
 fn feed_new(bytes: &[u8]) -> Vec<Result<FogSample, Dsp1760Error>> {
     feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), bytes)
@@ -99,7 +85,7 @@ fn samples_carry_angle_time_and_temperature() {
     assert_eq!(feed_new(&bytes(PLUS_10_DPS)), [Ok(first)]);
     // The number before 0 is 127: two frames in that order are one step apart.
     let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
-    let samples = feed(part, &[bytes(MINUS_10_DPS), bytes(PLUS_10_DPS)].concat());
+    let samples = feed(part, [bytes(MINUS_10_DPS), bytes(PLUS_10_DPS)].concat());
     let invalid = samples[0].expect("a sample");
     assert_eq!((invalid.increment[2], invalid.temperature), (None, Some(CentiCelsius(-500))));
     assert_eq!(samples[1..], [Ok(FogSample { time: Micros(2_000), ..first })]);
@@ -126,7 +112,7 @@ fn the_parser_resynchronises() {
     let mut damaged = other.clone();
     damaged[20] ^= 1;
     let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
-    assert_eq!(feed(part, &[&damaged[..], &damaged, &recorded].concat()).len(), 1);
+    assert_eq!(feed(part, [&damaged[..], &damaged, &recorded].concat()).len(), 1);
     assert_eq!((part.bad_checksums(), ByteSource::bad_checksums(part)), (2, 2));
     // A header inside the payload: an acceleration whose bits are FE 81 FF 55.
     let hidden = Message { acceleration: [f32::from_bits(0xFE81_FF55), 0.0, 0.0], ..message(3, 1e-5) }.emit();
@@ -151,7 +137,7 @@ fn self_tests_are_passed_over() {
 #[test]
 fn lost_and_repeated_messages_are_counted() {
     let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
-    let mut take = |sequence| feed(part, &message(sequence, 1e-6).emit())[0].map(|s| (s.time.0, s.lost));
+    let mut take = |sequence| feed(part, message(sequence, 1e-6).emit())[0].map(|s| (s.time.0, s.lost));
     assert_eq!(take(126), Ok((1_000, 0)));
     assert_eq!(take(127), Ok((2_000, 0)));
     assert_eq!(take(2), Ok((5_000, 2)));
@@ -172,7 +158,7 @@ fn a_number_that_is_none_is_not_valid() {
     }
     // Faster than anything turns: 1 rad in a millisecond.
     let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
-    assert_eq!(feed(part, &message(0, 1.0).emit())[0].expect("a sample").increment[2], None);
+    assert_eq!(feed(part, message(0, 1.0).emit())[0].expect("a sample").increment[2], None);
     assert_eq!(part.counters().implausible, 1);
 }
 
@@ -188,7 +174,7 @@ fn units_are_those_of_the_manual() {
         let temperature = TemperatureUnit::Hundredths;
         let config = Dsp1760Config { rotation, angle, temperature, ..Dsp1760Config::DEFAULT };
         let made = Message { extra: Extra::Temperature(2534), ..message(0, value as f32) };
-        let sample = feed(&mut Dsp1760::new(config), &made.emit())[0].expect("a sample");
+        let sample = feed(&mut Dsp1760::new(config), made.emit())[0].expect("a sample");
         assert_eq!(sample.temperature, Some(CentiCelsius(2534)));
         let got = sample.increment[2].expect("valid").rad();
         // A few roundings of f32.
@@ -202,8 +188,8 @@ fn time_stamps_wrap_and_750_messages_fill_a_second() {
         Message { extra: Extra::Timed { time, temperature: 0 }, ..message(sequence, 0.0) }.emit()
     };
     let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
-    feed(part, &timed(0, u32::MAX - 499));
-    let after = feed(part, &timed(1, 500))[0].expect("a sample");
+    feed(part, timed(0, u32::MAX - 499));
+    let after = feed(part, timed(1, 500))[0].expect("a sample");
     assert_eq!(after.time, Micros(u64::from(u32::MAX) + 501));
     let rate = OutputRate::new(750).expect("offered");
     let part = &mut Dsp1760::new(Dsp1760Config { rate, ..Dsp1760Config::DEFAULT });

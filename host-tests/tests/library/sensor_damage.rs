@@ -12,6 +12,7 @@ use gyronet::sensor::icm42688::packet::{Packet, PacketError, Resolution};
 use gyronet::sensor::xsens::dialogue::{Step, mid};
 use gyronet::sensor::xsens::xbus;
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::wire::feed;
 
 /// Returns all copies of some bytes with one bit flipped.
 fn flips(bytes: &[u8]) -> impl Iterator<Item = Vec<u8>> {
@@ -61,13 +62,7 @@ fn data_message() -> Vec<u8> {
 
 /// Samples that a DSP-1760 gives for these bytes.
 fn samples(bytes: &[u8]) -> usize {
-    let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
-    let mut samples = 0;
-    for byte in bytes {
-        part.receive(*byte);
-        samples += std::iter::from_fn(|| part.next_sample()).count();
-    }
-    samples
+    feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), bytes).len()
 }
 
 /// Damaged as they may be, they give no sample and take none away.

@@ -1,11 +1,10 @@
-//! Parsers find every intact frame among random bytes, through the one seam that they share. That no bytes harm them is
-//! tried in `entrances`.
+//! Parsers find every intact frame among random bytes. That no bytes harm them is tried in `entrances`.
 
-use gyronet::sensor::ByteSource;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::precision::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet_host_tests::wire::feed;
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 
@@ -13,18 +12,6 @@ const NOISE: usize = 100_000;
 
 fn random(seed: u8) -> TestRng {
     TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32])
-}
-
-/// Returns the samples that a part gives for a stream.
-fn samples<P: ByteSource>(part: &mut P, stream: &[u8]) -> Vec<P::Sample> {
-    let mut samples = Vec::new();
-    for byte in stream {
-        part.receive(*byte);
-        while let Some(sample) = part.next_sample() {
-            samples.extend(sample);
-        }
-    }
-    samples
 }
 
 /// Random bytes, half of them from `alphabet` so that false headers are common, with `frame(n)`
@@ -73,7 +60,7 @@ fn dsp1760_finds_every_intact_frame() {
     };
     let (stream, intact) = strewn(1, &[0xFE, 0x81, 0xFF, 0x55, 0x56, 0x57, 0x00, 0xAA], frame);
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
-    let found = samples(&mut part, &stream);
+    let found: Vec<_> = feed(&mut part, stream).into_iter().flatten().collect();
     println!("DSP-1760: {} of {} intact frames, {} false", found.len(), intact.len(), part.bad_checksums());
     assert_eq!(found.len(), intact.len());
     // One lost message for each damaged frame between the first and the last intact one.
@@ -108,7 +95,7 @@ fn xsens_finds_every_intact_frame() {
         at += 1;
     }
     let mut part = Mti::new();
-    let found = samples(&mut part, &stream);
+    let found: Vec<_> = feed(&mut part, stream).into_iter().flatten().collect();
     let times: Vec<u32> = found.iter().map(|sample| (sample.time.0 / 10_000) as u32).collect();
     let missed = intact.iter().filter(|n| !times.contains(n)).count();
     println!("MTi: {} of {} intact frames, {} false", found.len(), intact.len(), part.bad_checksums());
