@@ -33,6 +33,12 @@ pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
     require::wants(test, Need::Data, found)
 }
 
+/// Returns the files of these drives; where one is missing, reports that the test is skipped.
+#[must_use]
+pub fn trials(test: &str, numbers: &[u32]) -> Option<Vec<PathBuf>> {
+    numbers.iter().map(|number| trial(test, *number)).collect()
+}
+
 /// Holds one row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {

@@ -104,10 +104,8 @@ fn score(path: &Path) -> Score {
 
 #[test]
 fn recorded_errors_lie_inside_it_as_often_as_is_said() {
-    let paths =
-        TRIALS.map(|trial| recordings::trial("recorded_errors_lie_inside_it_as_often_as_is_said", trial));
-    let [Some(_), Some(_)] = paths else { return };
-    let paths: Vec<_> = paths.into_iter().flatten().collect();
+    let paths = recordings::trials("recorded_errors_lie_inside_it_as_often_as_is_said", &TRIALS);
+    let Some(paths) = paths else { return };
     let scores = parallel::map(&paths, |path| score(path));
     let mean = ablation::mean(&scores.into_iter().map(|score| vec![score]).collect::<Vec<_>>());
     let [score] = &mean.expect("two drives")[..] else { panic!("one variant") };

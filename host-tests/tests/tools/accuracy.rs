@@ -56,9 +56,7 @@ impl Trial {
 /// The trials, run once for both tests; `None` without the recordings.
 fn trials(test: &str) -> Option<&'static [Trial]> {
     static RUN: OnceLock<Vec<Trial>> = OnceLock::new();
-    let paths = TRIALS.map(|trial| recordings::trial(test, trial));
-    let [Some(first), Some(second)] = paths else { return None };
-    let drives: Vec<_> = TRIALS.into_iter().zip([first, second]).collect();
+    let drives: Vec<_> = TRIALS.into_iter().zip(recordings::trials(test, &TRIALS)?).collect();
     Some(RUN.get_or_init(|| parallel::map(&drives, |(trial, path)| Trial::new(*trial, path))))
 }
 

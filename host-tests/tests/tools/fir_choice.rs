@@ -39,9 +39,8 @@ impl Drive {
 
 #[test]
 fn no_other_low_pass_is_better_on_the_training_drives() {
-    let paths: Option<Vec<_>> =
-        TRIALS.iter().map(|trial| recordings::trial("no_other_low_pass_is_better", *trial)).collect();
-    let Some(paths) = paths else { return };
+    let test = "no_other_low_pass_is_better_on_the_training_drives";
+    let Some(paths) = recordings::trials(test, &TRIALS) else { return };
     let drives: Vec<Drive> =
         paths.iter().map(|path| Drive::new(&Recording::read(path).expect("a recording"))).collect();
     let ratio = |filter: &LowPass| {

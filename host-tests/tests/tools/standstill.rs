@@ -92,14 +92,8 @@ fn wheels(row: &Row) -> (f64, f64) {
 
 #[test]
 fn quiet_is_found_at_rest_and_hardly_ever_on_the_road() {
-    let trials = [2, 3, 4, 6, 7, 8, 9, 11];
-    let paths: Vec<_> = trials
-        .iter()
-        .filter_map(|trial| recordings::trial("quiet_is_found_at_rest_and_hardly_ever_on_the_road", *trial))
-        .collect();
-    if paths.len() < trials.len() {
-        return;
-    }
+    let test = "quiet_is_found_at_rest_and_hardly_ever_on_the_road";
+    let Some(paths) = recordings::trials(test, &[2, 3, 4, 6, 7, 8, 9, 11]) else { return };
     let (mut still, mut still_quiet, mut driven, mut driven_quiet) = (0, 0, 0, 0);
     for path in paths {
         let recording = Recording::read(&path).expect("a recording");

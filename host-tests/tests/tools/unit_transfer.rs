@@ -186,11 +186,9 @@ fn judge(trial: u32, path: &Path) -> (String, Vec<String>) {
 
 #[test]
 fn another_unit_of_the_part_moves_no_correction() {
-    let paths = TRIALS.map(|trial| recordings::trial("another_unit_of_the_part_moves_no_correction", trial));
-    if paths.iter().any(Option::is_none) {
-        return;
-    }
-    let drives: Vec<_> = TRIALS.into_iter().zip(paths.into_iter().flatten()).collect();
+    let test = "another_unit_of_the_part_moves_no_correction";
+    let Some(paths) = recordings::trials(test, &TRIALS) else { return };
+    let drives: Vec<_> = TRIALS.into_iter().zip(paths).collect();
     let heading = "1 s errors, rad           static |    inputs  ratio | recording  ratio |   perfect    unmoved  ratio";
     parallel::table(heading, &drives, |(trial, path)| judge(*trial, path));
 }
