@@ -18,11 +18,13 @@
 //! ```
 
 use super::error::{DataError, DataFault};
-use super::wheel_frames::RADIUS;
 use gyronet::mounting::Rotation;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// A wheel of the recorded car has this radius, m; another vehicle's stands in its vehicle file.
+pub const RADIUS: f64 = 0.289;
 
 /// Describes a vehicle and the names in its logs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

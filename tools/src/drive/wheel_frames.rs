@@ -7,8 +7,6 @@ use gyronet::can::DataFrame;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::sample::WHEELS;
 
-/// A wheel of the recorded car has this radius, m; another vehicle's stands in its vehicle file.
-pub const RADIUS: f64 = 0.289;
 /// Gives for each place of [`gyronet::sample::WheelSample::speeds`] the recorded wheel (front right, rear right, front
 /// left, rear left).
 const PLACES: [usize; WHEELS] = [1, 3, 0, 2];
@@ -120,6 +118,7 @@ impl Speeds {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::vehicle::RADIUS;
     use gyronet::sample::Standstill;
 
     fn standstills(wheel2: impl Fn(usize) -> String) -> Vec<Standstill> {
