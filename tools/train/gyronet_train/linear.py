@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save_file
 
+from . import course
 from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
 
 HOP = 5
@@ -168,36 +169,75 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors file")
     parser.add_argument("--stem", default="linear_window", help="name of the file")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
+    parser.add_argument("--course", action="store_true", help="train on ref_yaw, mounting and gain alone (course.py)")
+    parser.add_argument("--noise-deg", type=float, metavar="DEG", help="simulate the course from ref_gyr_z, at 1 Hz")
     return parser.parse_args()
 
 
-def main() -> None:
-    args = arguments()
-    drives = [load_drive(find_drive(args.data, n)) for n in args.train]
+def train_on_rate(paths: list[Path]) -> tuple[list[Drive], np.ndarray, float, dict]:
+    """The drives, outputs of a window, expected error in rad/s and the report, by `ref_gyr_z`."""
+    drives = [load_drive(path) for path in paths]
     print("1 s error over static initialisation's, each drive by the filter of the others: mean, standard deviation")
     report = {}
     for count in range(1, len(PARTS) + 1):
         names = " + ".join(list(PARTS)[:count])
         basis = np.concatenate(list(PARTS.values())[:count])
-        ratios = leave_one_out(drives, basis)
-        report[names] = [round(float(np.mean(ratios)), 4), round(float(np.std(ratios, ddof=1)), 4)]
-        each = " ".join(f"{ratio:.3f}" for ratio in ratios)
-        print(f"  {names}, {len(basis)} numbers: {report[names][0]:.3f} {report[names][1]:.3f} ({each})")
+        report[names] = tell(f"{names}, {len(basis)} numbers", leave_one_out(drives, basis))
     basis = np.concatenate(list(PARTS.values()))
     taps = fit([sums(drive, basis) for drive in drives], basis)
     outputs = rows(taps)
     roll, pitch, gain = taps.sum(axis=0)[[ROLL, PITCH, YAW]]
     print(f"mounting {roll:+.5f} of roll rate, {pitch:+.5f} of pitch rate; gain {gain:+.5f}")
+    return drives, outputs, window_error(outputs, drives), report
+
+
+def train_on_course(paths: list[Path], noise_deg: float | None) -> tuple[list[course.CourseDrive], np.ndarray, float, dict]:
+    """The same by `ref_yaw`: mounting and gain."""
+    drives = []
+    for path in paths:
+        try:
+            drives.append(course.load_course_drive(path, noise_deg))
+        except ValueError as error:
+            print(f"left out: {error}")
+    if len(drives) < 3:
+        raise SystemExit(f"{len(drives)} drives can be used, needed are 3")
+    for drive in drives:
+        print(f"{drive.name}: ref_yaw, {len(drive.errors)} spans of 10 s, {drive.left_out} that jump left out")
+    print("10 s error over static initialisation's, each drive by the shares of the others: mean, standard deviation")
+    report = {"mounting + gain": tell("mounting + gain, 3 numbers", course.leave_one_out(drives))}
+    shares, sigmas = course.fit(drives)
+    for name, share, sigma, limit in zip(("roll rate", "pitch rate", "yaw rate"), shares, sigmas, course.SHOWN):
+        shown = "" if sigma < limit else ": the drives do not show it"
+        print(f"share of the {name} {share:+.5f}, sigma {sigma:.5f}{shown}")
+    taps = np.tensordot(shares, np.concatenate([PARTS["mounting"], PARTS["gain"]]), axes=1)
+    return drives, rows(taps), course.window_error(shares, drives), report
+
+
+def tell(what: str, ratios: list[float]) -> list[float]:
+    """Prints the ratios of all drives; returns their mean and standard deviation."""
+    found = [round(float(np.mean(ratios)), 4), round(float(np.std(ratios, ddof=1)), 4)]
+    print(f"  {what}: {found[0]:.3f} {found[1]:.3f} ({' '.join(f'{ratio:.3f}' for ratio in ratios)})")
+    return found
+
+
+def main() -> None:
+    args = arguments()
+    paths = [find_drive(args.data, n) for n in args.train]
+    if args.course:
+        drives, outputs, scale, report = train_on_course(paths, args.noise_deg)
+    else:
+        drives, outputs, scale, report = train_on_rate(paths)
     features = np.concatenate([drive.features for drive in drives])
     tensors = {
         "input_mean": features.mean(axis=0),
         "input_std": features.std(axis=0),
-        "output_scale": np.array([window_error(outputs, drives)]),
+        "output_scale": np.array([scale]),
         "linear.weight": outputs.reshape(WINDOW, WINDOW * FEATURES),
     }
     provenance = {
         "network": "gyronet",
         "parts": "linear",
+        "reference": ("ref_yaw" if args.noise_deg is None else "simulated course") if args.course else "ref_gyr_z",
         "train": [drive.name for drive in drives],
         "sha256": {drive.name: drive.sha256 for drive in drives},
         "leave_one_out_to_static": report,

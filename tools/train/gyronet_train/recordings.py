@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .vehicle import read_mounting
+from .vehicle import Mounting, read_mounting
 
 RATE_HZ = 100
 STATIC_SAMPLES = 3 * RATE_HZ
@@ -45,16 +45,8 @@ def load_drive(path: Path) -> Drive:
 def load_pieces(path: Path) -> list[Drive]:
     """Read the pieces of one CSV between its gaps; static initialisation is that of the first. Raises ValueError that
     names the file and what is wrong with it."""
-    mounting = read_mounting(path)
-    digest = hashlib.sha256(path.read_bytes() + mounting.text).hexdigest()
-    table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
-    missing = [name for name in COLUMNS if name not in (table.dtype.names or ())]
-    if missing:
-        raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
+    table, mounting, digest = read_table(path, COLUMNS)
     values = np.stack([table[name] for name in COLUMNS], axis=1)
-    if not np.isfinite(values).all():
-        row = int(np.argwhere(~np.isfinite(values).all(axis=1))[0, 0])
-        raise ValueError(f"{path}: line {row + 2}: a value is empty or not a number")
     broken = np.flatnonzero(abs(np.diff(values[:, 0]) - 1 / RATE_HZ) > 1e-3) + 1
     pieces = np.split(np.arange(len(values)), broken)
     if len(pieces[0]) <= STATIC_SAMPLES:
@@ -74,6 +66,20 @@ def load_pieces(path: Path) -> list[Drive]:
         )
         for rows in kept
     ]
+
+
+def read_table(path: Path, columns: tuple[str, ...]) -> tuple[np.ndarray, Mounting, str]:
+    """Read the rows of one CSV, its mounting, and the hash of both. Raises ValueError where one of the columns has no
+    number in every row."""
+    mounting = read_mounting(path)
+    table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
+    missing = [name for name in columns if name not in (table.dtype.names or ())]
+    if missing:
+        raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
+    unknown = ~np.isfinite(np.stack([table[name] for name in columns], axis=1)).all(axis=1)
+    if unknown.any():
+        raise ValueError(f"{path}: line {np.argmax(unknown) + 2}: a value is empty or not a number")
+    return table, mounting, hashlib.sha256(path.read_bytes() + mounting.text).hexdigest()
 
 
 def find_drive(folder: Path, name: str) -> Path:
