@@ -30,12 +30,14 @@ pub enum Refusal {
     #[error(transparent)]
     Start(#[from] ReplayError),
     /// It has no true yaw rate.
-    #[error("{path}: line {line}: no ref_gyr_z, the true yaw rate, which a training needs in every row")]
+    #[error("{path}: line {line}: no ref_gyr_z, the true yaw rate, which a training needs in every row{}", advice(*course))]
     NoReference {
         /// The recording.
         path: String,
         /// The first line without it.
         line: u64,
+        /// Whether it has a course instead.
+        course: bool,
     },
     /// Rows are missing.
     #[error("{path}: line {line}: {ms:.1} ms after the row before; a training needs a row every 10 ms")]
@@ -68,6 +70,11 @@ pub enum Refusal {
     },
 }
 
+/// Returns the training that a drive with a course alone can have.
+fn advice(course: bool) -> &'static str {
+    if course { "; its ref_yaw trains the linear part: python -m gyronet_train.linear --course" } else { "" }
+}
+
 /// Describes a drive that can be trained on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Examined {
@@ -89,7 +96,8 @@ pub fn examine(path: &Path) -> Result<Examined, Refusal> {
     let mut recording = Recording::read(path)?;
     let named = || recording.path.clone();
     if let Some(row) = recording.rows.iter().find(|row| row.reference.is_none()) {
-        return Err(Refusal::NoReference { path: named(), line: row.line });
+        let course = recording.rows.iter().any(|row| row.course.is_some());
+        return Err(Refusal::NoReference { path: named(), line: row.line, course });
     }
     let period = |pair: &[Row]| pair[1].sample.time.0 - pair[0].sample.time.0;
     let mut pairs = recording.rows.windows(2);
@@ -126,7 +134,8 @@ mod tests {
 
     /// Examines a made drive with a row every 10 ms of (yaw rate, reference) by second of the drive.
     fn examined(name: &str, seconds: u32, rates: impl Fn(f64) -> (f64, String)) -> Result<Examined, String> {
-        let mut csv = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z\n");
+        let mut csv = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,ref_yaw\n");
+        let course = if name == "course" { "0.1" } else { "" };
         for k in 0..seconds * RATE_HZ {
             let noise = 1e-3 * f64::from(k % 3) - 1e-3;
             let time = f64::from(k) * DT;
@@ -134,7 +143,8 @@ mod tests {
             // Every axis flickers as a sensor does; equal readings are stuck ones.
             let (up, gyro) = (9.8 + 10.0 * noise, gyro + noise);
             // Writing to a string does not fail.
-            let _ = writeln!(csv, "{time:.2},{noise},{noise},{up},{noise},{noise},{gyro},{reference}");
+            let _ =
+                writeln!(csv, "{time:.2},{noise},{noise},{up},{noise},{noise},{gyro},{reference},{course}");
         }
         let path = std::env::temp_dir().join(format!("gyronet-examine-{}-{name}.csv", std::process::id()));
         std::fs::write(&path, csv).expect("a writable folder");
@@ -161,6 +171,7 @@ mod tests {
         let without = |time| (0.0, if time < 20.0 { "0".to_owned() } else { String::new() });
         for (name, seconds, reason, rates) in [
             ("blind", 63, "line 2002: no ref_gyr_z", &without as &dyn Fn(f64) -> (f64, String)),
+            ("course", 63, "its ref_yaw trains the linear part", &without),
             ("short", 20, "17 s after the 3 s at rest; a training needs 30", &|time| same(turn(time))),
             ("moving", 63, "starts moving: line ", &|time: f64| same((2.0 * time).sin())),
             ("mirrored", 63, "another unit or sign", &|time: f64| {
