@@ -67,7 +67,8 @@ def load_course_drive(path: Path, noise_deg: float | None = None) -> CourseDrive
         raise ValueError(f"{path}: the course is known in {len(errors)} spans of 10 s, needed are {LEAST_SPANS}")
     typical = np.median(errors)
     if np.median(abs(errors)) > PLAUSIBLE:
-        raise ValueError(f"{path}: ref_yaw turns otherwise than gyr_z, by {np.median(abs(errors)):.2f} rad in 10 s")
+        off = f"ref_yaw turns otherwise than gyr_z, by {np.median(abs(errors)):.2f} rad in 10 s"
+        raise ValueError(f"{path}: {off}: another sign, another drive, or no rest in the first 3 s")
     kept = abs(errors - typical) <= JUMP
     if kept.mean() < 0.75:
         raise ValueError(f"{path}: the course jumps by more than {JUMP} rad in {(~kept).sum()} of {len(kept)} spans of 10 s")
