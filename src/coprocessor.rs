@@ -42,7 +42,7 @@ use crate::model::seconds::SecondsWindow;
 use crate::monitor::{SensorMonitor, TIMEOUT_US};
 use crate::pipeline::Pipeline;
 use crate::sample::{FogSample, ImuSample, Standstill, WheelSample};
-use crate::units::Micros;
+use crate::units::{CentiCelsius, Micros};
 use handover::Handover;
 use heapless::Deque;
 use timeline::Timeline;
@@ -106,6 +106,8 @@ pub struct Coprocessor {
     /// The newest sample: its own time, and when it came.
     sample_time: Micros,
     heard: Micros,
+    /// The newest temperature: some parts send it with one sample in a hundred.
+    temperature: Option<CentiCelsius>,
     /// Rates are withheld.
     paused: bool,
     counters: InputCounters,
@@ -134,6 +136,7 @@ impl Coprocessor {
             frames: Deque::new(),
             sample_time: Micros(0),
             heard: Micros(0),
+            temperature: None,
             paused: false,
             counters: InputCounters::NONE,
         }
@@ -177,7 +180,9 @@ impl Coprocessor {
         if let Some(wheels) = self.poll_wheels() {
             self.pipeline.wheels(wheels);
         }
-        let sample = ImuSample { validity: self.monitor.judge(&sample), ..sample };
+        self.temperature = sample.temperature.or(self.temperature);
+        let validity = self.monitor.judge(&sample);
+        let sample = ImuSample { validity, temperature: self.temperature, ..sample };
         self.report_board();
         let output = self.pipeline.correct(sample).map_err(InputError::Imu)?;
         self.monitor.heard(sample.time, now);

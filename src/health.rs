@@ -15,6 +15,7 @@ pub mod supervisor;
 /// | state | status | entered when | yaw rate on CAN | left when | counter |
 /// |---|---|---|---|---|---|
 /// | init | `Init` | start; the clock jumped before the bias was known | raw gyro, marked initialising | 3 s at rest | `moving` |
+/// | degraded | `Degraded` | start, where earlier drives have shown the bias | gyro less the bias curve | 3 s at rest | `moving` |
 /// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is believed | `missing`, `late`, `implausible` |
 /// | ready | `Ready` | a believable window covers the recent samples | gyro less bias and correction | as above | `windows` |
 /// | fault | `Clipped` | the part says that it is saturated | none, `CLIPPED` | 50 ms after the last such sample | `invalid`, `held` |
@@ -103,8 +104,8 @@ impl Faults {
     pub const CLIPPED: Self = Self(1 << 1);
     /// The part's readings repeat themselves.
     pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate was rejected, a reading of the part or its clock is implausible, or the rates still lack
-    /// more than a window's revision.
+    /// The network's estimate was rejected, a reading of the part or its clock is implausible, the part was moved since
+    /// earlier drives, or the rates still lack more than a window's revision.
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
@@ -222,6 +223,8 @@ pub struct Counters {
     pub contradicted: u32,
     /// Times that the model's mounting was found to be another unit's, and taken out of the correction.
     pub foreign_mountings: u32,
+    /// Static initialisations that found the sensor tilted otherwise than in earlier drives: its mount was moved.
+    pub moved_mounts: u32,
 }
 
 impl Counters {
@@ -240,6 +243,7 @@ impl Counters {
         zero_rate_updates: 0,
         contradicted: 0,
         foreign_mountings: 0,
+        moved_mounts: 0,
     };
 }
 

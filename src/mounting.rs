@@ -50,6 +50,19 @@ impl Levelling {
     }
 }
 
+/// Cosine of the angle from which on a sensor counts as moved: 25 degrees, since streets are no steeper than 15, and the
+/// mean of several is less.
+const MOVED: f32 = 0.906;
+
+/// Returns whether two mean specific forces at standstill are so far apart that the sensor was moved between them.
+#[must_use]
+pub(crate) fn is_moved(before: &[SpecificForce; 3], now: &[SpecificForce; 3]) -> bool {
+    let float = |axis: &SpecificForce| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2;
+    let (before, now) = (before.each_ref().map(float), now.each_ref().map(float));
+    let dot = |a: &[f32; 3], b: &[f32; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+    dot(&before, &now) < MOVED * crate::root::sqrt(dot(&before, &before) * dot(&now, &now))
+}
+
 /// The reason why the accelerometer shows no vertical.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -13,6 +13,7 @@ mod config;
 mod initialised;
 mod output;
 mod report;
+mod sensor_bias;
 mod uncertainty;
 mod wheels;
 mod windows;
@@ -33,6 +34,7 @@ use crate::sample::{Frame, ImuSample, Standstill, WheelSample};
 use crate::model::window::{self, Features, WINDOW};
 use crate::units::{AngularRate, Yaw};
 use initialised::Initialised;
+use sensor_bias::SensorBias;
 use wheels::Wheels;
 use windows::Windows;
 
@@ -47,6 +49,7 @@ pub struct Pipeline {
 #[derive(Debug, Clone)]
 struct State {
     aligner: Aligner,
+    sensor_bias: SensorBias,
     static_init: StaticInit,
     initialised: Option<Initialised>,
     windows: Windows,
@@ -66,6 +69,8 @@ struct State {
     gap_within: u32,
     /// The newest sample as the networks see it.
     inertial: Option<Features>,
+    /// The sensor has another tilt at rest than in earlier drives.
+    moved: bool,
     board: BoardFaults,
     counters: Counters,
 }
@@ -76,6 +81,8 @@ struct Rates {
     prompt: Option<Compensated>,
     navigation: Option<Compensated>,
     settled: Option<Settled>,
+    /// Sigma of the reading's bias before static initialisation, rad/s, where earlier drives have shown the bias.
+    early_sigma: Option<f32>,
 }
 
 impl Pipeline {
@@ -84,6 +91,7 @@ impl Pipeline {
     pub const fn new(config: PipelineConfig) -> Self {
         let state = State {
             aligner: Aligner::START,
+            sensor_bias: SensorBias::START,
             static_init: StaticInit::new(config.static_init),
             initialised: None,
             windows: Windows::START,
@@ -97,6 +105,7 @@ impl Pipeline {
             tick: 0,
             gap_within: 0,
             inertial: None,
+            moved: false,
             board: BoardFaults::NONE,
             counters: Counters::NONE,
         };
@@ -105,6 +114,7 @@ impl Pipeline {
 
     /// Sets the configuration, before the first sample.
     pub fn configure(&mut self, config: PipelineConfig) {
+        self.state.sensor_bias = SensorBias::START;
         self.state.static_init = StaticInit::new(config.static_init);
         self.state.compensator.configure(config.compensate);
         self.state.uncertainty = Uncertainty::new(config.uncertainty);
@@ -118,6 +128,11 @@ impl Pipeline {
     /// a duplicate, the samples after it report [`Faults::GAP`] for as long as after a missing one.
     pub fn correct(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
         let mut frame = self.state.aligner.align(sample).inspect_err(|error| self.refuse(*error))?;
+        let mut sample = sample;
+        let initialised = self.state.initialised.is_some();
+        if self.state.sensor_bias.subtract(&mut sample, &self.config, initialised) {
+            self.state.static_init.restart();
+        }
         frame.sample = self.config.mounting.sample(&sample);
         frame.sample.angular_rate = self.config.gyro_map.rate(frame.sample.angular_rate);
         count(&mut self.state.counters.samples, 1);
@@ -133,7 +148,14 @@ impl Pipeline {
         let initialised = self.state.initialised.as_mut();
         let quiet = initialised.is_some_and(|known| known.quiet.observe(&frame.sample));
         let (rates, refused) = match self.level(&mut frame.sample) {
-            None => (Rates::default(), self.initialise(&frame)),
+            None => {
+                let refused = self.initialise(&frame);
+                let early = self.state.sensor_bias.early(&sample);
+                if let Some((levelling, _)) = early {
+                    frame.sample = levelling.sample(&frame.sample);
+                }
+                (Rates { early_sigma: early.map(|(_, sigma)| sigma), ..Rates::default() }, refused)
+            }
             Some(zero) => (self.estimate_rates(&frame, &zero, quiet), None),
         };
         let vehicle = self.report(&frame, &rates);
@@ -194,7 +216,7 @@ impl Pipeline {
         }
     }
 
-    /// Returns the gyro's static bias, once known.
+    /// Returns the gyro's static bias beyond the bias curve, once known.
     #[must_use]
     pub fn gyro_bias(&self) -> Option<[AngularRate; 3]> {
         self.state.initialised.as_ref().map(|known| known.zero.bias())
@@ -204,6 +226,12 @@ impl Pipeline {
     #[must_use]
     pub fn bias(&self) -> AngularRate {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
+    }
+
+    /// Returns the sigma of the bias when driving, rad/s, once zero-rate updates have begun.
+    #[must_use]
+    pub fn bias_sigma(&self) -> Option<f32> {
+        self.zero_rate().map(ZeroRate::sigma)
     }
 
     /// Returns the rotation that levelling applies, once known.
@@ -287,21 +315,15 @@ impl Pipeline {
             self.state.windows.add(features);
         }
         let settled = self.state.compensator.settled();
-        self.update_bias(settled.as_ref(), good.then_some(rate), quiet, sample);
+        self.update_bias(settled.as_ref(), good.then_some(rate), quiet);
         let bias = self.bias();
         let stands = self.state.stood as usize > self.config.compensate.lag.samples();
         let prompt = self.state.compensator.prompt(bias);
         let navigation = self.state.compensator.navigation(bias, stands);
-        Rates { prompt, navigation, settled }
+        Rates { prompt, navigation, settled, early_sigma: None }
     }
 
-    fn update_bias(
-        &mut self,
-        settled: Option<&Settled>,
-        rate: Option<AngularRate>,
-        quiet: bool,
-        sample: &ImuSample,
-    ) {
+    fn update_bias(&mut self, settled: Option<&Settled>, rate: Option<AngularRate>, quiet: bool) {
         let source = match self.state.wheels.standstill() {
             Some(Standstill::Still) => StandstillSource::Wheels,
             // Where there are wheels they decide.
@@ -309,11 +331,14 @@ impl Pipeline {
             None if quiet => StandstillSource::Inertial,
             None => StandstillSource::None,
         };
-        let State { initialised, compensator, stood, counters, .. } = &mut self.state;
+        let State { initialised, compensator, stood, counters, sensor_bias, .. } = &mut self.state;
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(settled)) = (zero_rate, settled) else { return };
-        match zero_rate.observe(settled.left(), source, sample.temperature) {
-            Some(ZeroRateOutcome::Used) => count(&mut counters.zero_rate_updates, 1),
+        match zero_rate.observe(settled.left(), source, sensor_bias.change_sigma()) {
+            Some(ZeroRateOutcome::Used) => {
+                count(&mut counters.zero_rate_updates, 1);
+                sensor_bias.refer();
+            }
             Some(ZeroRateOutcome::Refused) => count(&mut counters.contradicted, 1),
             Some(ZeroRateOutcome::Waits) | None => {}
         }

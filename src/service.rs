@@ -12,6 +12,7 @@ pub mod device;
 pub mod event;
 #[doc(hidden)]
 pub mod hardware;
+mod learner;
 pub mod message;
 #[doc(hidden)]
 pub mod standstill;
@@ -19,4 +20,5 @@ mod text;
 
 pub use conditions::Conditions;
 pub use device::{Device, MappedSlots, SupportedHardware};
+pub use learner::Learner;
 pub use message::Request;

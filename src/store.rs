@@ -2,7 +2,7 @@
 //!
 //! | what | where | written as | after an interrupted write |
 //! |---|---|---|---|
-//! | [`Configuration`], [`WheelSettings`](crate::can::wheel::WheelSettings), [`Calibration`], [`Troubles`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
+//! | [`Configuration`], [`WheelSettings`](crate::can::wheel::WheelSettings), [`Calibration`], [`Learned`], [`Troubles`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
 //! | weight files | two 128 KiB sectors, [`slots`] | the slot that is not in use | the slot in use |
 //!
 //! It works because new data never overwrites the data in use: an interrupted write leaves the old record or slot
@@ -16,6 +16,7 @@ pub mod configuration;
 mod error;
 #[doc(hidden)]
 pub mod layout;
+mod learned;
 pub(crate) mod record;
 #[doc(hidden)]
 pub mod slots;
@@ -24,9 +25,10 @@ mod upload;
 mod wheels;
 
 pub use access::Access;
-pub use calibration::{BiasPoint, Calibration, Level, UnitMap};
+pub use calibration::{Calibration, Level, UnitMap};
 pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};
 pub use error::{Field, FieldError, FlashFault, StoreError};
+pub use learned::Learned;
 pub use record::{Record, Store};
 pub use slots::{Accepted, Slot};
 pub use troubles::{MOST_TROUBLES, Snapshot, StoredTrouble, Troubles};

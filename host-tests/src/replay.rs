@@ -14,7 +14,7 @@ use gyronet::monitor::{START_US, TIMEOUT_US};
 use gyronet::sample::PERIOD_US;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
-use gyronet::store::{Calibration, Configuration};
+use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::Micros;
 use std::ops::Range;
 
@@ -134,7 +134,7 @@ impl Board {
             clock: Clock::Sensor,
             has_fognet,
             storage: StorageFaults { damaged: is_refused, configuration_lost: false },
-            ..configuration.coprocessor(&Calibration::NONE, 0)
+            ..configuration.coprocessor(&Calibration::NONE, &Learned::NOTHING, 0)
         };
         Self {
             coprocessor: Coprocessor::new(config),

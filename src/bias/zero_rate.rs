@@ -3,7 +3,7 @@
 //! A Kalman filter estimates two states from one-second means of the gyro, less its static bias and its
 //! settled correction:
 //!
-//! - the **bias** b also holds while driving: it is a random walk, faster when the temperature changes;
+//! - the **bias** b also holds while driving: it is a random walk, and changes with temperature;
 //! - the **offset** s holds for one standstill only: an idling engine shakes the sensor differently from
 //!   a road, which shifts the mean of gyro and network. The shift differs from stop to stop and does not
 //!   average out during a stop: without this state, a minute at a traffic light would make the filter
@@ -16,7 +16,7 @@
 
 use super::spread::Spread;
 use crate::sample::RATE_HZ;
-use crate::units::{AngularRate, CentiCelsius};
+use crate::units::AngularRate;
 
 /// Describes the noise of part and vehicle. All values are 1 sigma.
 #[derive(Debug, Clone, Copy)]
@@ -25,8 +25,6 @@ pub struct ZeroRateConfig {
     pub initial: f32,
     /// Random walk of the bias, rad/s per square root of a second.
     pub walk: f32,
-    /// Change of the bias with temperature, rad/s per kelvin.
-    pub per_kelvin: f32,
     /// Offset of a standstill, rad/s.
     pub standstill: f32,
     /// Least noise of a one-second mean, rad/s: no spread is believed to be less.
@@ -41,19 +39,12 @@ pub struct ZeroRateConfig {
 impl ZeroRateConfig {
     /// Holds the noise of a MEMS part on a car. The walk is the one published for an Xsens MTi-100 (OpenVINS,
     /// `config/kaist`); the noise is that part's 1.7e-4 rad/s/sqrt(Hz) over a second, less than
-    /// half of it to let a better part show; 0.005 deg/s per kelvin is typical of the class. The
+    /// half of it to let a better part show. The
     /// offset is measured: between standing and driving the mean error of the corrected rate
     /// changes by 1.3e-4 rad/s RMS over the five training drives and the validation drive, 0.9e-4
     /// on the latter alone.
-    pub const DEFAULT: Self = Self {
-        initial: 1e-4,
-        walk: 1e-5,
-        per_kelvin: 8.7e-5,
-        standstill: 1.4e-4,
-        noise: 5e-5,
-        max_step: 5e-3,
-        max_bias: 0.02,
-    };
+    pub const DEFAULT: Self =
+        Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, max_step: 5e-3, max_bias: 0.02 };
 }
 
 /// Samples of a mean whose spread is taken.
@@ -120,7 +111,8 @@ pub struct ZeroRate {
     turned: [i32; 5],
     turning_for: u8,
     since_walk: u32,
-    temperature: Option<CentiCelsius>,
+    /// Sigma of the change of the bias with temperature since the last update, rad/s.
+    thermal: f32,
 }
 
 impl ZeroRate {
@@ -143,23 +135,24 @@ impl ZeroRate {
             turned: [0; 5],
             turning_for: 0,
             since_walk: 0,
-            temperature: None,
+            thermal: 0.0,
         }
     }
 
     /// Takes the remaining rate of a settled sample (gyro less static bias less the network's estimate; `None` where
-    /// that is not good) and the source that says that the vehicle stands. Returns the outcome of a second of standing
-    /// when one is over.
+    /// that is not good), the source that says that the vehicle stands, and the sigma of the change of the bias with
+    /// temperature since the last outcome [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a second of standing when one is over.
     pub fn observe(
         &mut self,
         left: Option<AngularRate>,
         source: StandstillSource,
-        temperature: Option<CentiCelsius>,
+        thermal: f32,
     ) -> Option<ZeroRateOutcome> {
+        self.thermal = thermal;
         self.since_walk += 1;
         if self.since_walk == RATE_HZ {
             self.since_walk = 0;
-            self.walk(temperature);
+            self.walk();
         }
         if source != self.source {
             self.stop_begins(source);
@@ -250,7 +243,14 @@ impl ZeroRate {
     /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s.
     #[must_use]
     pub fn sigma(&self) -> f32 {
-        crate::root::sqrt(self.covariance.bias)
+        crate::root::sqrt(self.bias_variance())
+    }
+
+    /// Returns the variance of the bias when driving: that of the filter, and that of the change with temperature since
+    /// the last update, (rad/s)^2.
+    fn bias_variance(&self) -> f32 {
+        let largest = self.config.max_bias;
+        (self.covariance.bias + self.thermal * self.thermal).min(largest * largest)
     }
 
     /// Returns whether the wheels stand and the gyro does not contradict them.
@@ -269,16 +269,9 @@ impl ZeroRate {
     }
 
     /// Adds a second of the bias' random walk to its variance.
-    fn walk(&mut self, temperature: Option<CentiCelsius>) {
-        let ZeroRateConfig { walk, per_kelvin, max_bias, .. } = self.config;
-        let change = match (self.temperature, temperature) {
-            (Some(before), Some(now)) => f32::from(now.0) / 100.0 - f32::from(before.0) / 100.0,
-            _ => 0.0,
-        };
-        self.temperature = temperature.or(self.temperature);
-        let thermal = per_kelvin * change;
-        self.covariance.bias =
-            (self.covariance.bias + walk * walk + thermal * thermal).min(max_bias * max_bias);
+    fn walk(&mut self) {
+        let ZeroRateConfig { walk, max_bias, .. } = self.config;
+        self.covariance.bias = (self.covariance.bias + walk * walk).min(max_bias * max_bias);
     }
 
     fn second(&mut self, block: &Spread) -> ZeroRateOutcome {
@@ -288,7 +281,8 @@ impl ZeroRate {
             variance: (block.variance() / (block.count() - 1) as f32).max(noise * noise),
         };
         let step = measured.mean - self.bias - self.offset;
-        let Covariance { bias, both, offset } = self.covariance;
+        let Covariance { both, offset, .. } = self.covariance;
+        let bias = self.bias_variance();
         let gate = match self.source {
             StandstillSource::Wheels => self.wheels_gate(),
             StandstillSource::Inertial => {
@@ -309,6 +303,8 @@ impl ZeroRate {
 
     /// Applies the Kalman filter's measurement update.
     fn update(&mut self, measured: Measurement) {
+        self.covariance.bias = self.bias_variance();
+        self.thermal = 0.0;
         let Covariance { bias, both, offset } = self.covariance;
         let (with_bias, with_offset) = (bias + both, both + offset);
         let innovation = measured.mean - self.bias - self.offset;

@@ -1,15 +1,20 @@
 //! The pipeline's configuration is a plain value apart from the pipeline's state; it holds everything that can be set.
 
-use crate::bias::{EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
+use crate::bias::{BiasCurve, EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::uncertainty::UncertaintyConfig;
+use crate::units::SpecificForce;
 
 /// Holds all settings of the way from sample to rate.
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineConfig {
     /// The rotation of the board in the vehicle.
     pub mounting: Rotation,
+    /// The gyro's bias by temperature, in the sensor's axes, as earlier drives have shown it.
+    pub bias_curve: BiasCurve,
+    /// Mean specific force at standstill, in the sensor's axes, where earlier drives have shown it.
+    pub rest_force: Option<[SpecificForce; 3]>,
     /// The gain and the rest of the mounting of this unit's gyro.
     pub gyro_map: GyroMap,
     /// The condition under which the accelerometer corrects the mounting.
@@ -32,6 +37,8 @@ impl PipelineConfig {
     /// The configuration of a MEMS part on a car, x forward, y left, z up.
     pub const DEFAULT: Self = Self {
         mounting: Rotation::IDENTITY,
+        bias_curve: BiasCurve::UNKNOWN,
+        rest_force: None,
         gyro_map: GyroMap::IDENTITY,
         levelling: Levelling::DEFAULT,
         static_init: StaticConfig::DEFAULT,

@@ -3,7 +3,7 @@
 use super::{Pipeline, PipelineConfig};
 use crate::bias::{QuietDetector, Rest, StaticError, ZeroPoint, ZeroRate};
 use crate::health::count;
-use crate::mounting::Rotation;
+use crate::mounting::{Rotation, is_moved};
 use crate::sample::{Frame, ImuSample, Standstill};
 
 /// Holds the results of static initialisation, and the detectors that start from them.
@@ -44,6 +44,9 @@ impl Pipeline {
     fn accept(&mut self, rest: &Rest) -> Result<(), StaticError> {
         let PipelineConfig { levelling, static_init, earth_rate, zero_rate, quiet, .. } = self.config;
         let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
+        let before = self.config.rest_force.map(|force| self.config.mounting.force(force));
+        self.state.moved = before.is_some_and(|before| is_moved(&before, &rest.specific_force));
+        count(&mut self.state.counters.moved_mounts, u32::from(self.state.moved));
         self.state.initialised = Some(Initialised {
             levelling,
             zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),

@@ -16,11 +16,17 @@ impl Pipeline {
         self.state.tick = frame.tick;
         let faults = self.faults(&frame.sample);
         let accepted = self.state.windows.is_accepted();
-        let prompt =
-            self.estimate(frame, rates.prompt, |_| accepted, |pipeline| &mut pipeline.state.prompt_yaw);
+        let prompt = self.estimate(
+            frame,
+            rates.prompt,
+            rates.early_sigma,
+            |_| accepted,
+            |pipeline| &mut pipeline.state.prompt_yaw,
+        );
         let covered = |rate: &Compensated| rate.covered || accepted;
-        let navigation =
-            self.estimate(frame, rates.navigation, covered, |pipeline| &mut pipeline.state.navigation_yaw);
+        let navigation = self.estimate(frame, rates.navigation, rates.early_sigma, covered, |pipeline| {
+            &mut pipeline.state.navigation_yaw
+        });
         let zero =
             self.state.initialised.as_ref().map_or([AngularRate::ZERO; 3], |known| known.zero.reading());
         let [roll_rate, pitch_rate, _] = frame.sample.angular_rate;
@@ -69,16 +75,18 @@ impl Pipeline {
             .faults()
             .with(Faults::of(sample.validity))
             .with(Faults::GAP.when(self.state.gap_within > 0))
-            .with(Faults::IMPLAUSIBLE.when(self.state.compensator.carry_exceeds_limit()))
+            .with(Faults::IMPLAUSIBLE.when(self.state.moved || self.state.compensator.carry_exceeds_limit()))
             .with(Faults::WHEELS.when(self.state.wheels.are_silent() || contradicted))
             .with(self.state.board.faults())
     }
 
-    /// Makes the estimate of one rate; until a rate exists it carries the gyro's own reading.
+    /// Makes the estimate of one rate; until a rate exists it carries the gyro's own reading, with the sigma that its bias
+    /// has by the table, where there is one.
     fn estimate(
         &mut self,
         frame: &Frame,
         rate: Option<Compensated>,
+        early_sigma: Option<f32>,
         estimated: impl Fn(&Compensated) -> bool,
         yaw: impl Fn(&mut Self) -> &mut Yaw,
     ) -> YawEstimate {
@@ -87,22 +95,23 @@ impl Pipeline {
         let status = match validity {
             Validity::Stuck => Status::Stuck,
             Validity::Saturated | Validity::Recovering | Validity::Implausible => Status::Clipped,
-            Validity::Good if rate.is_none() => Status::Init,
+            Validity::Good if rate.is_none() && early_sigma.is_none() => Status::Init,
             Validity::Good if estimated => Status::Ready,
             Validity::Good => Status::Degraded,
         };
-        let bias = self.zero_rate().map_or(0.0, ZeroRate::sigma);
-        let sigma = rate.map(|_| self.state.uncertainty.sigma(estimated, bias));
-        let turned = rate.map_or(0, |rate| self.state.clock_ratio.turned(rate.rate));
+        let [.., raw] = frame.sample.angular_rate;
+        let used = rate.map(|rate| rate.rate).or_else(|| early_sigma.map(|_| raw));
+        let bias = early_sigma.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma));
+        let sigma = used.map(|_| self.state.uncertainty.sigma(estimated, bias));
+        let turned = used.map_or(0, |rate| self.state.clock_ratio.turned(rate));
         let yaw = yaw(self);
         yaw.0 = yaw.0.wrapping_add(turned);
         let yaw = *yaw;
-        let [.., raw] = frame.sample.angular_rate;
         let tick = rate.map_or(frame.tick, |rate| rate.tick);
         let (source, quality) = judge(status);
         YawEstimate {
             tick,
-            rate: rate.map_or(raw, |rate| rate.rate),
+            rate: used.unwrap_or(raw),
             correction: rate.map_or(AngularRate::ZERO, |rate| rate.correction),
             yaw,
             sigma,

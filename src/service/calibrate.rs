@@ -1,10 +1,10 @@
 //! A calibration at rest finds the gyro's bias, or the tilt of the sensor on level ground.
 
-use crate::bias::{StaticConfig, StaticError, StaticInit};
+use crate::bias::{Rest, StaticConfig, StaticError, StaticInit};
 use crate::mounting::{LevelError, Rotation};
 use crate::sample::ImuSample;
 use crate::store::calibration::MAX_TILT_DEG;
-use crate::store::{Calibration, Level, Mounting};
+use crate::store::{Level, Mounting};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};
 
@@ -69,24 +69,13 @@ impl Calibrator {
         self.task
     }
 
-    /// Takes a sample; with the last one enters what was found into `calibration`.
-    pub fn add(
-        &mut self,
-        sample: &ImuSample,
-        mounting: &Mounting,
-        calibration: &mut Calibration,
-    ) -> Option<Result<(), CalibrationFault>> {
+    /// Takes a sample; with the last one returns the readings at rest.
+    pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, CalibrationFault>> {
         if !sample.validity.is_good() {
             return Some(Err(CalibrationFault::Clipped));
         }
         let judged = self.still.add(sample)?;
-        Some(judged.map_err(fault).and_then(|rest| {
-            match self.task {
-                Task::Static => calibration.add_bias(rest.angular_rate, sample.temperature),
-                Task::Mounting => calibration.level = Some(level(rest.specific_force, mounting)?),
-            }
-            Ok(())
-        }))
+        Some(judged.map_err(fault))
     }
 }
 
@@ -103,7 +92,7 @@ fn fault(error: StaticError) -> CalibrationFault {
 }
 
 /// Returns the roll and pitch that gravity shows, after the configured rotation.
-fn level(force: [SpecificForce; 3], mounting: &Mounting) -> Result<Level, CalibrationFault> {
+pub(crate) fn level(force: [SpecificForce; 3], mounting: &Mounting) -> Result<Level, CalibrationFault> {
     // The angles have been checked to be finite.
     let rotation = mounting.rotation().unwrap_or(Rotation::IDENTITY);
     let [x, y, z] = rotation.force(force).map(|axis| axis.0 as f32);

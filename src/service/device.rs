@@ -8,9 +8,10 @@ mod weights;
 
 pub use weights::MappedSlots;
 
-use super::calibrate::{Calibrator, State, Task};
+use super::calibrate::{Calibrator, State, Task, level};
 use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, LogPage, SensorFault};
+use super::learner::Learner;
 use super::message::{
     AccessCounters, Calibrate, FlashState, Identity, Info, Origin, PROTOCOL, Refusal, Request,
 };
@@ -20,7 +21,7 @@ use crate::health::{Faults, Status};
 use crate::sample::{ImuSample, Standstill};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{
-    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Place, Record, Store, Troubles,
+    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Place, Record, Store, Troubles,
 };
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
@@ -56,6 +57,8 @@ pub struct Device<R: NorFlash, W> {
     wheels_origin: Origin,
     calibration: Calibration,
     calibration_origin: Origin,
+    learned: Learned,
+    learner: Learner,
     calibrator: Option<Calibrator>,
     calibration_state: State,
     accepted: Accepted,
@@ -100,6 +103,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             wheels_origin: Origin::BuiltIn,
             calibration: Calibration::NONE,
             calibration_origin: Origin::BuiltIn,
+            learned: Learned::NOTHING,
+            learner: Learner::new(),
             calibrator: None,
             calibration_state: State::Idle,
             accepted: Accepted::NONE,
@@ -146,6 +151,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         &self.calibration
     }
 
+    /// Returns what the board has learnt about its sensor.
+    #[must_use]
+    pub fn learned(&self) -> &Learned {
+        &self.learned
+    }
+
     /// Notes how setting the sensor up went; the same result again is not noted again.
     pub fn sensor(&mut self, result: Result<(), SensorFault>) {
         let fault = result.err();
@@ -166,21 +177,45 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     ) {
         self.tick = tick;
         self.faults = faults;
-        self.standstill.observe(sample, wheels, &self.configuration.static_init);
+        let limits = &self.configuration.static_init;
+        self.standstill.observe(sample, wheels, limits);
+        if self.configuration.learn_bias {
+            self.learner.observe(sample, wheels, limits, &mut self.learned);
+        }
         if status != self.status {
             self.status = status;
             self.note(EventKind::Status(status));
         }
-        let (Some(calibrator), Some(sample)) = (self.calibrator.as_mut(), sample) else { return };
-        let task = calibrator.task();
-        if let Some(result) = calibrator.add(sample, &self.configuration.mounting, &mut self.calibration) {
-            self.calibrator = None;
-            self.calibration_state = match result {
-                Ok(()) => State::Found(task),
-                Err(fault) => State::Failed(task, fault),
-            };
-            self.note(EventKind::Calibrated(result.err()));
+        if let Some(sample) = sample {
+            self.add_to_calibration(sample);
         }
+    }
+
+    fn add_to_calibration(&mut self, sample: &ImuSample) {
+        let Some(calibrator) = self.calibrator.as_mut() else { return };
+        let task = calibrator.task();
+        let Some(rest) = calibrator.add(sample) else { return };
+        let result = rest.and_then(|rest| {
+            match task {
+                Task::Static => {
+                    // It holds for a sensor that was moved, too.
+                    self.learned.specific_force = Some(rest.specific_force);
+                    if let Some(temperature) = sample.temperature {
+                        self.learner.learn(&rest, temperature, &mut self.learned);
+                    }
+                }
+                Task::Mounting => {
+                    self.calibration.level = Some(level(rest.specific_force, &self.configuration.mounting)?);
+                }
+            }
+            Ok(())
+        });
+        self.calibrator = None;
+        self.calibration_state = match result {
+            Ok(()) => State::Found(task),
+            Err(fault) => State::Failed(task, fault),
+        };
+        self.note(EventKind::Calibrated(result.err()));
     }
 
     /// Executes a request.
@@ -326,11 +361,17 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 self.calibration_state = State::Idle;
             }
             Calibrate::Store => {
-                if !matches!(self.calibration_state, State::Found(_)) {
-                    return Err(Refusal::NothingFound);
+                match self.calibration_state {
+                    State::Found(Task::Static) => self.store_learned()?,
+                    State::Found(Task::Mounting) => self.store_calibration()?,
+                    _ => return Err(Refusal::NothingFound),
                 }
-                self.store_calibration()?;
                 self.calibration_state = State::Idle;
+            }
+            Calibrate::Forget => {
+                self.learned = Learned::NOTHING;
+                self.learner = Learner::new();
+                self.store_learned()?;
             }
             Calibrate::SetUnit(unit) => self.set_unit(unit)?,
         }

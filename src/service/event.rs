@@ -105,6 +105,10 @@ pub enum EventKind {
     KeyStored,
     /// The key was removed: everyone may write.
     KeyRemoved,
+    /// What the board had learnt about its sensor could not be read or stored.
+    LearnedRefused(StoreError),
+    /// What the board has learnt about its sensor was stored.
+    LearnedStored,
 }
 
 /// Something that happened.

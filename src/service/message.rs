@@ -10,7 +10,7 @@ use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
 /// The version of what is encoded as these types; it is raised when one changes.
-pub const PROTOCOL: u8 = 12;
+pub const PROTOCOL: u8 = 13;
 /// Most bytes of a block of weights.
 pub const BLOCK: usize = 256;
 
@@ -58,7 +58,7 @@ impl Request<'_> {
         match self {
             Self::SetConfiguration { .. }
             | Self::SetWheels(_)
-            | Self::Calibrate(Calibrate::Store | Calibrate::SetUnit(_))
+            | Self::Calibrate(Calibrate::Store | Calibrate::Forget | Calibrate::SetUnit(_))
             | Self::WeightsBegin { .. }
             | Self::WeightsBlock { .. }
             | Self::WeightsActivate
@@ -86,6 +86,8 @@ pub enum Calibrate {
     Cancel,
     /// Keep over the next start what was found.
     Store,
+    /// Forget what the board has learnt about its sensor.
+    Forget,
     /// Store the map of this unit's gyro, or none; it holds from the next start on.
     SetUnit(Option<UnitMap>),
 }

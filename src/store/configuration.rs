@@ -3,7 +3,7 @@
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
-use super::{Calibration, Level};
+use super::{Calibration, Learned, Level};
 use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
 use crate::can::diagnosis::DiagnosisIds;
@@ -104,6 +104,8 @@ pub struct Configuration {
     pub diagnosis: DiagnosisIds,
     /// Number of the fibre-optic gyro, 0 where it is not known: FoGNet's weights for one gyro run on that one alone.
     pub fog_serial: u32,
+    /// The board learns the sensor's bias by temperature at standstill, and uses what it has learnt.
+    pub learn_bias: bool,
 }
 
 impl Configuration {
@@ -121,19 +123,23 @@ impl Configuration {
         slcan_inputs: false,
         diagnosis: DiagnosisIds::DEFAULT,
         fog_serial: 0,
+        learn_bias: true,
     };
 }
 
 impl Configuration {
-    /// Makes the pipeline's configuration from this one and a calibration. A level that was found on level ground
+    /// Makes the pipeline's configuration from this one, a calibration and what the board has learnt. A level that was found on level ground
     /// completes the mounting, and levelling by the street is off. The map of the gyro applies only with the weights it
     /// was found with.
     #[must_use]
-    pub fn pipeline(&self, calibration: &Calibration, weights: u32) -> PipelineConfig {
+    pub fn pipeline(&self, calibration: &Calibration, learned: &Learned, weights: u32) -> PipelineConfig {
         // All angles have been checked to be finite.
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let level = calibration.level.as_ref().and_then(Level::rotation);
+        let learned = if self.learn_bias { learned } else { &Learned::NOTHING };
         PipelineConfig {
+            bias_curve: learned.bias_curve,
+            rest_force: learned.specific_force,
             mounting: level.map_or(mounting, |level| mounting.then(&level)),
             gyro_map: calibration.gyro_map(weights).unwrap_or(GyroMap::IDENTITY),
             levelling: if level.is_some() { Levelling::Off } else { Levelling::DEFAULT },
@@ -195,9 +201,14 @@ impl Configuration {
     /// Makes the configuration of a coprocessor that runs the weights with this checksum; the board adds the wheels,
     /// the clock, the networks and damage found at the start.
     #[must_use]
-    pub fn coprocessor(&self, calibration: &Calibration, weights: u32) -> coprocessor::Config {
+    pub fn coprocessor(
+        &self,
+        calibration: &Calibration,
+        learned: &Learned,
+        weights: u32,
+    ) -> coprocessor::Config {
         coprocessor::Config {
-            pipeline: self.pipeline(calibration, weights),
+            pipeline: self.pipeline(calibration, learned, weights),
             // A stored configuration has been checked.
             can: Config::new(self.can).unwrap_or(Config::DEFAULT),
             fog_ids: self.fog_ids,
@@ -211,18 +222,20 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 5;
+    const VERSION: u8 = 6;
 
     /// Returns the bytes that older layouts lack at their end: 1 ended before `fog_ids`, which were [`FOG_IDS`], here
-    /// as varints; 2 ended before `fog_lane`, 3 before `slcan_inputs`, 4 before `fog_serial`.
+    /// as varints; 2 ended before `fog_lane`, 3 before `slcan_inputs`, 4 before `fog_serial`, 5 before
+    /// `learn_bias`.
     fn missing(version: u8) -> Option<&'static [u8]> {
         const ALL: &[u8] =
-            &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0xE0, 0x0F, 0xDF, 0x0F, 0xE8, 0x0F, 0];
+            &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0xE0, 0x0F, 0xDF, 0x0F, 0xE8, 0x0F, 0, 1];
         match version {
             1 => Some(ALL),
             2 => ALL.get(6..),
             3 => ALL.get(12..),
             4 => ALL.get(20..),
+            5 => ALL.get(21..),
             _ => None,
         }
     }

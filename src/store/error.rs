@@ -24,12 +24,10 @@ pub enum Field {
     CompensateMaxMean,
     CompensateMaxSingle,
     CompensateMaxCarry,
-    CalibrationGyroBias,
-    CalibrationTemperature,
-    CalibrationTemperatureOrder,
     CalibrationRollDeg,
     CalibrationPitchDeg,
     CalibrationGyroMap,
+    BiasCurve,
 }
 
 impl Field {
@@ -50,12 +48,10 @@ impl Field {
             Self::CompensateMaxMean => "compensate.max_mean",
             Self::CompensateMaxSingle => "compensate.max_single",
             Self::CompensateMaxCarry => "compensate.max_carry",
-            Self::CalibrationGyroBias => "gyro_bias",
-            Self::CalibrationTemperature => "temperature_table.temperature",
-            Self::CalibrationTemperatureOrder => "temperature_table (order)",
             Self::CalibrationRollDeg => "level.roll_deg",
             Self::CalibrationPitchDeg => "level.pitch_deg",
             Self::CalibrationGyroMap => "gyro_map",
+            Self::BiasCurve => "bias_curve",
         }
     }
 }
@@ -77,8 +73,8 @@ pub enum FieldError {
         /// The largest valid value.
         high: f32,
     },
-    /// The map of the gyro is implausible: an element is too far from the identity.
-    #[error("{}: no unit is so far from the identity", .0.name())]
+    /// No sensor has these values.
+    #[error("{}: no sensor has these values", .0.name())]
     Implausible(Field),
     /// The configuration of the bus messages is invalid.
     #[error("can: {0}")]

@@ -27,6 +27,8 @@ const HEADER: u32 = 2 * WORD_U32;
 pub(crate) const MAX_LEN: usize = 248;
 /// The longest record, with its first and last word.
 const BUFFER: usize = MAX_LEN + 2 * WORD;
+/// Records of the longest kind that must fit after a start.
+const FEW: u32 = 8;
 /// Highest key.
 const MAX_KEY: u8 = 7;
 /// This mark in the header's checksum tells our sectors from other uses of the flash.
@@ -195,8 +197,31 @@ impl<F: NorFlash> Store<F> {
     /// Returns whether the next record of any length fits without an erase.
     #[must_use]
     pub fn has_room(&self) -> bool {
+        self.room() >= BUFFER as u32
+    }
+
+    /// Returns the bytes that are free in the sector in use.
+    fn room(&self) -> u32 {
         let end = self.current.map(|(sector, _)| self.range(sector).end);
-        self.free.zip(end).is_some_and(|(at, end)| at + BUFFER as u32 <= end)
+        self.free.zip(end).map_or(0, |(at, end)| end.saturating_sub(at))
+    }
+
+    /// Moves the newest records to the other sector, which needs an erase, where little room is left. Call it at the
+    /// start, when nothing is lost by an erase: what is stored while the vehicle drives has to fit without one.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`].
+    pub fn make_room(&mut self) -> Result<(), StoreError> {
+        let mut raw = Raw::EMPTY;
+        if self.current.is_none() || self.room() >= FEW * BUFFER as u32 {
+            return Ok(());
+        }
+        for key in 1..=MAX_KEY {
+            if self.find(key, &mut raw)? {
+                return self.change_sector(&raw);
+            }
+        }
+        Ok(())
     }
 
     /// Writes an encoded record. It is separate from [`Store::set`], which is compiled once for each kind of record.
@@ -300,8 +325,12 @@ impl<F: NorFlash> Store<F> {
         if end > self.range(sector).end {
             return Ok(None);
         }
-        self.flash.write(at, raw.bytes()).map_err(fault)?;
-        Ok(Some(end))
+        let written = self.flash.write(at, raw.bytes()).map_err(fault);
+        if written.is_err() {
+            // Some of its words may be programmed.
+            self.free = None;
+        }
+        written.map(|()| Some(end))
     }
 
     /// Starts the other sector with the newest record of each key, the given one among them.
@@ -320,12 +349,12 @@ impl<F: NorFlash> Store<F> {
                 at = self.append(sector, at, &raw)?.ok_or(StoreError::Full)?;
             }
         }
-        self.append(sector, at, newest)?.ok_or(StoreError::Full)?;
+        let free = self.append(sector, at, newest)?.ok_or(StoreError::Full)?;
         self.flash.write(start, &generation.to_le_bytes()).map_err(fault)?;
         self.flash.write(start + WORD_U32, &header_crc(generation).to_le_bytes()).map_err(fault)?;
         // The other sector's was good, if there was one.
         self.header_damaged &= self.current.is_none();
-        self.current = Some((sector, generation));
+        (self.current, self.free) = (Some((sector, generation)), Some(free));
         Ok(())
     }
 }

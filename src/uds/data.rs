@@ -25,7 +25,8 @@
 //! | 0112 | 4 | messages of the fibre-optic gyro since the start, by themselves | |
 //! | 0113 | 4 each | requests that were refused for want of access, in the order of [`AccessCounters`] | |
 //! | 0114 | 1, 4 | FoGNet: 0 off, 1 its weights are used, 2 they are refused (why: 010A); their CRC-32 | |
-//! | 0201 to 021D | | [`super::settings`], each by itself | extended |
+//! | 0115 | postcard | what standstills have shown about the sensor: [`crate::store::Learned`] | |
+//! | 0201 to 021E | | [`super::settings`], each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
 
@@ -101,7 +102,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             out,
             &words!(counters.pipeline => Counters {
                 samples, missing, misplaced, clock_jumps, invalid, moving, windows, clamped_inputs, implausible, late,
-                zero_rate_updates, contradicted, foreign_mountings
+                zero_rate_updates, contradicted, foreign_mountings, moved_mounts
             }),
         ),
         0x0106 => {
@@ -149,6 +150,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             put(out, &[state])?;
             put(out, &crc.to_be_bytes())
         }
+        0x0115 => put_record(out, device.learned()),
         _ => settings::read(id, device, out),
     }
 }

@@ -14,6 +14,8 @@ use embedded_storage::nor_flash::NorFlash;
 
 /// Examines the parts of the board.
 const SELF_TEST: u16 = 0x0204;
+/// Forgets what the board has learnt about its sensor.
+const FORGET: u16 = 0x0205;
 /// Begins a request for the log.
 pub(super) const READ_LOG: [u8; 3] = [1, 0x02, 0x03];
 /// Reads the log.
@@ -91,7 +93,12 @@ impl Services {
             (0x0202, None, RoutineControlType::StartRoutine) => {
                 device.act(&Request::Calibrate(Calibrate::Store)).map_err(nrc)?;
             }
-            (0x0202 | SELF_TEST | USE_DOWNLOAD, None, _) => return Err(Nrc::SubFunctionNotSupported),
+            (FORGET, None, RoutineControlType::StartRoutine) => {
+                device.act(&Request::Calibrate(Calibrate::Forget)).map_err(nrc)?;
+            }
+            (0x0202 | FORGET | SELF_TEST | USE_DOWNLOAD, None, _) => {
+                return Err(Nrc::SubFunctionNotSupported);
+            }
             _ => return Err(Nrc::RequestOutOfRange),
         }
         Ok(())

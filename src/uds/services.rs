@@ -92,6 +92,7 @@ impl Services {
         if !core::mem::replace(&mut self.is_restored, true) {
             self.memory.restore(device.troubles());
         }
+        device.store_what_was_learnt();
         self.memory.observe(&device.conditions());
         if self.memory.is_changed {
             let in_workshop = self.session != Session::Default;
@@ -114,7 +115,10 @@ impl Services {
         self.session != Session::Default
             && matches!(
                 request,
-                [0x2E | 0x34, ..] | [0x27, 2 | 0x82, ..] | [0x31, 1, 0x02, 0x02] | [0x31, 1, 0xFF, 0x01, ..]
+                [0x2E | 0x34, ..]
+                    | [0x27, 2 | 0x82, ..]
+                    | [0x31, 1, 0x02, 0x02 | 0x05]
+                    | [0x31, 1, 0xFF, 0x01, ..]
             )
             || matches!(request, [0x36, ..]) && self.download.as_ref().is_some_and(Download::erases_next)
     }

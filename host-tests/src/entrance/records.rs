@@ -1,12 +1,14 @@
-//! This module reads records in flash: configuration, calibration, and the accepted weights.
+//! This module reads records in flash: configuration, calibration, what was learnt, and the accepted weights.
 
 use super::{Seed, byte, take};
 use crate::synthetic::turning;
 use embedded_storage::nor_flash::ReadNorFlash;
 use gyronet::Coprocessor;
+use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::model::blob::CRC;
-use gyronet::store::{Accepted, Calibration, Configuration, Level, Record, Store};
-use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet::sample::ImuSample;
+use gyronet::store::{Accepted, Calibration, Configuration, Learned, Level, Record, Store};
+use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_tools::target::ram_flash::RamFlash;
 
 /// A sector has this size, smaller than the part's, so that it is soon full.
@@ -21,9 +23,11 @@ pub fn flash(mut data: &[u8]) {
     let mut store = Store::open(flash, 0, false).expect("the flash answers");
     let calibration = store.get::<Calibration>().ok().flatten().unwrap_or_default();
     calibration.check().expect("what is read was checked");
+    let learned = store.get::<Learned>().ok().flatten().unwrap_or(Learned::NOTHING);
+    learned.check().expect("what is read was checked");
     if let Ok(Some(configuration)) = store.get::<Configuration>() {
         configuration.check().expect("what is read was checked");
-        run(&configuration, &calibration);
+        run(&configuration, &calibration, &learned);
     }
     let _ = store.get::<Accepted>();
     if store.set(&Configuration::DEFAULT).is_ok() {
@@ -32,12 +36,12 @@ pub fn flash(mut data: &[u8]) {
 }
 
 /// Runs a few samples through a coprocessor with this configuration.
-fn run(configuration: &Configuration, calibration: &Calibration) {
-    let mut coprocessor = Coprocessor::new(
-        configuration.coprocessor(calibration, calibration.unit.map_or(0, |unit| unit.weights)),
-    );
+fn run(configuration: &Configuration, calibration: &Calibration, learned: &Learned) {
+    let weights = calibration.unit.map_or(0, |unit| unit.weights);
+    let mut coprocessor = Coprocessor::new(configuration.coprocessor(calibration, learned, weights));
     for tick in 0..3 {
-        let sample = turning(tick, AngularRate(1_000));
+        let temperature = Some(CentiCelsius(2_300));
+        let sample = ImuSample { temperature, ..turning(tick, AngularRate(1_000)) };
         coprocessor.imu(sample, sample.time).expect("a place on the grid");
         while coprocessor.next_frame().is_some() {}
     }
@@ -62,19 +66,19 @@ fn fitting(mut data: &[u8]) -> Vec<u8> {
 }
 
 pub fn seeds() -> Vec<Seed> {
-    let mut calibration =
+    let calibration =
         Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Calibration::default() };
-    calibration.add_bias([AngularRate(5), AngularRate(-5), AngularRate(7)], Some(CentiCelsius(2_500)));
-    calibration.add_bias([AngularRate(6), AngularRate(-6), AngularRate(8)], Some(CentiCelsius(4_500)));
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
-    let mut store = Store::open(Flash::new(&[]), 0, false).expect("the flash answers");
-    store.set(&configuration).and_then(|()| store.set(&calibration)).expect("there is room");
+    let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
+    filter.add(CentiCelsius(2_500), [AngularRate(5), AngularRate(-5), AngularRate(7)]);
+    let learned = Learned { bias_curve: filter.curve(), specific_force: Some([SpecificForce(1 << 20); 3]) };
     // The first sector, as the flash has it.
     let mut raw = vec![0; 1 + SECTOR];
     let mut flash = Flash::new(&[]);
     let mut store = Store::open(&mut flash, 0, false);
     if let Ok(store) = &mut store {
-        store.set(&configuration).and_then(|()| store.set(&calibration)).expect("there is room");
+        store.set(&configuration).expect("there is room");
+        store.set(&calibration).and_then(|()| store.set(&learned)).expect("there is room");
     }
     drop(store);
     flash.read(0, &mut raw[1..]).expect("inside");
@@ -90,10 +94,12 @@ pub fn seeds() -> Vec<Seed> {
         (raw[at + 4..at + 4 + len].to_vec(), at + 8 + len.next_multiple_of(4))
     };
     let (first, next) = content(1 + 8);
-    let (second, _) = content(next);
+    let (second, next) = content(next);
+    let (third, _) = content(next);
     vec![
         ("sectors", raw.clone()),
         ("configuration", record(Configuration::KEY, Configuration::VERSION, &first)),
         ("calibration", record(Calibration::KEY, Calibration::VERSION, &second)),
+        ("learned", record(Learned::KEY, Learned::VERSION, &third)),
     ]
 }

@@ -3,14 +3,16 @@
 use crate::common::{self, SLCAN, START};
 use crate::service;
 use embedded_can::{Frame, Id};
-use gyronet::can::yaw::{AngleMessage, RateMessage};
+use gyronet::can::DataFrame;
+use gyronet::can::yaw::{AngleMessage, Quality, RateMessage};
 use gyronet::service::event::{EventKind, SensorFault};
 use gyronet::service::message::AllCounters;
-use gyronet::store::{Configuration, ImuPart};
+use gyronet::store::{Configuration, ImuPart, Learned};
 use gyronet::units::AngularRate;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::stored::Stored;
 use gyronet_tools::client::monitor::line::parse_line;
+use gyronet_tools::drive::wheel_frames;
 use serde_json::json;
 use std::time::Duration;
 
@@ -252,5 +254,61 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off() {
     assert!((100.5..=101.5).contains(&per_second), "{per_second}");
     assert!((turned / expected - 1.0).abs() < 1e-3, "{turned} deg of {expected}");
     assert_eq!(common::counters(&mut board).watch.clock_off, 0);
+    assert_driven_well(&mut board);
+}
+
+/// The frame of wheels that all turn at this speed, km/h.
+fn wheels(speed: f64) -> DataFrame {
+    wheel_frames::frame([Some(speed); 4]).expect("a frame")
+}
+
+/// Runs with a wheel frame every 20 ms.
+fn roll(board: &mut Board, seconds: u32, speed: f64) {
+    for _ in 0..50 * seconds {
+        board.can_send(&wheels(speed));
+        board.run(20 * MS);
+    }
+}
+
+/// The rates of the newest frames, deg/s, and their quality.
+fn judged(board: &mut Board) -> Vec<(f64, Quality)> {
+    let frames = of(board, RATE);
+    let rate = |data: &[u8]| RateMessage::parse(data).expect("eight bytes");
+    let known = frames.iter().map(|(_, data)| rate(data));
+    known.filter_map(|rate| Some((rate.deg_per_sec()?, rate.quality))).collect()
+}
+
+#[test]
+fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands() {
+    const TEST: &str = "what_a_standstill_has_shown_corrects_the_next_start_before_it_stands";
+    /// The bias of the part about its three axes, deg/s.
+    const BIAS: [f64; 3] = [0.2, -0.1, 0.4];
+    let Some(mut board) = equipped(TEST, Configuration::DEFAULT) else { return };
+    board.configure("SPI1.imu_rates_dps", json!(BIAS));
+    board.power_on();
+    board.run(START);
+    roll(&mut board, 8, 0.0);
+    let learned = service::on_line(&mut board).learned().expect("a response");
+    let bias = |learned: &Learned, celsius: f32| {
+        let found = learned.bias_curve.at(celsius).expect("it was learnt").gyro_bias;
+        found.map(|rate| rate.rad_per_sec().to_degrees())
+    };
+    let found = bias(&learned, 25.0);
+    println!("{TEST}: {found:.3?} deg/s");
+    assert!(found.iter().zip(BIAS).all(|(found, bias)| (found - bias).abs() < 0.01), "{found:?}");
+
+    // It drives off with power on, and turns at 5 deg/s.
+    board.power_off();
+    board.configure("SPI1.imu_rates_dps", json!([BIAS[0], BIAS[1], BIAS[2] + 5.0]));
+    board.power_on();
+    board.run(START);
+    let _ = judged(&mut board);
+    roll(&mut board, 2, 30.0);
+    let rates = judged(&mut board);
+    assert!(rates.len() > 150, "{} rates", rates.len());
+    for (rate, quality) in &rates {
+        assert!((rate - 5.0).abs() < 0.1 && *quality == Quality::Degraded, "{rate} deg/s, {quality:?}");
+    }
+    assert_eq!(service::on_line(&mut board).learned().expect("a response").bias_curve, learned.bias_curve);
     assert_driven_well(&mut board);
 }

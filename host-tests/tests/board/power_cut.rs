@@ -10,8 +10,7 @@ use gyronet::model::weights;
 use gyronet::service::message::{BLOCK, FlashState, Info, Origin};
 use gyronet::store::layout::{FLASH_BASE, SLOTS, STORE};
 use gyronet::store::slots::WeightSource;
-use gyronet::store::{Calibration, Configuration, Mounting, Slot};
-use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet::store::{Calibration, Configuration, Level, Mounting, Slot};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::stored::{Stored, other_weights};
 use std::collections::HashSet;
@@ -39,9 +38,7 @@ fn configuration(k: usize) -> Configuration {
 }
 
 fn calibration() -> Calibration {
-    let mut calibration = Calibration::default();
-    calibration.add_bias([AngularRate(5), AngularRate(-6), AngularRate(7)], Some(CentiCelsius(2_000)));
-    calibration
+    Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Calibration::default() }
 }
 
 fn crc(file: &[u8]) -> u32 {

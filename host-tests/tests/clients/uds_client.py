@@ -1,6 +1,6 @@
 """Diagnoses the board with udsoncan over can-isotp, as they are published.
 
-`uds_client.py slcan URL` reads over a serial line. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
+`uds_client.py slcan URL` reads over a serial line, `uds_client.py socketcan vcan0` over an interface of Linux. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
 pipes, with the key and signatures in WEIGHTS.json: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
 comes back the server's frames. Time is counted in turns, so that a slow model of the board breaks no timeout.
 """
@@ -170,14 +170,15 @@ def main():
         with Client(pipes, config=CONFIG) as client:
             write(client, pipes, Path(name).read_bytes(), json.loads(Path(name + ".json").read_text()))
     else:
-        bus = can.Bus(interface="slcan", channel=name, bitrate=500_000)
+        bus = can.Bus(interface=line, channel=name, bitrate=500_000)
         notifier = can.Notifier(bus, [])
         address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=SERVER, rxid=RESPONSE)
         stack = isotp.NotifierBasedCanStack(bus=bus, notifier=notifier, address=address, params={"tx_padding": 0xAA})
         with Client(PythonIsoTpConnection(stack), config=CONFIG) as client:
             configuration = examine(client)
-            # The emulator has no flash controller.
-            refused(0x22, client.write_data_by_identifier, 0x0100, configuration)
+            if line == "slcan":
+                # The emulator has no flash controller.
+                refused(0x22, client.write_data_by_identifier, 0x0100, configuration)
         notifier.stop()
         bus.shutdown()
     print("done")

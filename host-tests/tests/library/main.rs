@@ -6,6 +6,7 @@ mod align;
 mod align_faults;
 mod align_streams;
 mod bias;
+mod bias_curve;
 mod blob;
 mod bosch_set;
 mod bosch_tx1;

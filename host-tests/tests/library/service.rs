@@ -4,6 +4,7 @@ mod access;
 mod calibration;
 mod configuration;
 mod isotp;
+mod learning;
 mod log;
 mod uds;
 mod weights;

@@ -2,19 +2,19 @@
 
 use embedded_can::ExtendedId;
 use embedded_storage::nor_flash::NorFlash;
+use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::can::config::{ConfigError, YawSettings};
 use gyronet::can::e2e::{P02, Profile};
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelConfigError, WheelFrame, WheelSettings, WheelSignal};
 use gyronet::model::blob::CRC;
-use gyronet::sample::RATE_HZ;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
-    Accepted, Calibration, Configuration, Field, FieldError, FogLane, Level, Mounting, Place, Record, Slot,
-    Store, StoreError,
+    Accepted, Calibration, Configuration, Field, FieldError, FogLane, Learned, Level, Mounting, Place,
+    Record, Slot, Store, StoreError,
 };
-use gyronet::units::{AngularRate, CentiCelsius, Duration, WheelSpeed};
+use gyronet::units::{AngularRate, CentiCelsius, Duration, SpecificForce, WheelSpeed};
 use gyronet_host_tests::flash::{F405, Region};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;
@@ -108,14 +108,16 @@ fn records_come_back() {
     let mut store = open(&flash);
     assert_eq!(store.get::<Configuration>(), Ok(None));
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
-    let mut calibration =
+    let calibration =
         Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Default::default() };
-    calibration.add_bias([AngularRate(5), AngularRate(-5), AngularRate(7)], Some(CentiCelsius(2_500)));
+    let learned = Learned { specific_force: Some([SpecificForce(1 << 20); 3]), ..Learned::NOTHING };
     store.set(&configuration).expect("it is stored");
+    store.set(&learned).expect("it is stored");
     store.set(&calibration).expect("it is stored");
     for mut store in [store, open(&flash)] {
         assert_eq!(store.get::<Configuration>(), Ok(Some(configuration)));
-        assert_eq!(store.get::<Calibration>(), Ok(Some(calibration.clone())));
+        assert_eq!(store.get::<Calibration>(), Ok(Some(calibration)));
+        assert_eq!(store.get::<Learned>(), Ok(Some(learned)));
         assert_eq!(store.get::<Accepted>(), Ok(None));
         assert!(!store.damaged());
     }
@@ -156,11 +158,11 @@ fn a_value_out_of_its_range_is_refused() {
     can.yaw = can.yaw.map(|yaw| YawSettings { period_ms: 15, ..yaw });
     let refused = store.set(&Configuration { can, ..default });
     assert_eq!(refused, Err(StoreError::Field(FieldError::Can(ConfigError::Period(15)))));
-    let wild = Calibration { gyro_bias: Some([AngularRate(i32::MAX); 3]), ..Default::default() };
-    assert!(matches!(
-        store.set(&wild),
-        Err(StoreError::Field(FieldError::Range { field: Field::CalibrationGyroBias, .. }))
-    ));
+    let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
+    (0..100).for_each(|_| filter.add(CentiCelsius(11_000), [AngularRate(i32::MAX); 3]));
+    let wild = Learned { bias_curve: filter.curve(), specific_force: None };
+    let refused = Err(StoreError::Field(FieldError::Implausible(Field::BiasCurve)));
+    assert_eq!(store.set(&wild), refused);
     assert_eq!(flash.borrow().operations(), 0, "nothing was written");
 }
 
@@ -199,7 +201,10 @@ fn another_layout_is_named() {
     let flash = Flash::default();
     let mut store = open(&flash);
     store.set(&Later { value: 7 }).expect("it is stored");
-    assert_eq!(store.get::<Configuration>(), Err(StoreError::Version { found: 6, expected: 5 }));
+    assert_eq!(
+        store.get::<Configuration>(),
+        Err(StoreError::Version { found: Later::VERSION, expected: Configuration::VERSION })
+    );
     store.set(&Alien { value: [200; 3] }).expect("it is stored");
     assert_eq!(store.get::<Configuration>(), Err(StoreError::Encoding));
 }
@@ -339,19 +344,28 @@ fn slots_are_checked() {
 }
 
 #[test]
-fn the_bias_table_stays_sorted_and_bounded() {
-    let mut calibration = Calibration::default();
-    let bias = |z| [AngularRate(0), AngularRate(0), AngularRate(z)];
-    for (celsius, z) in [(40, 400), (0, 0), (20, 100), (22, 120)] {
-        calibration.add_bias(bias(z), Some(CentiCelsius(celsius * 100)));
-    }
-    let table =
-        calibration.temperature_table.iter().map(|point| (point.temperature.0 / 100, point.gyro_bias[2].0));
-    assert_eq!(table.collect::<Vec<_>>(), [(0, 0), (22, 120), (40, 400)], "22 deg C has replaced 20");
-    assert_eq!(calibration.gyro_bias, Some(bias(120)));
-    for k in 0..2 * RATE_HZ as i16 {
-        calibration.add_bias(bias(1), Some(CentiCelsius(k * 77 - 4000)));
-        calibration.check().expect("it stays sorted and bounded");
+fn a_start_makes_room_where_little_is_left() {
+    let flash = Flash::default();
+    let mut store = open(&flash);
+    let learned = Learned::NOTHING;
+    store.set(&learned).expect("it is stored");
+    // Each of the two sectors is full once.
+    for turn in 0..2 {
+        while store.has_room() {
+            store.set(&learned).expect("it is stored");
+        }
+        let before = flash.borrow().operations();
+        store.make_room().expect("the flash answers");
+        assert!(store.has_room() && flash.borrow().operations() > before, "turn {turn}");
+        let after = flash.borrow().operations();
+        store.make_room().expect("the flash answers");
+        assert_eq!(flash.borrow().operations(), after, "turn {turn}: there is room");
+        let latitude = Configuration { latitude_deg: Some(turn as f32), ..Configuration::DEFAULT };
+        store.set(&latitude).expect("it is stored without a read before");
+        let mut restarted = open(&flash);
+        assert_eq!(restarted.get(), Ok(Some(latitude)), "turn {turn}");
+        assert_eq!(restarted.get::<Learned>(), Ok(Some(learned)), "turn {turn}");
+        assert!(!restarted.damaged(), "turn {turn}");
     }
 }
 

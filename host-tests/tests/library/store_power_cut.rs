@@ -1,11 +1,11 @@
-//! Power cuts at every operation of a configuration write, a calibration write and a weight
+//! Power cuts at every operation of a configuration write, a write of the bias curve and a weight
 //! upload, on a flash with the F405's rules: the old or the new is always there, whole.
 
 use gyronet::model::weights;
 use gyronet::store::layout::{self, SLOT_SIZE};
 use gyronet::store::slots::{Selection, WeightSource, select};
-use gyronet::store::{Accepted, Calibration, Configuration, Place, Record, Slot};
-use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet::store::{Accepted, Configuration, Learned, Place, Record, Slot};
+use gyronet::units::SpecificForce;
 use gyronet_host_tests::flash::{Cut, F405};
 use gyronet_host_tests::stored::{open, other_weights, slots, upload};
 use std::cell::RefCell;
@@ -15,13 +15,9 @@ fn configuration(k: usize) -> Configuration {
     Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT }
 }
 
-fn calibration(k: usize) -> Calibration {
-    let mut calibration = Calibration::default();
-    for point in 0..8 {
-        let bias = [AngularRate(k as i32), AngularRate(-(k as i32)), AngularRate(point)];
-        calibration.add_bias(bias, Some(CentiCelsius(point as i16 * 1000)));
-    }
-    calibration
+fn learned(k: usize) -> Learned {
+    let force = [SpecificForce(1 << 20), SpecificForce(k as i32), SpecificForce(-(k as i32))];
+    Learned { specific_force: Some(force), ..Learned::NOTHING }
 }
 
 /// Flash contents before writes that need the most different operations: the first of all, a
@@ -31,7 +27,7 @@ fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
     // The other records must survive too.
     let mut store = open(&flash).expect("an empty flash");
     store.set(&Accepted::NONE.with(Place::Slot(Slot::B), 7)).expect("it is stored");
-    store.set(&calibration(1)).expect("it is stored");
+    store.set(&learned(1)).expect("it is stored");
     store.set(&configuration(1)).expect("it is stored");
     store.set(&make(1)).expect("it is stored");
     let (mut starts, mut plain, mut changes) = (Vec::new(), 0, 0);
@@ -67,7 +63,7 @@ fn whole<R: Record + PartialEq + std::fmt::Debug>(
     let accepted = store.get::<Accepted>().unwrap_or_else(|error| panic!("{at}: {error}"));
     assert_eq!(accepted, Some(Accepted::NONE.with(Place::Slot(Slot::B), 7)), "{at}");
     if R::KEY == Configuration::KEY {
-        assert_eq!(store.get::<Calibration>(), Ok(Some(calibration(1))), "{at}");
+        assert_eq!(store.get::<Learned>(), Ok(Some(learned(1))), "{at}");
     } else {
         assert_eq!(store.get::<Configuration>(), Ok(Some(configuration(1))), "{at}");
     }
@@ -115,7 +111,7 @@ fn a_cut_while_a_configuration_is_written_leaves_the_old_or_the_new_one() {
 
 #[test]
 fn a_cut_while_a_calibration_is_written_leaves_the_old_or_the_new_one() {
-    every_cut("calibration", calibration);
+    every_cut("calibration", learned);
 }
 
 /// Returns the weights that the board would run on after a restart.

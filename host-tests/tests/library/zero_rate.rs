@@ -5,7 +5,7 @@ use gyronet::estimate::YawEstimate;
 use gyronet::health::{Faults, Status};
 use gyronet::pipeline::{Output, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, RATE_HZ, Standstill, WHEELS, WheelSample};
-use gyronet::units::{AngularRate, CentiCelsius, WheelSpeed};
+use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stream::constant;
 use gyronet_host_tests::synthetic::{force, rate, turning};
@@ -181,28 +181,28 @@ fn locked_wheels_in_a_turn_never_hold_the_rate_at_zero() {
 #[test]
 fn uncertainty_grows_with_time_and_temperature_and_shrinks_at_stops() {
     let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
-    let mut go = |seconds: u32, source, celsius: i16| {
+    let mut go = |seconds: u32, source, thermal: f32| {
         for _ in 0..100 * seconds {
-            zero_rate.observe(Some(rate(0.0001)), source, Some(CentiCelsius(100 * celsius)));
+            zero_rate.observe(Some(rate(0.0001)), source, thermal);
         }
         (zero_rate.sigma(), zero_rate.bias().rad_per_sec())
     };
-    let (start, _) = go(1, StandstillSource::None, 20);
-    let (stop, bias) = go(20, StandstillSource::Wheels, 20);
+    let (start, _) = go(1, StandstillSource::None, 0.0);
+    let (stop, bias) = go(20, StandstillSource::Wheels, 0.0);
     assert!(stop < start && bias > 0.0, "{start} {stop} {bias}");
-    let (drive, kept) = go(600, StandstillSource::None, 20);
+    let (drive, kept) = go(600, StandstillSource::None, 0.0);
     assert!(drive > stop && (drive / stop) < 5.0, "{stop} {drive}");
     assert!(kept > 0.0 && kept < bias, "the offset of the stop is no bias: {bias} {kept}");
-    let (warm, _) = go(2, StandstillSource::None, 40);
-    assert!((warm - 20.0 * ZeroRateConfig::DEFAULT.per_kelvin).abs() < 2e-4, "{warm}");
-    let (hot, _) = go(2, StandstillSource::None, 327);
+    let (warm, _) = go(2, StandstillSource::None, 0.0017);
+    assert!((warm - 0.0017).abs() < 2e-4, "{warm}");
+    let (hot, _) = go(2, StandstillSource::None, 0.1);
     // The root of the bound is right to 2e-6.
     assert!(hot <= ZeroRateConfig::DEFAULT.max_bias * (1.0 + 2e-6), "bounded: {hot}");
 }
 
 /// Feeds a second of standing by the wheels.
 fn second(zero_rate: &mut ZeroRate, left: f64) -> Option<ZeroRateOutcome> {
-    let sample = |_| zero_rate.observe(Some(rate(left)), StandstillSource::Wheels, None);
+    let sample = |_| zero_rate.observe(Some(rate(left)), StandstillSource::Wheels, 0.0);
     (0..RATE_HZ).filter_map(sample).last()
 }
 
@@ -224,9 +224,9 @@ fn a_stop_begins_without_the_offset_of_the_one_before() {
         let _ = second(&mut zero_rate, 0.002);
     }
     let standing = zero_rate.bias();
-    zero_rate.observe(None, StandstillSource::None, None);
+    zero_rate.observe(None, StandstillSource::None, 0.0);
     let driving = zero_rate.bias();
     assert!(2 * standing.0 > 3 * driving.0 && driving.0 > 0, "{standing:?} {driving:?}");
-    zero_rate.observe(Some(rate(0.002)), StandstillSource::Wheels, None);
+    zero_rate.observe(Some(rate(0.002)), StandstillSource::Wheels, 0.0);
     assert_eq!(zero_rate.bias(), driving);
 }

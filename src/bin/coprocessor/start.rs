@@ -78,7 +78,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
             damaged: device.stored_damaged() || of_other_weights,
             configuration_lost: device.configuration_lost(),
         },
-        ..configuration.coprocessor(device.calibration(), weights)
+        ..configuration.coprocessor(device.calibration(), device.learned(), weights)
     };
     receive(board, configuration, device.wheels(), &config);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);

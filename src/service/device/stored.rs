@@ -5,7 +5,8 @@ use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{
-    Accepted, Access, Calibration, Configuration, FieldError, Record, Store, StoreError, Troubles, UnitMap,
+    Accepted, Access, Calibration, Configuration, FieldError, Learned, Record, Store, StoreError, Troubles,
+    UnitMap,
 };
 use embedded_storage::nor_flash::NorFlash;
 
@@ -64,6 +65,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         (self.wheels, self.wheels_origin) = (wheels.unwrap_or(WheelSettings::TOYOTA), origin);
         let (calibration, origin) = self.take(store.get(), EventKind::CalibrationRefused);
         (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
+        let (learned, _) = self.take(store.get(), EventKind::LearnedRefused);
+        self.learned = learned.unwrap_or(Learned::NOTHING);
         let (accepted, _) = self.take(store.get(), EventKind::AcceptedRefused);
         self.accepted = accepted.unwrap_or(Accepted::NONE);
         match store.get() {
@@ -74,6 +77,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             (_, Origin::Refused(_)) => None,
             (access, _) => Some(access.unwrap_or(Access::OPEN)),
         };
+        if self.writable
+            && let Err(error) = store.make_room()
+        {
+            self.note(EventKind::LearnedRefused(error));
+        }
         self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
         self.store = self.writable.then_some(store);
     }
@@ -148,10 +156,18 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         {
             return Err(Refusal::OtherWeights { found, runs });
         }
-        let calibration = Calibration { unit, ..self.calibration.clone() };
+        let calibration = Calibration { unit, ..self.calibration };
         calibration.check().map_err(StoreError::from)?;
         self.calibration = calibration;
         self.store_calibration()
+    }
+
+    pub(super) fn store_learned(&mut self) -> Result<(), Refusal> {
+        let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
+        store.set(&self.learned)?;
+        self.learner.is_changed = false;
+        self.note(EventKind::LearnedStored);
+        Ok(())
     }
 
     pub(super) fn store_calibration(&mut self) -> Result<(), Refusal> {
@@ -176,6 +192,19 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Returns the troubles as they were stored last.
     pub(crate) fn troubles(&self) -> &Troubles {
         &self.troubles
+    }
+
+    /// Stores what the sensor has shown since it was stored, where that needs no erase and the vehicle stands.
+    #[inline(never)]
+    pub(crate) fn store_what_was_learnt(&mut self) {
+        let has_room = self.store.as_ref().is_some_and(Store::has_room);
+        if self.learner.is_changed && has_room && self.standstill.is_open() {
+            // One that the flash refuses is not tried again and again.
+            self.learner.is_changed = false;
+            if let Err(Refusal::Store(error)) = self.store_learned() {
+                self.note(EventKind::LearnedRefused(error));
+            }
+        }
     }
 
     /// Stores the troubles, which needs an erase now and then: that waits for `may_erase` and standstill. Returns

@@ -178,7 +178,8 @@ fn what_is_unsigned_cut_foreign_or_changed_is_refused() {
     ] {
         let response = bench.ask(&request);
         // A cut trailer takes a byte of the content for its own first one.
-        let is_cut = what == "cut" && response == Some(vec![0x7F, 0x2E, 0x13]);
+        let is_cut =
+            what == "cut" && [0x13, 0x31].iter().any(|code| response == Some(vec![0x7F, 0x2E, *code]));
         assert!(is_cut || response == Some(vec![0x7F, 0x2E, code]), "{what}: {response:02x?}");
         if !is_cut {
             assert_eq!(refusal(&mut bench), reason, "{what}");
@@ -403,7 +404,8 @@ fn keys_that_come_and_go_are_in_the_log() {
     let remove = [&[0x2E, 1, 0x10][..], &[0; 32], &key.trailer(0x0110, None, 1, &[0; 32])].concat();
     bench.expect(&remove, &[0x6E, 1, 0x10]);
     let kinds: Vec<EventKind> = bench.board.events(before).events.iter().map(|event| event.kind).collect();
-    assert_eq!(kinds, [EventKind::KeyStored, EventKind::KeyRemoved]);
+    let keys = kinds.into_iter().filter(|kind| *kind != EventKind::LearnedStored);
+    assert_eq!(keys.collect::<Vec<_>>(), [EventKind::KeyStored, EventKind::KeyRemoved]);
 }
 
 /// A record of a later firmware, for one: nobody may write, and the board reports why.

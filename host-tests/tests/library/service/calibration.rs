@@ -1,16 +1,18 @@
 //! A calibration runs at standstill, and its result is stored when that is asked for.
 
 use super::{Board, ask, sample, set, start};
+use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::GyroMap;
 use gyronet::sample::Standstill;
 use gyronet::service::Request;
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::message::{Calibrate, Refusal};
-use gyronet::store::{Calibration, Configuration, Level, Mounting, UnitMap};
+use gyronet::store::{Configuration, Learned, Mounting, UnitMap};
 use gyronet::uds::isotp::LONGEST;
-use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::stored::open;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -41,6 +43,7 @@ fn calibration_is_found_and_kept() {
         State::Failed(Task::Static, CalibrationFault::Moving(0))
     );
     assert_eq!(ask(&mut board, &store), Err(Refusal::NothingFound));
+    let mut board = start(&flash);
     assert_eq!(calibrate(&mut board, Task::Static, level, 0.001), State::Found(Task::Static));
     assert_eq!(ask(&mut board, &store), Ok(()));
     // Rolled by 30 deg: gravity shows on y.
@@ -52,11 +55,10 @@ fn calibration_is_found_and_kept() {
         State::Failed(Task::Mounting, CalibrationFault::Tilted(90.0))
     );
     let board = start(&flash);
-    let calibration = board.calibration();
-    let level = calibration.level.expect("it was stored");
+    let level = board.calibration().level.expect("it was stored");
     assert!((level.roll_deg - 30.0).abs() < 1e-3 && level.pitch_deg.abs() < 1e-3, "{level:?}");
-    let bias = calibration.gyro_bias.expect("it was stored");
-    assert!(bias.iter().all(|rate| (rate.rad_per_sec() - 0.01).abs() < 1e-5), "{bias:?}");
+    let bias = board.learned().bias_curve.at(30.0).expect("it was stored").gyro_bias;
+    assert!(bias.iter().all(|rate| (rate.rad_per_sec() - 0.01).abs() < 1e-4), "{bias:?}");
 }
 
 #[test]
@@ -72,7 +74,8 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
     assert_eq!(ask(&mut board, &set(runs)), Ok(()));
     let board = start(&flash);
     assert_eq!(board.calibration().gyro_map(runs), Some(gyro_map));
-    let of = |weights| Configuration::DEFAULT.pipeline(board.calibration(), weights).gyro_map;
+    let of =
+        |weights| Configuration::DEFAULT.pipeline(board.calibration(), board.learned(), weights).gyro_map;
     assert_eq!((of(runs), of(runs ^ 1)), (gyro_map, GyroMap::IDENTITY));
     assert_eq!(GyroMap::from_elements([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.0, 1.0]]), None);
     assert_eq!(GyroMap::from_elements([[f32::NAN, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None);
@@ -93,13 +96,13 @@ fn configured_rotation_comes_first() {
 }
 
 #[test]
-fn the_longest_calibration_fits_a_response() {
-    let mut calibration = Calibration::default();
-    for k in 0..8 {
-        calibration.add_bias([AngularRate(-(1 << 27)); 3], Some(CentiCelsius(k * 1000 - 4000)));
-    }
-    calibration.level = Some(Level { roll_deg: -1.5, pitch_deg: 1.5 });
-    calibration.unit = Some(UnitMap { gyro_map: GyroMap::IDENTITY, weights: u32::MAX });
-    let record = postcard::to_stdvec(&calibration).expect("there is room");
+fn what_was_learnt_fits_a_response_and_a_record() {
+    let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
+    filter.add(CentiCelsius(-3_000), [AngularRate(-11_000_000); 3]);
+    let learned =
+        Learned { bias_curve: filter.curve(), specific_force: Some([SpecificForce(-10_000_000); 3]) };
+    let record = postcard::to_stdvec(&learned).expect("there is room");
     assert!(record.len() + 4 <= LONGEST, "{} bytes", record.len());
+    let flash = Rc::new(RefCell::new(F405::default()));
+    assert_eq!(open(&flash).expect("an empty flash").set(&learned), Ok(()));
 }

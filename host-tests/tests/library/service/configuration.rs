@@ -50,7 +50,7 @@ fn configuration_is_kept_whole() {
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
     assert_eq!(ask(&mut board, &set(&with_fog)), refused(FieldError::PartNotInImage));
     let request = Request::SetConfiguration { version: 9, configuration: &wanted };
-    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 5 }));
+    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 6 }));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 

@@ -326,8 +326,8 @@ fn a_static_calibration_runs_as_a_routine() {
     bench.stand();
     bench.expect(&[0x31, 3, 2, 0], &[0x71, 3, 2, 0, 2]);
     bench.expect(&[0x31, 1, 2, 2], &[0x71, 1, 2, 2]);
-    assert_eq!(start(&flash).calibration(), bench.board.calibration());
-    assert_ne!(start(&flash).calibration(), &gyronet::store::Calibration::NONE);
+    assert_eq!(start(&flash).learned(), bench.board.learned());
+    assert_ne!(start(&flash).learned(), &gyronet::store::Learned::NOTHING);
 }
 
 /// Downloads a file; returns the response to the last step.
@@ -418,7 +418,7 @@ fn settings_are_read_and_written_one_by_one() {
     bench.expect(&[0x2E, 2, 0x04, 0, 0], &[0x7F, 0x2E, 0x13]);
     bench.expect(&[0x2E, 2, 0x01, 9], &[0x7F, 0x2E, 0x13]);
     bench.expect(&[0x2E, 2, 0x00, 0], &[0x7F, 0x2E, 0x31]);
-    bench.expect(&[0x2E, 2, 0x1E, 0], &[0x7F, 0x2E, 0x31]);
+    bench.expect(&[0x2E, 2, 0x1F, 0], &[0x7F, 0x2E, 0x31]);
     assert_eq!(start(&flash).configuration().mounting.yaw_deg, 90.0);
 }
 

@@ -1,26 +1,29 @@
-//! A calibration as readable names and values.
+//! A calibration and what the board has learnt about its sensor, as readable names and values.
 
 use super::settings::{shortest, value};
-use gyronet::store::Calibration;
-use gyronet::units::AngularRate;
+use gyronet::store::{Calibration, Learned};
+use gyronet::units::SpecificForce;
 use serde_json::{Value, json};
 
-/// Hundredths of a degree in one.
-const CENTI: f64 = 100.0;
+/// The bias by temperature is printed at these, deg C.
+const TEMPERATURES: [f32; 6] = [-20.0, 0.0, 20.0, 40.0, 60.0, 80.0];
 
-/// A calibration by names with units.
+/// Both by names with units.
 ///
 /// # Errors
 /// [`serde_json::Error`], which no calibration gives.
-pub fn to_value(calibration: &Calibration) -> serde_json::Result<Value> {
-    let rates = |rates: [AngularRate; 3]| rates.map(shortest);
-    let points = calibration.temperature_table.iter().map(|point| {
-        let temperature = f64::from(point.temperature.0) / CENTI;
-        json!({ "temperature_c": temperature, "gyro_bias_rad_per_s": rates(point.gyro_bias) })
+pub fn to_value(calibration: &Calibration, learned: &Learned) -> serde_json::Result<Value> {
+    let points = TEMPERATURES.into_iter().filter_map(|celsius| {
+        let bias = learned.bias_curve.at(celsius)?;
+        Some(json!({
+            "temperature_c": celsius,
+            "gyro_bias_rad_per_s": bias.gyro_bias.map(shortest),
+            "sigma_rad_per_s": bias.sigma,
+        }))
     });
     Ok(json!({
-        "gyro_bias_rad_per_s": calibration.gyro_bias.map(rates),
-        "temperature_table": points.collect::<Value>(),
+        "bias_curve": points.collect::<Value>(),
+        "specific_force_m_per_s2": learned.specific_force.map(|force| force.map(SpecificForce::metre_per_sec2)),
         "level": value(&calibration.level)?,
         "unit": calibration.unit.map(|unit| {
             json!({ "gyro_map": unit.gyro_map.elements(), "weights": unit.weights })
@@ -31,25 +34,29 @@ pub fn to_value(calibration: &Calibration) -> serde_json::Result<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gyronet::bias::CurveFilter;
     use gyronet::store::Level;
-    use gyronet::units::CentiCelsius;
+    use gyronet::units::{AngularRate, CentiCelsius};
 
     #[test]
     fn codes_have_units() {
         let bias = [0.01, -0.002, 0.0].map(|rate| AngularRate::from_rad_per_sec(rate).unwrap());
-        let mut calibration = Calibration::NONE;
+        let (mut calibration, mut learned) = (Calibration::NONE, Learned::NOTHING);
         assert_eq!(
-            to_value(&calibration).unwrap(),
-            json!({ "gyro_bias_rad_per_s": null, "temperature_table": [], "level": null, "unit": null })
+            to_value(&calibration, &learned).unwrap(),
+            json!({ "bias_curve": [], "specific_force_m_per_s2": null, "level": null, "unit": null })
         );
-        calibration.add_bias(bias, Some(CentiCelsius(2_150)));
+        let mut filter = CurveFilter::new(&learned.bias_curve);
+        (0..100).for_each(|_| filter.add(CentiCelsius(2_000), bias));
+        learned.bias_curve = filter.curve();
+        learned.specific_force = Some([SpecificForce(1 << 20); 3]);
         calibration.level = Some(Level { roll_deg: 1.5, pitch_deg: -0.25 });
-        let value = to_value(&calibration).unwrap();
-        let [x, y, z] = [0, 1, 2].map(|axis| value["gyro_bias_rad_per_s"][axis].as_f64().unwrap());
-        assert!((x - 0.01).abs() < 1e-6 && (y + 0.002).abs() < 1e-6 && z == 0.0, "{value}");
-        let point = &value["temperature_table"][0];
-        assert_eq!(point["gyro_bias_rad_per_s"], value["gyro_bias_rad_per_s"]);
-        assert_eq!(point["temperature_c"], 21.5);
+        let value = to_value(&calibration, &learned).unwrap();
+        let point = &value["bias_curve"][2];
+        let [x, y, z] = [0, 1, 2].map(|axis| point["gyro_bias_rad_per_s"][axis].as_f64().unwrap());
+        assert!((x - 0.01).abs() < 1e-4 && (y + 0.002).abs() < 1e-4 && z == 0.0, "{value}");
+        assert_eq!(point["temperature_c"], 20.0);
+        assert_eq!(value["specific_force_m_per_s2"], json!([1.0, 1.0, 1.0]));
         assert_eq!(value["level"], json!({ "roll_deg": 1.5, "pitch_deg": -0.25 }));
     }
 }

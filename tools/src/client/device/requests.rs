@@ -9,7 +9,7 @@ use gyronet::health::{Counters, InputCounters, MonitorCounters};
 use gyronet::service::calibrate::{State, Task};
 use gyronet::service::event::LogPage;
 use gyronet::service::message::{AccessCounters, AllCounters, Info, LineCounters, PROTOCOL};
-use gyronet::store::{Calibration, Configuration, Record, UnitMap};
+use gyronet::store::{Calibration, Configuration, Learned, Record, UnitMap};
 use gyronet::uds::Session;
 use serde::de::value::{Error, SeqAccessDeserializer};
 use serde::de::{DeserializeOwned, DeserializeSeed, IntoDeserializer, SeqAccess};
@@ -33,6 +33,7 @@ pub const FOG_MESSAGES: u16 = 0x0112;
 /// Who may write.
 pub const ACCESS: u16 = 0x0111;
 const ACCESS_COUNTERS: u16 = 0x0113;
+const LEARNED: u16 = 0x0115;
 /// The request for all counters.
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
@@ -47,6 +48,7 @@ const STATIC: u16 = 0x0200;
 const MOUNTING: u16 = 0x0201;
 const STORE_CALIBRATION: u16 = 0x0202;
 const LOG: u16 = 0x0203;
+const FORGET: u16 = 0x0205;
 /// These sub-functions start and stop a routine.
 const START: u8 = 1;
 const STOP: u8 = 2;
@@ -109,6 +111,22 @@ impl<B: Bus> Device<B> {
     /// [`DeviceError`].
     pub fn calibration(&mut self) -> Result<Calibration> {
         versioned::<Calibration>(&self.read(CALIBRATION)?)
+    }
+
+    /// Returns what standstills have shown the board about its sensor.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn learned(&mut self) -> Result<Learned> {
+        decode(&self.read(LEARNED)?)
+    }
+
+    /// Has the board forget what standstills have shown about its sensor.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn forget_learned(&mut self) -> Result<()> {
+        self.routine(START, FORGET)
     }
 
     /// Stores the map of this unit's gyro, or none, which is used from the next start on.
@@ -305,7 +323,7 @@ mod tests {
             |from: u32, count: u32| (from..from + count).flat_map(u32::to_be_bytes).collect::<Vec<u8>>();
         let response = [
             &PIPELINE_COUNTERS.to_be_bytes()[..],
-            &words(0, 13),
+            &words(0, 14),
             &INPUT_COUNTERS.to_be_bytes(),
             &words(100, 20),
             &FOG_COUNTERS.to_be_bytes(),
@@ -313,7 +331,7 @@ mod tests {
         ]
         .concat();
         let all = counters(&response).expect("whole");
-        assert_eq!((all.pipeline.samples, all.pipeline.foreign_mountings), (0, 12));
+        assert_eq!((all.pipeline.samples, all.pipeline.moved_mounts), (0, 13));
         assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 114));
         assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.dropped), (119, 200, 211));
         for length in 0..response.len() {

@@ -18,7 +18,9 @@ pub enum What {
     Unit,
     /// Remove the stored gain and mounting.
     NoUnit,
-    /// Print the calibration.
+    /// Forget the bias by temperature, after another sensor was fitted or the sensor was moved.
+    Forget,
+    /// Print the calibration, and the bias by temperature that the board has learnt.
     Show,
     /// Stop without a result.
     Cancel,
@@ -44,6 +46,10 @@ pub fn run(
         }
         What::NoUnit => {
             device.set_unit(None)?;
+            None
+        }
+        What::Forget => {
+            device.forget_learned()?;
             None
         }
         What::Cancel => {
@@ -73,7 +79,7 @@ pub fn run(
                 if store {
                     device.store_calibration()?;
                 }
-                return print_value(&to_value(&device.calibration()?)?, json);
+                return print_value(&to_value(&device.calibration()?, &device.learned()?)?, json);
             }
         }
     }

@@ -1,0 +1,161 @@
+//! The bias by temperature that earlier drives have shown: what it does before the first standstill, while the sensor
+//! warms up, and after the sensor was moved.
+
+use gyronet::bias::{BiasCurve, CurveFilter};
+use gyronet::health::{Faults, Quality, Status};
+use gyronet::pipeline::{Output, Pipeline, PipelineConfig};
+use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
+use gyronet::units::{CentiCelsius, WheelSpeed};
+use gyronet::{Config, Coprocessor};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::{force, rate, turning};
+
+const BIAS: f64 = 0.004;
+const PER_KELVIN: f64 = 8.7e-5;
+
+/// Bias of the sensor at a temperature, rad/s.
+fn bias(celsius: f64) -> f64 {
+    BIAS + PER_KELVIN * (celsius - 20.0)
+}
+
+/// The curve of the sensor, that five starts have shown from 15 to 65 deg C.
+fn curve() -> BiasCurve {
+    (0..5).fold(BiasCurve::UNKNOWN, |curve, _| {
+        let mut filter = CurveFilter::new(&curve);
+        for celsius in (15..65).step_by(2) {
+            filter.add(CentiCelsius(celsius * 100), [rate(bias(f64::from(celsius))); 3]);
+        }
+        filter.curve()
+    })
+}
+
+fn known() -> PipelineConfig {
+    let rest_force = Some(turning(0, rate(0.0)).specific_force);
+    PipelineConfig { bias_curve: curve(), rest_force, ..PipelineConfig::DEFAULT }
+}
+
+/// Runs a sensor with this temperature at each tick; the vehicle drives straight from `moves` on. Its yaw rate
+/// is 0.1 rad/s where `turns`.
+fn run(
+    config: PipelineConfig,
+    ticks: u64,
+    celsius: impl Fn(u64) -> f64,
+    moves: u64,
+    turns: f64,
+) -> (Pipeline, Vec<Output>) {
+    let mut pipeline = Pipeline::new(config);
+    let mut noise = Noise::new(7);
+    let outputs = (0..ticks).map(|tick| {
+        let (celsius, drives) = (celsius(tick), tick >= moves);
+        let mut sample = turning(tick, rate(0.0));
+        let temperature = Some(CentiCelsius((100.0 * celsius) as i16));
+        for axis in 0..3 {
+            let turn = if axis == 2 && drives { turns } else { 0.0 };
+            sample.angular_rate[axis] = rate(bias(celsius) + turn + 0.001 * noise.normal());
+            sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
+        }
+        let sample = ImuSample { temperature, ..sample };
+        let standstill = if drives { Standstill::Moving } else { Standstill::Still };
+        let speeds = [Some(WheelSpeed(0)); WHEELS];
+        pipeline.wheels(WheelSample { time: sample.time, speeds, standstill });
+        pipeline.correct(sample).expect("a place on the grid")
+    });
+    let outputs = outputs.collect();
+    (pipeline, outputs)
+}
+
+#[test]
+fn a_vehicle_that_drives_off_at_once_has_a_rate_with_its_sigma() {
+    let (_, without) = run(PipelineConfig::DEFAULT, 500, |_| 35.0, 0, 0.1);
+    assert!(without.iter().all(|output| output.vehicle.navigation.status == Status::Init));
+    let (_, with) = run(known(), 500, |_| 35.0, 0, 0.1);
+    for output in &with {
+        let navigation = output.vehicle.navigation;
+        assert_eq!((navigation.status, navigation.quality), (Status::Degraded, Quality::Degraded));
+        let sigma = navigation.sigma.expect("the curve's").rad_per_sec();
+        assert!((1e-4..1e-3).contains(&sigma), "{sigma}");
+    }
+    let mean = with.iter().map(|output| output.vehicle.navigation.rate.rad_per_sec()).sum::<f64>() / 500.0;
+    assert!((mean - 0.1).abs() < 2e-4, "{mean}");
+    // The yaw goes on from there.
+    let yaw = with.last().expect("samples").vehicle.navigation.yaw.rad();
+    assert!((yaw - 0.5).abs() < 2e-3, "{yaw}");
+}
+
+#[test]
+fn warming_up_turns_the_vehicle_no_more_than_the_curve_s_error() {
+    // Three seconds at rest at 20 deg C, then ten minutes of driving straight, in which the sensor warms by 30 K.
+    let celsius = |tick: u64| 20.0 + 30.0 * (tick as f64 / 60_000.0);
+    let turned =
+        |outputs: &[Output]| outputs.last().expect("samples").vehicle.navigation.yaw.rad().to_degrees();
+    let (without, without_curve) = run(PipelineConfig::DEFAULT, 60_000, celsius, 400, 0.0);
+    let (with, with_curve) = run(known(), 60_000, celsius, 400, 0.0);
+    let (without_curve, with_curve) = (turned(&without_curve), turned(&with_curve));
+    // 0.0013 rad/s on average for ten minutes.
+    assert!((35.0..55.0).contains(&without_curve), "{without_curve}");
+    assert!(with_curve.abs() < 0.1 * without_curve, "{with_curve} of {without_curve}");
+    // Without a curve the sigma has what a part may drift by over 30 K.
+    let sigma = |pipeline: &Pipeline| f64::from(pipeline.bias_sigma().expect("known"));
+    assert!(sigma(&without) > 25.0 * PER_KELVIN, "{}", sigma(&without));
+    assert!(sigma(&with) < 0.3 * sigma(&without), "{}", sigma(&with));
+}
+
+#[test]
+fn a_standstill_takes_the_error_of_a_wrong_curve_out() {
+    let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
+    filter.add(CentiCelsius(2_000), [rate(0.03); 3]);
+    let wrong = PipelineConfig { bias_curve: filter.curve(), ..known() };
+    let (_, outputs) = run(wrong, 2_000, |_| 20.0, 1_000, 0.1);
+    let driven = &outputs[1_100..];
+    let mean = driven.iter().map(|output| output.vehicle.navigation.rate.rad_per_sec()).sum::<f64>();
+    assert!((mean / driven.len() as f64 - 0.1).abs() < 2e-4, "{mean}");
+}
+
+#[test]
+fn a_sensor_that_was_moved_is_reported() {
+    let was = Some([force(4.9), force(0.0), force(8.5)]);
+    let moved = PipelineConfig { rest_force: was, ..known() };
+    let (pipeline, outputs) = run(moved, 500, |_| 20.0, 400, 0.0);
+    assert_eq!(pipeline.counters().moved_mounts, 1);
+    let first = &outputs.first().expect("samples").vehicle.navigation;
+    assert_eq!(first.status, Status::Init, "no early rate of a sensor that was moved");
+    let last = &outputs.last().expect("samples").vehicle.navigation;
+    assert!(last.faults.contains(Faults::IMPLAUSIBLE));
+    let (pipeline, outputs) = run(known(), 500, |_| 20.0, 400, 0.0);
+    assert_eq!(pipeline.counters().moved_mounts, 0);
+    assert!(outputs.iter().all(|output| !output.vehicle.navigation.faults.contains(Faults::IMPLAUSIBLE)));
+}
+
+#[test]
+fn a_part_without_a_temperature_is_not_corrected_by_the_curve() {
+    let mut pipeline = Pipeline::new(known());
+    let output = pipeline.correct(turning(0, rate(0.01))).expect("a place on the grid");
+    assert!((output.vehicle.navigation.rate.rad_per_sec() - 0.01).abs() < 1e-6);
+    assert_eq!(output.vehicle.navigation.status, Status::Init);
+}
+
+/// Xsens MTi sends its temperature once in a second, and may begin late.
+#[test]
+fn a_temperature_that_comes_late_makes_no_step() {
+    for first in [150, 700] {
+        let mut coprocessor = Coprocessor::new(Config { pipeline: known(), ..Config::DEFAULT });
+        let mut noise = Noise::new(8);
+        let mut sent = Vec::new();
+        for tick in 0..2_000 {
+            let mut sample = turning(tick, rate(0.0));
+            sample.temperature = (tick >= first && tick % 100 == first % 100).then_some(CentiCelsius(3_500));
+            for axis in 0..3 {
+                sample.angular_rate[axis] = rate(bias(35.0) + 0.001 * noise.normal());
+                sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
+            }
+            let seen = coprocessor.imu(sample, sample.time).expect("a place on the grid");
+            let known = (tick >= first).then_some(CentiCelsius(3_500));
+            assert_eq!(seen.sample.and_then(|sample| sample.temperature), known, "sample {tick}");
+            sent.push(seen.vehicle.navigation);
+        }
+        let after = &sent[800..];
+        assert!(after.iter().all(|sent| sent.status == Status::Degraded), "from {first}");
+        let mean = after.iter().map(|sent| sent.rate.rad_per_sec()).sum::<f64>() / after.len() as f64;
+        assert!(mean.abs() < 2e-4, "from {first}: {mean}");
+    }
+}

@@ -1,0 +1,111 @@
+//! The pipeline subtracts the bias that earlier drives have shown at the sensor's temperature from each reading, before
+//! anything else sees it. With it the rate can be used before the vehicle has stood.
+
+use super::PipelineConfig;
+use crate::bias::CurveBias;
+use crate::mounting::{Rotation, is_moved};
+use crate::sample::{ImuSample, RATE_HZ};
+use crate::units::{AngularRate, SpecificForce};
+
+/// Each second the temperature in use goes this part of the way to the measured one: a wrong reading moves the bias little.
+const SMOOTHING: f32 = 0.125;
+
+/// Holds the sensor's temperature and its bias there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SensorBias {
+    /// Smoothed, deg C.
+    celsius: Option<f32>,
+    /// The samples until the next second.
+    wait: u32,
+    newest: Option<CurveBias>,
+    /// The part of it that static initialisation has found already, because the first temperature came after it.
+    found: [AngularRate; 3],
+    /// The temperature at which the zero-rate updates have found the rest of the bias, deg C, and the sigma of its change
+    /// since then, rad/s.
+    reference: Option<f32>,
+    change_sigma: f32,
+    /// The rotation beyond the configured mounting that earlier drives have shown, and the specific force at rest that
+    /// it belongs to, in the sensor's axes.
+    early: Option<(Rotation, [SpecificForce; 3])>,
+}
+
+impl SensorBias {
+    /// Starts before the first sample.
+    pub(super) const START: Self = Self {
+        celsius: None,
+        wait: 0,
+        newest: None,
+        found: [AngularRate::ZERO; 3],
+        reference: None,
+        change_sigma: 0.0,
+        early: None,
+    };
+
+    /// Subtracts the curve's bias from a reading in the sensor's axes; `initialised`: static initialisation has been done.
+    /// Returns whether this is the first reading that it is subtracted from: static initialisation must not mix it with
+    /// those before.
+    pub(super) fn subtract(
+        &mut self,
+        sample: &mut ImuSample,
+        config: &PipelineConfig,
+        initialised: bool,
+    ) -> bool {
+        let before = self.newest.is_some();
+        if self.wait == 0 {
+            self.wait = RATE_HZ;
+            self.take_temperature(sample, config);
+        }
+        self.wait -= 1;
+        let Some(CurveBias { gyro_bias, .. }) = self.newest else { return false };
+        if !before && initialised {
+            self.found = gyro_bias;
+        }
+        for ((rate, bias), found) in sample.angular_rate.iter_mut().zip(gyro_bias).zip(self.found) {
+            *rate = AngularRate(rate.0.saturating_sub(bias.0.saturating_sub(found.0)));
+        }
+        !before
+    }
+
+    fn take_temperature(&mut self, sample: &ImuSample, config: &PipelineConfig) {
+        let Some(measured) = sample.temperature.filter(|_| sample.validity.is_good()) else { return };
+        let measured = f32::from(measured.0) / 100.0;
+        let before = self.celsius.unwrap_or(measured);
+        let now = before + SMOOTHING * (measured - before);
+        self.celsius = Some(now);
+        self.newest = config.bias_curve.at(now);
+        let reference = *self.reference.get_or_insert(now);
+        self.change_sigma = config.bias_curve.change_sigma(reference, now);
+        if self.early.is_none() {
+            self.early = early_levelling(config);
+        }
+    }
+
+    /// Returns the sigma of the change of the bias with temperature since the last [`SensorBias::refer`], rad/s; 0 where the
+    /// part reports no temperature.
+    pub(super) fn change_sigma(&self) -> f32 {
+        self.change_sigma
+    }
+
+    /// Notes that the bias has been found at the present temperature.
+    pub(super) fn refer(&mut self) {
+        self.reference = self.celsius;
+        self.change_sigma = 0.0;
+    }
+
+    /// Returns the levelling and the bias' sigma, rad/s, for a reading in the sensor's axes before static initialisation;
+    /// `None` where earlier drives have shown no bias, the sensor was moved since, or the reading is not good.
+    pub(super) fn early(&self, sample: &ImuSample) -> Option<(Rotation, f32)> {
+        let (levelling, force) = self.early?;
+        let sigma = self.newest?.sigma;
+        let is_usable = sample.validity.is_good() && !is_moved(&force, &sample.specific_force);
+        is_usable.then_some((levelling, sigma))
+    }
+}
+
+/// Returns the levelling that static initialisation would find for the specific force at rest of earlier drives, and that
+/// force.
+fn early_levelling(config: &PipelineConfig) -> Option<(Rotation, [SpecificForce; 3])> {
+    let force = config.rest_force?;
+    let levelling = config.levelling.rotation(config.mounting.force(force)).ok()?;
+    Some((levelling, force))
+}
