@@ -24,6 +24,7 @@ pub mod size;
 pub mod soak;
 pub mod tables;
 pub mod train;
+pub mod warm_up;
 mod weights;
 pub mod wheels;
 

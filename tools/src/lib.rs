@@ -11,6 +11,7 @@
 //! drive <- doctor -> import, plot
 //! drive <- evaluate <- paper -> plot, simulate
 //! train -> evaluate, plot      python
+//! warm_up -> drive, plot, simulate
 //! target -> simulate      network      client      wheels
 //! demo -> everything above
 //! ```
@@ -34,4 +35,5 @@ pub mod signing;
 pub mod simulate;
 pub mod target;
 pub mod train;
+pub mod warm_up;
 pub mod wheels;

@@ -62,6 +62,7 @@ enum Command {
     Size(commands::size::Args),
     Completions(commands::completions::Args),
     Soak(commands::soak::Args),
+    WarmUp(commands::warm_up::Args),
 }
 
 fn main() -> ExitCode {
@@ -70,25 +71,26 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
         Command::Calibrate(args) => commands::calibrate::run(args, common),
-        Command::Replay(args) => commands::replay::run(args, common),
+            Command::Replay(args) => commands::replay::run(args, common),
         Command::Campaign(args) => commands::campaign::run(args, common),
         Command::Keys(args) => commands::keys::run(args, common),
         Command::Sign(args) => commands::sign::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
-        Command::Import(args) => commands::import::run(args, common),
-        Command::Doctor(args) => commands::doctor::run(args, common),
+            Command::Import(args) => commands::import::run(args, common),
+            Command::Doctor(args) => commands::doctor::run(args, common),
         Command::Train(args) => commands::train::run(args, common),
-        Command::Tables(args) => commands::tables::run(args, common),
+            Command::Tables(args) => commands::tables::run(args, common),
         Command::Paper(args) => commands::paper::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
         Command::Bus(args) => commands::bus::run(args, common),
         Command::Monitor(args) => commands::monitor::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
         Command::Device(args) => commands::device::run(args, common),
-        Command::Wheels(args) => commands::wheels::run(args, common),
+            Command::Wheels(args) => commands::wheels::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),
         Command::Soak(args) => commands::soak::run(args, common),
+        Command::WarmUp(args) => commands::warm_up::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
     // The reader of our output has closed it: `gyronet replay FILE | head`.

@@ -29,3 +29,4 @@ mod trajectory_evo;
 mod turns;
 mod unit_transfer;
 mod upsets;
+mod warm_up;

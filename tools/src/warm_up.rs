@@ -1,0 +1,9 @@
+//! This module measures how far the heading drifts while the sensor warms up and the vehicle does not stop: by static
+//! calibration, by zero-rate updates, by the bias curve, and by the difference of the rear wheels.
+
+mod drive;
+pub mod plot;
+mod rear_wheels;
+mod rows;
+
+pub use rows::{Outcome, Row, State, run};
