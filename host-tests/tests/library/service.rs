@@ -6,6 +6,8 @@ mod configuration;
 mod isotp;
 mod learning;
 mod log;
+#[cfg(target_os = "linux")]
+mod socketcan;
 mod uds;
 mod weights;
 
