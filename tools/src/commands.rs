@@ -7,9 +7,11 @@ pub mod campaign;
 pub mod completions;
 pub mod demo;
 pub mod device;
+#[cfg(feature = "logs")]
 pub mod doctor;
 mod drives;
 pub mod evaluate;
+#[cfg(feature = "logs")]
 pub mod import;
 pub mod keys;
 pub mod monitor;
@@ -17,18 +19,25 @@ mod paint;
 pub mod paper;
 mod progress;
 pub mod quantize;
+#[cfg(feature = "logs")]
 pub mod replay;
 pub mod sign;
 pub mod simulate;
 pub mod size;
 pub mod soak;
+#[cfg(feature = "logs")]
 pub mod tables;
 pub mod train;
 pub mod warm_up;
 mod weights;
+#[cfg(feature = "logs")]
 pub mod wheels;
 
 use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::Replay;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
 
 /// The library's errors are typed; here all that matters is that each prints as one clear line
 /// that names the file.
@@ -88,4 +97,11 @@ impl WriteError {
         let path = path.display().to_string();
         move |source| Self { path: path.clone(), source }
     }
+}
+
+/// Writes a drive's frames to a file.
+fn write_log(drive: &Replay, path: &Path) -> std::result::Result<u64, WriteError> {
+    let error = WriteError::to(path);
+    let file = File::create(path).map_err(&error)?;
+    drive.log(BufWriter::new(file)).map_err(&error)
 }

@@ -5,6 +5,7 @@
 pub mod candump;
 pub mod error;
 pub mod export;
+#[cfg(feature = "logs")]
 pub mod foxglove;
 pub mod recording;
 pub mod replay;

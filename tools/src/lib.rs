@@ -21,9 +21,11 @@ pub mod calibrate;
 pub mod campaign;
 pub mod client;
 pub mod demo;
+#[cfg(feature = "logs")]
 pub mod doctor;
 pub mod drive;
 pub mod evaluate;
+#[cfg(feature = "logs")]
 pub mod import;
 pub mod network;
 pub mod paper;

@@ -43,12 +43,16 @@ enum Command {
     Demo(commands::demo::Args),
     Evaluate(commands::evaluate::Args),
     Calibrate(commands::calibrate::Args),
+    #[cfg(feature = "logs")]
     Replay(commands::replay::Args),
     Campaign(commands::campaign::Args),
     Simulate(commands::simulate::Args),
+    #[cfg(feature = "logs")]
     Import(commands::import::Args),
+    #[cfg(feature = "logs")]
     Doctor(commands::doctor::Args),
     Train(commands::train::Args),
+    #[cfg(feature = "logs")]
     Tables(commands::tables::Args),
     Paper(commands::paper::Args),
     Quantize(commands::quantize::Args),
@@ -58,6 +62,7 @@ enum Command {
     Device(commands::device::Args),
     Keys(commands::keys::Args),
     Sign(commands::sign::Args),
+    #[cfg(feature = "logs")]
     Wheels(commands::wheels::Args),
     Size(commands::size::Args),
     Completions(commands::completions::Args),
@@ -71,22 +76,27 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
         Command::Calibrate(args) => commands::calibrate::run(args, common),
-            Command::Replay(args) => commands::replay::run(args, common),
+        #[cfg(feature = "logs")]
+        Command::Replay(args) => commands::replay::run(args, common),
         Command::Campaign(args) => commands::campaign::run(args, common),
         Command::Keys(args) => commands::keys::run(args, common),
         Command::Sign(args) => commands::sign::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
-            Command::Import(args) => commands::import::run(args, common),
-            Command::Doctor(args) => commands::doctor::run(args, common),
+        #[cfg(feature = "logs")]
+        Command::Import(args) => commands::import::run(args, common),
+        #[cfg(feature = "logs")]
+        Command::Doctor(args) => commands::doctor::run(args, common),
         Command::Train(args) => commands::train::run(args, common),
-            Command::Tables(args) => commands::tables::run(args, common),
+        #[cfg(feature = "logs")]
+        Command::Tables(args) => commands::tables::run(args, common),
         Command::Paper(args) => commands::paper::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
         Command::Bus(args) => commands::bus::run(args, common),
         Command::Monitor(args) => commands::monitor::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
         Command::Device(args) => commands::device::run(args, common),
-            Command::Wheels(args) => commands::wheels::run(args, common),
+        #[cfg(feature = "logs")]
+        Command::Wheels(args) => commands::wheels::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),
         Command::Soak(args) => commands::soak::run(args, common),

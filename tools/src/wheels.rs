@@ -4,8 +4,10 @@
 //! The board keeps the same settings as a record ([`gyronet::can::wheel::WheelSettings`]), so that another vehicle
 //! needs no new image. Both pass the library's own check.
 
+#[cfg(feature = "logs")]
 pub(crate) mod dbc;
 mod file;
 
+#[cfg(feature = "logs")]
 pub use dbc::{DbcError, Signals, from_dbc};
 pub use file::{WheelFile, WheelFileError};

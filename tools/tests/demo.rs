@@ -7,7 +7,7 @@ use std::process::Command;
 fn demo(name: &str, arguments: &[&str]) -> (PathBuf, String) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let output = Command::new(env!("CARGO_BIN_EXE_gyronet"))
-        .args(["demo", "--no-board", "--out"])
+        .args(["demo", "--out"])
         .arg(&folder)
         .args(arguments)
         .output()
@@ -45,7 +45,7 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
         assert!(page.contains(data) && log.contains(&format!("{id}#{}", data.replace(' ', ""))), "{message}");
     }
     assert_eq!(json["frames"], log.lines().count());
-    assert_eq!(json["board"]["why"], "--no-board");
+    assert_eq!(json["board"]["why"], "--image runs it in QEMU");
 }
 
 #[test]

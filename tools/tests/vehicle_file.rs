@@ -64,7 +64,7 @@ fn mounting_and_radius_are_used_and_named() {
         let (_, err) = gyronet(&folder, &[command, "drive.csv"]);
         assert!(err.contains("drive.csv: vehicle file drive.toml\n"), "{command}: {err}");
     }
-    let (good, err) = gyronet(&folder, &["demo", "drive.csv", "--no-board", "--out", "demo"]);
+    let (good, err) = gyronet(&folder, &["demo", "drive.csv", "--out", "demo"]);
     assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
     let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
     assert!(page.contains("(radius 0.578 m)"), "the page says what the path rests on");
@@ -114,7 +114,7 @@ fn a_sequence_of_a_data_set_comes_with_its_radius() {
     assert!(good, "{err}");
     let (good, err) = gyronet(&folder, &["import", "nclt", "nclt", "--out", "robot.csv"]);
     assert!(good && err.contains("rows; robot.toml beside it"), "{err}");
-    let (good, err) = gyronet(&folder, &["demo", "robot.csv", "--no-board", "--out", "demo"]);
+    let (good, err) = gyronet(&folder, &["demo", "robot.csv", "--out", "demo"]);
     assert!(good, "{err}");
     let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
     assert!(page.contains("(radius 0.24 m)"), "its wheels are smaller than the recorded car's");

@@ -1,6 +1,6 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, paint, print_json, progress, read_drive, replay, weights};
+use super::{Common, WriteError, paint, print_json, progress, read_drive, weights, write_log};
 use gyronet::can::config::Config;
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
@@ -19,14 +19,14 @@ use std::path::{Path, PathBuf};
 /// of methods, decoded CAN messages, time and memory. Without FILE the command takes the simulated drive that
 /// comes with it.
 ///
-/// Where qemu-system-arm is installed the firmware image is built (minutes, the first time) and run on the first
-/// 10 s of the drive. The exit status is 1 if one byte differs from the library's on this machine.
+/// With --image the firmware image is built and run in QEMU (qemu-system-arm) on the first 10 s of the drive. The exit
+/// status is 1 if one byte differs from the library's on this machine.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet demo                                  # the simulated drive
   gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns
-  gyronet demo drive.csv --json --no-board")]
+  gyronet demo --image                          # and the firmware in QEMU")]
 pub struct Args {
     /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate.
     #[arg(value_name = "FILE")]
@@ -34,9 +34,9 @@ pub struct Args {
     /// Folder for demo.html, yaw.svg and can.log [default: target/demo].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Do not run the firmware image, even where QEMU is installed.
+    /// Build the firmware image as well, a minute the first time, and run it in QEMU.
     #[arg(long)]
-    no_board: bool,
+    image: bool,
     #[command(flatten)]
     networks: weights::Files,
 }
@@ -63,7 +63,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let folder = args.out.clone().unwrap_or_else(default_folder);
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
-    let frames = replay::write_file(&rates.drive, &log)?;
+    let frames = write_log(&rates.drive, &log)?;
     std::fs::write(&picture, picture::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
     let board = board(args, common, &recording, &mut GyroNet::new(weights.blob()?))?;
     let simulated = args.file.is_none();
@@ -121,8 +121,8 @@ fn board(
     recording: &Recording,
     network: &mut GyroNet<'_>,
 ) -> Result<Outcome, BoardError> {
-    if args.no_board {
-        return Ok(Outcome::NotRun { why: "--no-board".into() });
+    if !args.image {
+        return Ok(Outcome::NotRun { why: "--image runs it in QEMU".into() });
     }
     if args.networks.weights.is_some() {
         return Ok(Outcome::NotRun {

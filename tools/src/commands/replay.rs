@@ -69,7 +69,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let writes_elsewhere = [&args.mcap, &args.csv, &args.tum].into_iter().any(Option::is_some);
     let frames = match &args.out {
         None if writes_elsewhere => drive.frames().count() as u64,
-        Some(path) => write_file(&drive, path)?,
+        Some(path) => super::write_log(&drive, path)?,
         None => drive.log(BufWriter::new(io::stdout().lock()))?,
     };
     if let Some(path) = &args.mcap {
@@ -193,13 +193,6 @@ impl std::fmt::Display for Detour {
             difference.rate_rms, bound.rate_rms, difference.rows, difference.unpaired
         )
     }
-}
-
-/// Writes a drive's frames to a file.
-pub(super) fn write_file(drive: &Replay, path: &Path) -> Result<u64, WriteError> {
-    let error = WriteError::to(path);
-    let file = File::create(path).map_err(&error)?;
-    drive.log(BufWriter::new(file)).map_err(&error)
 }
 
 /// Writes a drive and its layout for Foxglove.

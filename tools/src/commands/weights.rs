@@ -25,6 +25,7 @@ impl Weights {
     }
 
     /// Opens a file, or chooses the weights of the paper's GyroNet.
+    #[cfg(feature = "logs")]
     pub fn of_the_paper(path: Option<&Path>) -> Result<Self, WeightFileError> {
         Ok(Self { built_in: &weights::GYRONET.0, ..Self::open(path)? })
     }
