@@ -23,20 +23,25 @@ mod firmware {
     const UNITS: usize = 4;
     const HALF: usize = UNITS / 2;
     const RECURRENT: usize = recurrent_words(UNITS);
-    /// The default model, without room for a larger one.
-    type Model = GyroNet<'static, GyroNetState<UNITS, HALF, RECURRENT>, UNITS, HALF, RECURRENT>;
+    /// The state of the default model, without room for a larger one; it is not on the stack.
+    type State = GyroNetState<UNITS, HALF, RECURRENT>;
+    type Model = GyroNet<'static, &'static mut State, UNITS, HALF, RECURRENT>;
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let coprocessor = cortex_m::singleton!(: Coprocessor = Coprocessor::START);
-        let blob = Blob::new_checked(&weights::DEFAULT.0);
-        let network = blob.and_then(|blob| Model::with_state(blob, GyroNetState::ZERO));
-        let passed =
-            coprocessor.zip(network.ok()).is_some_and(|(coprocessor, network)| run(coprocessor, network));
+        let passed = parts().is_some_and(|(coprocessor, network)| run(coprocessor, network));
         debug::exit(if passed { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
         loop {
             cortex_m::asm::wfi();
         }
+    }
+
+    /// Makes both over their statics.
+    fn parts() -> Option<(&'static mut Coprocessor, Model)> {
+        let blob = Blob::new_checked(&weights::DEFAULT.0).ok()?;
+        let state = cortex_m::singleton!(: State = GyroNetState::ZERO)?;
+        let coprocessor = cortex_m::singleton!(: Coprocessor = Coprocessor::START)?;
+        Some((coprocessor, Model::with_state(blob, state).ok()?))
     }
 
     /// Corrects five seconds of samples. Returns whether the last rate is the network's, and within 1 % of the turn's.
