@@ -41,7 +41,7 @@ use crate::model::fognet::FogEstimate;
 use crate::model::seconds::SecondsWindow;
 use crate::monitor::{SensorMonitor, TIMEOUT_US};
 use crate::pipeline::Pipeline;
-use crate::sample::{FogSample, ImuSample, Standstill, WheelSample};
+use crate::sample::{FogSample, ImuSample, WheelSample};
 use crate::units::{CentiCelsius, Micros};
 use handover::Handover;
 use heapless::Deque;
@@ -66,8 +66,8 @@ pub struct Observation {
     pub sample: Option<ImuSample>,
     /// Everything that is sent for it.
     pub vehicle: VehicleSample,
-    /// The vehicle's standstill by its wheels.
-    pub wheels: Standstill,
+    /// The wheels.
+    pub wheels: WheelSample,
     /// The sample whose estimate is final with this one.
     pub settled: Option<Settled>,
     /// The reason why static initialisation was refused with this sample.
@@ -193,7 +193,7 @@ impl Coprocessor {
             count(&mut self.counters.replaced_windows, u32::from(replaced));
         }
         let (settled, refused) = (output.settled, output.refused);
-        let wheels = self.standstill();
+        let wheels = self.known_wheels.unwrap_or_default();
         Ok(Observation { sample: Some(sample), vehicle: output.vehicle, wheels, settled, refused })
     }
 
@@ -266,7 +266,7 @@ impl Coprocessor {
         self.report_board();
         let vehicle = self.pipeline.silent(steps);
         self.send(&vehicle, Micros(self.sample_time.0.saturating_add(now.0 - self.heard.0)));
-        let wheels = self.standstill();
+        let wheels = self.known_wheels.unwrap_or_default();
         Ok(Some(Observation { sample: None, vehicle, wheels, settled: None, refused: None }))
     }
 
@@ -322,6 +322,11 @@ impl Coprocessor {
     /// Notes that GyroNet's weights are damaged: no window is due any more, and the messages report it.
     pub fn weights_damaged(&mut self) {
         self.handover.stop();
+    }
+
+    /// Notes that the sensor was moved since earlier drives. The next messages report it.
+    pub fn mount_moved(&mut self) {
+        self.pipeline.mount_moved();
     }
 
     /// Notes the number of frames lost on the bus since the start, and whether the controller is off the bus. The next
@@ -390,10 +395,6 @@ impl Coprocessor {
         let time = self.time();
         self.known_wheels = self.wheels.as_mut().and_then(|wheels| wheels.poll(time));
         self.known_wheels
-    }
-
-    fn standstill(&self) -> Standstill {
-        self.known_wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill)
     }
 
     /// Works on the next step of the fibre-optic gyro, if it is complete or due.

@@ -223,7 +223,7 @@ pub struct Counters {
     pub contradicted: u32,
     /// Times that the model's mounting was found to be another unit's, and taken out of the correction.
     pub foreign_mountings: u32,
-    /// Static initialisations that found the sensor tilted otherwise than in earlier drives: its mount was moved.
+    /// Times that the sensor was found to be mounted otherwise than in earlier drives.
     pub moved_mounts: u32,
 }
 

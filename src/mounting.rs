@@ -8,6 +8,10 @@
 //! (0.00021 to 0.00049 rad on trial 04 of the training drives). Hence [`Levelling::Beyond`]: a tilt steeper than any
 //! street counts as mounting, a smaller one as the street.
 
+mod forward;
+
+pub use forward::{Forward, ForwardEstimator};
+
 use crate::sample::ImuSample;
 use crate::units::{AngularRate, STANDARD_GRAVITY, SpecificForce};
 
@@ -52,7 +56,7 @@ impl Levelling {
 
 /// Cosine of the angle from which on a sensor counts as moved: 25 degrees, since streets are no steeper than 15, and the
 /// mean of several is less.
-const MOVED: f32 = 0.906;
+pub(crate) const MOVED: f32 = 0.906;
 
 /// Returns whether two mean specific forces at standstill are so far apart that the sensor was moved between them.
 #[must_use]

@@ -69,7 +69,7 @@ struct State {
     gap_within: u32,
     /// The newest sample as the networks see it.
     inertial: Option<Features>,
-    /// The sensor has another tilt at rest than in earlier drives.
+    /// The sensor is mounted otherwise than in earlier drives.
     moved: bool,
     board: BoardFaults,
     counters: Counters,
@@ -174,6 +174,12 @@ impl Pipeline {
     /// Takes the faults of the board beside the sensor; they are reported with every message set from now on.
     pub fn board(&mut self, faults: BoardFaults) {
         self.state.board = faults;
+    }
+
+    /// Notes that the sensor was moved since earlier drives; it is reported with every message set from now on.
+    pub fn mount_moved(&mut self) {
+        count(&mut self.state.counters.moved_mounts, u32::from(!self.state.moved));
+        self.state.moved = true;
     }
 
     /// Sets the true length of the steps of the sensor's clock, for the samples that follow.

@@ -110,3 +110,11 @@ pub struct WheelSample {
     /// The standstill of the vehicle.
     pub standstill: Standstill,
 }
+
+impl WheelSample {
+    /// Makes a report without speeds.
+    #[must_use]
+    pub const fn without_speeds(standstill: Standstill) -> Self {
+        Self { time: Micros(0), speeds: [None; WHEELS], standstill }
+    }
+}

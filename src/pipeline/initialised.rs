@@ -45,8 +45,9 @@ impl Pipeline {
         let PipelineConfig { levelling, static_init, earth_rate, zero_rate, quiet, .. } = self.config;
         let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
         let before = self.config.rest_force.map(|force| self.config.mounting.force(force));
-        self.state.moved = before.is_some_and(|before| is_moved(&before, &rest.specific_force));
-        count(&mut self.state.counters.moved_mounts, u32::from(self.state.moved));
+        if before.is_some_and(|before| is_moved(&before, &rest.specific_force)) {
+            self.mount_moved();
+        }
         self.state.initialised = Some(Initialised {
             levelling,
             zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),

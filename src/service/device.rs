@@ -18,7 +18,7 @@ use super::message::{
 use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
 use crate::health::{Faults, Status};
-use crate::sample::{ImuSample, Standstill};
+use crate::sample::{ImuSample, WheelSample};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{
     Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Place, Record, Store, Troubles,
@@ -59,6 +59,8 @@ pub struct Device<R: NorFlash, W> {
     calibration_origin: Origin,
     learned: Learned,
     learner: Learner,
+    /// The sensor was found to be moved, and the coprocessor does not know yet.
+    mount_moved: bool,
     calibrator: Option<Calibrator>,
     calibration_state: State,
     accepted: Accepted,
@@ -105,6 +107,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             calibration_origin: Origin::BuiltIn,
             learned: Learned::NOTHING,
             learner: Learner::new(),
+            mount_moved: false,
             calibrator: None,
             calibration_state: State::Idle,
             accepted: Accepted::NONE,
@@ -157,6 +160,18 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         &self.learned
     }
 
+    /// Returns once whether the sensor was found to be moved since earlier drives, for
+    /// [`Coprocessor::mount_moved`](crate::Coprocessor::mount_moved).
+    pub fn take_mount_moved(&mut self) -> bool {
+        core::mem::take(&mut self.mount_moved)
+    }
+
+    /// Returns where forward is in the configured axes, deg to the left of x, and its sigma: 0 where the mounting is right.
+    #[must_use]
+    pub fn forward_deg(&self) -> Option<[f32; 2]> {
+        self.learned.yaw_deg(&self.configuration.mounting.rotation()?)
+    }
+
     /// Notes how setting the sensor up went; the same result again is not noted again.
     pub fn sensor(&mut self, result: Result<(), SensorFault>) {
         let fault = result.err();
@@ -166,21 +181,22 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.sensor = fault;
     }
 
-    /// Takes every sample of the sensor (`None` while it is silent), with the status and faults of what was made of it
-    /// and what the wheels show.
+    /// Takes every sample of the sensor (`None` while it is silent), with the status and faults of what was made of it,
+    /// and the wheels.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
         tick: u32,
         (status, faults): (Status, Faults),
-        wheels: Standstill,
+        wheels: &WheelSample,
     ) {
         self.tick = tick;
         self.faults = faults;
         let limits = &self.configuration.static_init;
-        self.standstill.observe(sample, wheels, limits);
-        if self.configuration.learn_bias {
-            self.learner.observe(sample, wheels, limits, &mut self.learned);
+        self.standstill.observe(sample, wheels.standstill, limits);
+        if self.configuration.learn && self.learner.observe(sample, wheels, limits, &mut self.learned) {
+            self.mount_moved = true;
+            self.note(EventKind::MountMoved);
         }
         if status != self.status {
             self.status = status;
@@ -199,10 +215,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             match task {
                 Task::Static => {
                     // It holds for a sensor that was moved, too.
-                    self.learned.specific_force = Some(rest.specific_force);
-                    if let Some(temperature) = sample.temperature {
-                        self.learner.learn(&rest, temperature, &mut self.learned);
-                    }
+                    self.learner.calibrated(&rest, sample.temperature, &mut self.learned);
                 }
                 Task::Mounting => {
                     self.calibration.level = Some(level(rest.specific_force, &self.configuration.mounting)?);

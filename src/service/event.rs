@@ -109,6 +109,8 @@ pub enum EventKind {
     LearnedRefused(StoreError),
     /// What the board has learnt about its sensor was stored.
     LearnedStored,
+    /// The sensor is mounted otherwise than in earlier drives.
+    MountMoved,
 }
 
 /// Something that happened.

@@ -1,21 +1,31 @@
-//! The board learns the sensor's bias by temperature at standstills that the wheels prove.
+//! The board learns the sensor's bias by temperature at standstills that the wheels prove, and its mounting: up at
+//! standstills, forward while the vehicle drives.
 //!
 //! Without wheels a long straight can look like a standstill; then only static calibrations add to the curve. What three
-//! seconds at rest have shown is stored after the first time, the second, the fourth and so on, so that the flash is
-//! written some ten times in a start.
+//! seconds at rest have shown is stored after the first time, the second, the fourth and so on, and the forward
+//! direction each time its sigma has halved, so that the flash is written some fifteen times in a start.
 
 use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
-use crate::sample::{ImuSample, Standstill};
+use crate::mounting::{Forward, ForwardEstimator, MOVED};
+use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::store::Learned;
 use crate::units::CentiCelsius;
 
-/// Learns from the rests of this start.
+/// A forward direction with this sigma is known, rad: 10 degrees. A wrong mounting by that much costs nothing.
+const KNOWN: f32 = 0.175;
+/// With this one it can show that the sensor was moved by 25 degrees, rad: 6 degrees.
+const SURE: f32 = 0.105;
+
+/// Learns from the rests and the drive of this start.
 #[derive(Debug)]
 pub struct Learner {
     rest: Option<StaticInit>,
     /// It exists from the first rest on.
     filter: Option<CurveFilter>,
     rests: u32,
+    forward: ForwardEstimator,
+    /// The sensor is mounted otherwise than in earlier drives: nothing is learnt.
+    is_moved: bool,
     /// What is learnt differs from what is stored.
     pub is_changed: bool,
 }
@@ -24,39 +34,71 @@ impl Learner {
     /// Starts with nothing shown.
     #[must_use]
     pub const fn new() -> Self {
-        Self { rest: None, filter: None, rests: 0, is_changed: false }
+        let forward = ForwardEstimator::START;
+        Self { rest: None, filter: None, rests: 0, forward, is_moved: false, is_changed: false }
     }
 
-    /// Takes a sample (`None` while the sensor is silent), what the wheels show, and the limits of a rest.
+    /// Takes a sample (`None` while the sensor is silent), the wheels, and the limits of a rest. Returns whether this has
+    /// shown that the sensor was moved since earlier drives.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
-        wheels: Standstill,
+        wheels: &WheelSample,
         limits: &StaticConfig,
         learned: &mut Learned,
-    ) {
-        let at_rest = sample.filter(|sample| sample.validity.is_good() && wheels == Standstill::Still);
-        let Some((sample, temperature)) = at_rest.and_then(|sample| Some((sample, sample.temperature?)))
-        else {
-            self.rest = None;
-            return;
-        };
-        let rest = self.rest.get_or_insert_with(|| StaticInit::new(*limits));
-        if let Some(Ok(rest)) = rest.add(sample) {
-            self.learn(&rest, temperature, learned);
+    ) -> bool {
+        let was_moved = self.is_moved;
+        if let Some(rest) = &learned.specific_force
+            && self.forward.add(sample, wheels, rest)
+            && let Some(forward) = self.forward.forward()
+        {
+            self.learn_forward(forward, learned);
         }
+        let still = wheels.standstill == Standstill::Still;
+        if let Some(sample) = sample.filter(|sample| still && sample.validity.is_good()) {
+            let rest = self.rest.get_or_insert_with(|| StaticInit::new(*limits));
+            if let Some(Ok(rest)) = rest.add(sample) {
+                self.learn_rest(&rest, sample.temperature, learned);
+            }
+        } else {
+            self.rest = None;
+        }
+        self.is_moved && !was_moved
     }
 
-    /// Takes three seconds at rest; those of a sensor that was moved are not used.
-    pub fn learn(&mut self, rest: &Rest, temperature: CentiCelsius, learned: &mut Learned) {
-        if !learned.accept(rest.specific_force) {
+    /// Takes three seconds at rest of a static calibration, which holds for a sensor that was moved, too.
+    pub fn calibrated(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
+        learned.specific_force = Some(rest.specific_force);
+        if core::mem::take(&mut self.is_moved) {
+            learned.forward = None;
+            self.forward = ForwardEstimator::START;
+        }
+        self.learn_rest(rest, temperature, learned);
+    }
+
+    fn learn_rest(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
+        self.is_moved |= !learned.accept(rest.specific_force);
+        if self.is_moved {
             return;
         }
-        let filter = self.filter.get_or_insert_with(|| CurveFilter::new(&learned.bias_curve));
-        filter.add(temperature, rest.angular_rate);
-        learned.bias_curve = filter.curve();
+        if let Some(temperature) = temperature {
+            let filter = self.filter.get_or_insert_with(|| CurveFilter::new(&learned.bias_curve));
+            filter.add(temperature, rest.angular_rate);
+            learned.bias_curve = filter.curve();
+        }
         self.rests = self.rests.saturating_add(1);
         self.is_changed |= self.rests.is_power_of_two();
+    }
+
+    /// Holds the direction of this start against the one that is known, and keeps the better one.
+    fn learn_forward(&mut self, forward: Forward, learned: &mut Learned) {
+        let known = learned.forward;
+        self.is_moved |= forward.sigma < SURE && known.is_some_and(|known| known.is_beyond(&forward, MOVED));
+        let is_better = forward.sigma < known.map_or(KNOWN, |known| known.sigma / 2.0);
+        if is_better && !self.is_moved {
+            learned.forward = Some(forward);
+            self.is_changed = true;
+        }
     }
 }
 

@@ -107,8 +107,9 @@ impl Display for EventKind {
             Self::AccessRefused(error) => write!(f, "record of who may write refused, nobody may: {error}"),
             Self::KeyStored => f.write_str("key stored: what is written must be signed"),
             Self::KeyRemoved => f.write_str("key removed: everyone may write"),
-            Self::LearnedRefused(error) => write!(f, "bias table not read or stored: {error}"),
-            Self::LearnedStored => f.write_str("bias table stored"),
+            Self::LearnedRefused(error) => write!(f, "what was learnt not read or stored: {error}"),
+            Self::LearnedStored => f.write_str("what was learnt stored"),
+            Self::MountMoved => f.write_str("the sensor was moved since earlier drives"),
             Self::TroublesRefused(error) => write!(f, "memory of troubles not read or stored: {error}"),
             Self::Sensor(Some(fault)) => write!(f, "sensor not set up: {fault}"),
         }

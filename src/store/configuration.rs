@@ -104,8 +104,8 @@ pub struct Configuration {
     pub diagnosis: DiagnosisIds,
     /// Number of the fibre-optic gyro, 0 where it is not known: FoGNet's weights for one gyro run on that one alone.
     pub fog_serial: u32,
-    /// The board learns the sensor's bias by temperature at standstill, and uses what it has learnt.
-    pub learn_bias: bool,
+    /// The board learns the sensor's bias by temperature, and where forward is, and uses what it has learnt.
+    pub learn: bool,
 }
 
 impl Configuration {
@@ -123,20 +123,20 @@ impl Configuration {
         slcan_inputs: false,
         diagnosis: DiagnosisIds::DEFAULT,
         fog_serial: 0,
-        learn_bias: true,
+        learn: true,
     };
 }
 
 impl Configuration {
-    /// Makes the pipeline's configuration from this one, a calibration and what the board has learnt. A level that was found on level ground
-    /// completes the mounting, and levelling by the street is off. The map of the gyro applies only with the weights it
-    /// was found with.
+    /// Makes the pipeline's configuration from this one, a calibration and what the board has learnt. A level that was
+    /// found on level ground completes the mounting, and levelling by the street is off. The map of the gyro applies only
+    /// with the weights it was found with.
     #[must_use]
     pub fn pipeline(&self, calibration: &Calibration, learned: &Learned, weights: u32) -> PipelineConfig {
         // All angles have been checked to be finite.
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let level = calibration.level.as_ref().and_then(Level::rotation);
-        let learned = if self.learn_bias { learned } else { &Learned::NOTHING };
+        let learned = if self.learn { learned } else { &Learned::NOTHING };
         PipelineConfig {
             bias_curve: learned.bias_curve,
             rest_force: learned.specific_force,
@@ -226,7 +226,7 @@ impl Record for Configuration {
 
     /// Returns the bytes that older layouts lack at their end: 1 ended before `fog_ids`, which were [`FOG_IDS`], here
     /// as varints; 2 ended before `fog_lane`, 3 before `slcan_inputs`, 4 before `fog_serial`, 5 before
-    /// `learn_bias`.
+    /// `learn`.
     fn missing(version: u8) -> Option<&'static [u8]> {
         const ALL: &[u8] =
             &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0xE0, 0x0F, 0xDF, 0x0F, 0xE8, 0x0F, 0, 1];

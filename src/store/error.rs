@@ -28,6 +28,7 @@ pub enum Field {
     CalibrationPitchDeg,
     CalibrationGyroMap,
     BiasCurve,
+    Forward,
 }
 
 impl Field {
@@ -52,6 +53,7 @@ impl Field {
             Self::CalibrationPitchDeg => "level.pitch_deg",
             Self::CalibrationGyroMap => "gyro_map",
             Self::BiasCurve => "bias_curve",
+            Self::Forward => "forward",
         }
     }
 }

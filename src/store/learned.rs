@@ -1,16 +1,16 @@
-//! The record of what the board has learnt about its sensor at standstill: the bias by temperature, and where up is.
+//! The record of what the board has learnt about its sensor: the bias by temperature, and where up and forward are.
 
 use super::error::{Field, FieldError};
 use super::record::Record;
 use crate::bias::BiasCurve;
-use crate::mounting::is_moved;
+use crate::mounting::{Forward, Rotation, is_moved};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};
 
 /// A standstill changes the mean specific force by one part in so many.
 const MEMORY: i64 = 8;
 
-/// Holds what standstills have shown about the sensor, in its own axes.
+/// Holds what standstills and drives have shown about the sensor, in its own axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Learned {
@@ -18,11 +18,13 @@ pub struct Learned {
     pub bias_curve: BiasCurve,
     /// Mean specific force; `None` before the first standstill.
     pub specific_force: Option<[SpecificForce; 3]>,
+    /// The vehicle's forward direction; `None` before a drive has shown it within 10 degrees.
+    pub forward: Option<Forward>,
 }
 
 impl Learned {
     /// Nothing is known.
-    pub const NOTHING: Self = Self { bias_curve: BiasCurve::UNKNOWN, specific_force: None };
+    pub const NOTHING: Self = Self { bias_curve: BiasCurve::UNKNOWN, specific_force: None, forward: None };
 
     /// Takes the mean specific force of a standstill. Returns whether it is that of a sensor that was not moved.
     pub fn accept(&mut self, specific_force: [SpecificForce; 3]) -> bool {
@@ -37,12 +39,28 @@ impl Learned {
     }
 }
 
+impl Learned {
+    /// Returns the angle from the x axis of a mounting to the forward direction, to the left, and its sigma, deg; 0 where
+    /// the mounting is right.
+    #[must_use]
+    pub fn yaw_deg(&self, mounting: &Rotation) -> Option<[f32; 2]> {
+        let (forward, rest) = self.forward.zip(self.specific_force)?;
+        Some([forward.yaw(mounting, rest), forward.sigma].map(f32::to_degrees))
+    }
+}
+
 impl Record for Learned {
     const KEY: u8 = 7;
     const VERSION: u8 = 1;
 
     fn check(&self) -> Result<(), FieldError> {
-        if self.bias_curve.is_plausible() { Ok(()) } else { Err(FieldError::Implausible(Field::BiasCurve)) }
+        if !self.bias_curve.is_plausible() {
+            return Err(FieldError::Implausible(Field::BiasCurve));
+        }
+        if !self.forward.is_none_or(|forward| forward.is_plausible()) {
+            return Err(FieldError::Implausible(Field::Forward));
+        }
+        Ok(())
     }
 }
 

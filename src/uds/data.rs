@@ -25,7 +25,8 @@
 //! | 0112 | 4 | messages of the fibre-optic gyro since the start, by themselves | |
 //! | 0113 | 4 each | requests that were refused for want of access, in the order of [`AccessCounters`] | |
 //! | 0114 | 1, 4 | FoGNet: 0 off, 1 its weights are used, 2 they are refused (why: 010A); their CRC-32 | |
-//! | 0115 | postcard | what standstills have shown about the sensor: [`crate::store::Learned`] | |
+//! | 0115 | postcard | what standstills and drives have shown about the sensor: [`crate::store::Learned`] | |
+//! | 0116 | 1, 2, 2 | forward direction: 0 unknown, 1 within 10 deg, 2 within 3 deg; its angle to the left of the configured x axis, its sigma, both 1/100 deg | |
 //! | 0201 to 021E | | [`super::settings`], each by itself | extended |
 //!
 //! Numbers are big-endian, as everywhere in ISO 14229.
@@ -43,6 +44,9 @@ use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+
+/// A forward direction with a smaller sigma is fine, others are coarse, deg.
+const FINE_DEG: f32 = 3.0;
 
 /// Lists the fields of a type in this order; one that is left out does not compile.
 macro_rules! words {
@@ -151,6 +155,13 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             put(out, &crc.to_be_bytes())
         }
         0x0115 => put_record(out, device.learned()),
+        0x0116 => {
+            let known = device.forward_deg();
+            let [yaw, sigma] = known.unwrap_or_default().map(|angle| libm::roundf(100.0 * angle) as i16);
+            put(out, &[known.map_or(0, |[_, sigma]| if sigma <= FINE_DEG { 2 } else { 1 })])?;
+            put(out, &yaw.to_be_bytes())?;
+            put(out, &sigma.to_be_bytes())
+        }
         _ => settings::read(id, device, out),
     }
 }

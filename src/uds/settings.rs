@@ -74,7 +74,7 @@ settings! { c:
     0x021B => c.can.yaw.as_mut().ok_or(Nrc::ConditionsNotCorrect)?.e2e,
     0x021C => c.can.vdc2,
     0x021D => c.fog_serial,
-    0x021E => c.learn_bias,
+    0x021E => c.learn,
 }
 
 /// Appends the value of a setting.

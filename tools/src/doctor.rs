@@ -6,6 +6,7 @@
 
 mod allan;
 mod finding;
+mod forward;
 mod mounting;
 mod page;
 mod range;
@@ -81,6 +82,7 @@ impl Doctor {
                 "Not a column of a drive: a bias that follows temperature cannot be told from one that drifts.",
             ),
             mounting::finding(mounting.as_ref()),
+            forward::finding(rows, mounting.as_ref()),
             wheels::finding(rows),
             reference::finding(rows, longest),
             scope::finding(rows, &standstills),

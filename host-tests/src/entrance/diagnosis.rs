@@ -6,7 +6,7 @@ use crate::noise::Noise;
 use crate::synthetic::idling;
 use crate::tester::segment;
 use gyronet::health::{Faults, Status};
-use gyronet::sample::Standstill;
+use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::RECORD_SECTOR;
@@ -47,7 +47,12 @@ pub fn frames(mut data: &[u8]) {
     let mut noise = Noise::new(1);
     for tick in 0..if choice & 1 != 0 { 310 } else { 0 } {
         let sample = idling(tick, 0.001, &mut noise);
-        board.observe(Some(&sample), 0, (Status::Ready, Faults::NONE), Standstill::Still);
+        board.observe(
+            Some(&sample),
+            0,
+            (Status::Ready, Faults::NONE),
+            &WheelSample::without_speeds(Standstill::Still),
+        );
     }
     let mut bench = Bench { server: Server::new(), board, now: u32::MAX - 1_000 };
     while !data.is_empty() {

@@ -6,6 +6,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 use gyronet::Coprocessor;
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::model::blob::CRC;
+use gyronet::mounting::Forward;
 use gyronet::sample::ImuSample;
 use gyronet::store::{Accepted, Calibration, Configuration, Learned, Level, Record, Store};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
@@ -71,7 +72,11 @@ pub fn seeds() -> Vec<Seed> {
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
     let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
     filter.add(CentiCelsius(2_500), [AngularRate(5), AngularRate(-5), AngularRate(7)]);
-    let learned = Learned { bias_curve: filter.curve(), specific_force: Some([SpecificForce(1 << 20); 3]) };
+    let learned = Learned {
+        bias_curve: filter.curve(),
+        specific_force: Some([SpecificForce(1 << 20); 3]),
+        forward: Some(Forward { direction: [0.6, 0.8, 0.0], sigma: 0.05 }),
+    };
     // The first sector, as the flash has it.
     let mut raw = vec![0; 1 + SECTOR];
     let mut flash = Flash::new(&[]);

@@ -121,8 +121,13 @@ fn a_sensor_that_was_moved_is_reported() {
     assert_eq!(first.status, Status::Init, "no early rate of a sensor that was moved");
     let last = &outputs.last().expect("samples").vehicle.navigation;
     assert!(last.faults.contains(Faults::IMPLAUSIBLE));
-    let (pipeline, outputs) = run(known(), 500, |_| 20.0, 400, 0.0);
+    let (mut pipeline, outputs) = run(known(), 500, |_| 20.0, 400, 0.0);
     assert_eq!(pipeline.counters().moved_mounts, 0);
+    // A drive has shown it.
+    (0..2).for_each(|_| pipeline.mount_moved());
+    assert_eq!(pipeline.counters().moved_mounts, 1);
+    let next = pipeline.correct(turning(501, rate(0.0))).expect("in order").vehicle.navigation;
+    assert!(next.faults.contains(Faults::IMPLAUSIBLE));
     assert!(outputs.iter().all(|output| !output.vehicle.navigation.faults.contains(Faults::IMPLAUSIBLE)));
 }
 

@@ -88,7 +88,10 @@ fn a_sample_gives_its_frames_once_and_an_observation() {
     let mut car = Car::new(Config::DEFAULT);
     let observation = car.sample();
     assert_eq!(observation.sample.map(|sample| sample.time), Some(Micros(0)));
-    assert_eq!((observation.vehicle.prompt.status, observation.wheels), (Status::Init, Standstill::Unknown));
+    assert_eq!(
+        (observation.vehicle.prompt.status, observation.wheels.standstill),
+        (Status::Init, Standstill::Unknown)
+    );
     let sent: Vec<_> = std::iter::from_fn(|| car.coprocessor.next_frame()).collect();
     assert_eq!(sent.len(), SET);
     assert!(sent.iter().all(|frame| frame.time == Micros(0)), "stamped with the sample's time");
@@ -233,7 +236,7 @@ fn wheels_are_judged_by_the_clock_that_is_configured() {
             let now = Micros(at(*tick).0 / pace);
             coprocessor.can(&wheel_frame(&STANDS), now).expect("a wheel frame");
             let observation = coprocessor.imu(idling(*tick, 0.001, &mut noise), now).expect("in time");
-            observation.wheels == Standstill::Still
+            observation.wheels.standstill == Standstill::Still
         });
         let expected = if clock == Clock::Outside && pace == 10 { None } else { Some(50) };
         assert_eq!(still, expected, "{clock:?} at {pace} times the pace");

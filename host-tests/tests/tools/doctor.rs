@@ -2,6 +2,7 @@
 
 use gyronet_host_tests::recordings::{folder, trial};
 use gyronet_host_tests::require::{Need, wants};
+use gyronet_tools::bundled;
 use gyronet_tools::doctor::{Doctor, Mounting, Noise, Verdict, page};
 use gyronet_tools::drive::vehicle::Vehicle;
 use gyronet_tools::import::drive::{Logs, Request};
@@ -50,7 +51,7 @@ fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
     drive.write_csv(BufWriter::new(File::create(&csv).unwrap())).unwrap();
 
     let doctor = Doctor::examine(&csv).unwrap();
-    let Some(Mounting { roll_deg, pitch_deg, force }) = doctor.mounting else { panic!() };
+    let Some(Mounting { roll_deg, pitch_deg, force, .. }) = doctor.mounting else { panic!() };
     assert!(
         roll_deg.abs() < 2.0 && pitch_deg.abs() < 2.0 && (9.6..10.2).contains(&force),
         "{:?}",
@@ -68,4 +69,29 @@ fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
     // A few lines of NumPy on the same column give 0.0082 deg/s at the bottom of z, at 42 s.
     let (rate, tau) = noise[2].instability.unwrap();
     assert!((rate.to_degrees() * 0.664 - 0.0082).abs() < 2e-4 && (30.0..55.0).contains(&tau), "{rate} {tau}");
+}
+
+/// Returns the angle and the sigma that the finding on the forward direction names.
+fn forward(doctor: &Doctor) -> [f64; 2] {
+    let text = &doctor.finding("forward").unwrap().text;
+    let mut numbers = text.split(' ').filter_map(|word| word.parse().ok());
+    [(); 2].map(|()| numbers.next().unwrap_or_else(|| panic!("{text}")))
+}
+
+#[test]
+fn wheels_and_accelerometer_show_where_forward_is() {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
+    for mounted in [0.0, 90.0, -120.0] {
+        let csv = folder.join(format!("forward_{mounted}.csv"));
+        std::fs::write(&csv, bundled::SIMULATED_DRIVE).unwrap();
+        std::fs::write(csv.with_extension("toml"), format!("[mounting]\nyaw_deg = {mounted}\n")).unwrap();
+        let [yaw, sigma] = forward(&Doctor::examine(&csv).unwrap());
+        assert!((yaw - mounted).abs() < 3.0 * sigma && sigma < 5.0, "{mounted}: {yaw} +- {sigma}");
+    }
+    // The recorded car's sensor looks to the right; five of its drives agree.
+    for number in [2, 3, 4, 7, 8] {
+        let Some(path) = trial("wheels_and_accelerometer_show_where_forward_is", number) else { return };
+        let [yaw, sigma] = forward(&Doctor::examine(&path).unwrap());
+        assert!((yaw - 98.0).abs() < 2.0 * sigma && sigma < 10.0, "{number}: {yaw} +- {sigma}");
+    }
 }

@@ -9,7 +9,7 @@ use crate::ring::Ring;
 use crate::stm32f405::{clocks, timer};
 use gyronet::health::{Faults, Status};
 use gyronet::model::background::BackgroundCheck;
-use gyronet::sample::{ImuSample, Standstill};
+use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
 use gyronet::service::event::ClockFault;
 use gyronet::service::message::AllCounters;
@@ -26,13 +26,19 @@ pub struct Observation {
     pub tick: u32,
     pub status: Status,
     pub faults: Faults,
-    pub wheels: Standstill,
+    pub wheels: WheelSample,
 }
 
 /// Samples that idle has not looked at.
 pub static OBSERVATIONS: Ring<Observation, 8> =
     // SAFETY: the output task writes, idle reads.
     unsafe { Ring::new() };
+
+/// Faults that the idle task has found, for the coprocessor.
+pub struct Found {
+    pub weights_damaged: bool,
+    pub mount_moved: bool,
+}
 
 /// Holds the state of the idle task.
 pub struct Idle {
@@ -63,9 +69,9 @@ impl Idle {
         Self { device, check, diagnosis, fog_network, bring_up, clock_fault, retried: 0, milliseconds: 0 }
     }
 
-    /// Does a bounded piece of work, and returns whether the weights were found to be damaged.
+    /// Does a bounded piece of work, and returns what it has found.
     #[inline(never)]
-    pub fn turn(&mut self, counters: &mut AllCounters) -> bool {
+    pub fn turn(&mut self, counters: &mut AllCounters) -> Found {
         self.observe();
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::turn) {
             self.device.sensor(result);
@@ -76,13 +82,13 @@ impl Idle {
             self.fog_network.stop();
         }
         self.retry_clock();
-        self.check()
+        Found { weights_damaged: self.check(), mount_moved: self.device.take_mount_moved() }
     }
 
     #[inline(never)]
     fn observe(&mut self) {
         while let Some(Observation { sample, tick, status, faults, wheels }) = OBSERVATIONS.pop() {
-            self.device.observe(sample.as_ref(), tick, (status, faults), wheels);
+            self.device.observe(sample.as_ref(), tick, (status, faults), &wheels);
         }
     }
 

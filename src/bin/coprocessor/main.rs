@@ -240,9 +240,12 @@ mod app {
     fn idle(mut cx: idle::Context) -> ! {
         loop {
             let mut counters = cx.shared.counters.lock(|counters| *counters);
-            let damaged = cx.local.rest.turn(&mut counters);
-            if damaged {
+            let found = cx.local.rest.turn(&mut counters);
+            if found.weights_damaged {
                 cx.shared.coprocessor.lock(|coprocessor| coprocessor.weights_damaged());
+            }
+            if found.mount_moved {
+                cx.shared.coprocessor.lock(|coprocessor| coprocessor.mount_moved());
             }
             let fog_network = cx.local.rest.fog_network();
             if fog_network.is_waiting() {

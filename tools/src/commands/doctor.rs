@@ -16,8 +16,8 @@ use std::path::PathBuf;
 /// Examine a recording before anyone trusts it.
 ///
 /// The page has rate and gaps, saturation, noise with its random walk and bias instability, standstills, mounting by
-/// gravity, wheels against gyro, the reference, what can and cannot be judged on the recording, and what a calibration
-/// and a training could gain. The exit status is 1 where something is to be cured first.
+/// gravity, forward by wheels and accelerometer, wheels against gyro, the reference, what can and cannot be judged on the
+/// recording, and what a calibration and a training could gain. The exit status is 1 where something is to be cured first.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:

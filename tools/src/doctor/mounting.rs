@@ -16,6 +16,8 @@ pub struct Mounting {
     pub pitch_deg: f64,
     /// Length of the specific force, m/s^2.
     pub force: f64,
+    /// The specific force, m/s^2.
+    pub rest: [f64; 3],
 }
 
 impl Mounting {
@@ -28,13 +30,14 @@ impl Mounting {
             roll_deg: y.atan2(z).to_degrees(),
             pitch_deg: (-x).atan2(y.hypot(z)).to_degrees(),
             force: length,
+            rest: [x, y, z],
         })
     }
 }
 
 pub fn finding(mounting: Option<&Mounting>) -> Finding {
     let what = "mounting";
-    let Some(Mounting { roll_deg, pitch_deg, force }) = mounting else {
+    let Some(Mounting { roll_deg, pitch_deg, force, .. }) = mounting else {
         return Finding::note(what, "No standstill to see gravity at.");
     };
     let excess = force / GRAVITY - 1.0;
@@ -53,6 +56,6 @@ pub fn finding(mounting: Option<&Mounting>) -> Finding {
             format!("{angles}: beyond {} deg the board levels by itself, better name it.", TILT.0),
         )
     } else {
-        Finding::good(what, format!("{angles}. Gravity does not show the yaw angle."))
+        Finding::good(what, format!("{angles}."))
     }
 }

@@ -133,7 +133,7 @@ impl Replay {
                 start = Some(steps.len());
             }
             let settled = vehicle.prompt.rate;
-            let standstill = observation.wheels;
+            let standstill = observation.wheels.standstill;
             steps.push(Step { row: index, time, standstill, vehicle, navigation: None, settled, frames });
             if vehicle.navigation.status != Status::Init
                 && let Some(step) = earlier(&mut steps, vehicle.navigation.tick)

@@ -9,7 +9,7 @@ use gyronet::bias::BiasCurve;
 use gyronet::health::Status;
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
-use gyronet::sample::RATE_HZ;
+use gyronet::sample::{RATE_HZ, WheelSample};
 use gyronet::service::Learner;
 use gyronet::store::{Calibration, Configuration, Learned};
 use serde::Serialize;
@@ -138,7 +138,7 @@ fn learn(drive: &Drive, replay: &Replay, learned: &mut Learned) {
     let limits = Configuration::DEFAULT.static_init;
     for step in &replay.steps {
         let sample = drive.recording.rows[step.row].sample;
-        learner.observe(Some(&sample), step.standstill, &limits, learned);
+        learner.observe(Some(&sample), &WheelSample::without_speeds(step.standstill), &limits, learned);
     }
 }
 

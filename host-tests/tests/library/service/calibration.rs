@@ -3,8 +3,8 @@
 use super::{Board, ask, sample, set, start};
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::health::{Faults, Status};
-use gyronet::mounting::GyroMap;
-use gyronet::sample::Standstill;
+use gyronet::mounting::{Forward, GyroMap};
+use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::Request;
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::message::{Calibrate, Refusal};
@@ -25,7 +25,7 @@ fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> Sta
             Some(&sample(k, force, rate)),
             k as u32,
             (Status::Ready, Faults::NONE),
-            Standstill::Still,
+            &WheelSample::without_speeds(Standstill::Still),
         );
     }
     board.calibration_state()
@@ -99,8 +99,11 @@ fn configured_rotation_comes_first() {
 fn what_was_learnt_fits_a_response_and_a_record() {
     let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
     filter.add(CentiCelsius(-3_000), [AngularRate(-11_000_000); 3]);
-    let learned =
-        Learned { bias_curve: filter.curve(), specific_force: Some([SpecificForce(-10_000_000); 3]) };
+    let learned = Learned {
+        bias_curve: filter.curve(),
+        specific_force: Some([SpecificForce(-10_000_000); 3]),
+        forward: Some(Forward { direction: [-0.577; 3], sigma: 0.171 }),
+    };
     let record = postcard::to_stdvec(&learned).expect("there is room");
     assert!(record.len() + 4 <= LONGEST, "{} bytes", record.len());
     let flash = Rc::new(RefCell::new(F405::default()));

@@ -6,7 +6,7 @@ use gyronet::can::config::{ConfigError, Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::wheel::{WheelConfigError, WheelFrame, WheelSettings};
 use gyronet::health::{Faults, Status};
-use gyronet::sample::Standstill;
+use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::Request;
 use gyronet::service::event::EventKind;
 use gyronet::service::message::{Calibrate, FlashState, Network, Origin, Refusal};
@@ -159,7 +159,7 @@ fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standst
             Some(&sample(k, [0.0, 0.0, 9.81], rate)),
             k as u32,
             (Status::Ready, Faults::NONE),
-            wheels,
+            &WheelSample::without_speeds(wheels),
         );
     }
     match ask(board, &set(&Configuration::DEFAULT)) {
@@ -179,9 +179,19 @@ fn flash_is_written_at_standstill_alone() {
     assert!(!storable(&mut board, 2..202, 0.001, Standstill::Unknown), "quiet for two seconds");
     assert!(storable(&mut board, 202..402, 0.001, Standstill::Unknown), "quiet for more than three");
     assert!(!storable(&mut board, 402..602, 0.3, Standstill::Unknown), "a gyro that moves");
-    board.observe(None, 700, (Status::Silent, Faults::NONE), Standstill::Unknown);
+    board.observe(
+        None,
+        700,
+        (Status::Silent, Faults::NONE),
+        &WheelSample::without_speeds(Standstill::Unknown),
+    );
     assert!(storable(&mut board, 0..0, 0.0, Standstill::Unknown), "a bench without a sensor");
-    board.observe(None, 701, (Status::Silent, Faults::NONE), Standstill::Moving);
+    board.observe(
+        None,
+        701,
+        (Status::Silent, Faults::NONE),
+        &WheelSample::without_speeds(Standstill::Moving),
+    );
     for request in [
         Request::WeightsBegin { network: Network::GyroNet, length: 64 },
         Request::WeightsBlock { offset: 0, bytes: &[] },

@@ -1,15 +1,18 @@
-//! The board learns its sensor's bias by temperature while the wheels stand, keeps it over a restart, and forgets it on
-//! request.
+//! The board learns its sensor's bias by temperature while the wheels stand and where forward is while they turn, keeps
+//! both over a restart, and forgets them on request.
 
 use super::uds::{Bench, bench};
 use super::{Board, ask, sample, set, start};
 use gyronet::health::{Faults, Status};
-use gyronet::sample::{ImuSample, Standstill};
+use gyronet::sample::{ImuSample, Standstill, WheelSample};
 use gyronet::service::Request;
+use gyronet::service::calibrate::Task;
+use gyronet::service::event::EventKind;
 use gyronet::service::message::Calibrate;
 use gyronet::store::{Calibration, Configuration};
-use gyronet::units::CentiCelsius;
+use gyronet::units::{CentiCelsius, WheelSpeed};
 use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::noise::Noise;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -26,7 +29,8 @@ fn observe(
     for tick in 0..100 * seconds {
         let temperature = Some(CentiCelsius(celsius * 100));
         let sample = ImuSample { temperature, ..sample(tick, force, bias) };
-        board.observe(Some(&sample), tick as u32, (Status::Ready, Faults::NONE), wheels);
+        let wheels = WheelSample::without_speeds(wheels);
+        board.observe(Some(&sample), tick as u32, (Status::Ready, Faults::NONE), &wheels);
     }
 }
 
@@ -73,7 +77,7 @@ fn what_was_learnt_survives_a_restart_and_is_used_where_the_configuration_wants_
         table.at(20.0).map(|bias| bias.gyro_bias[2].rad_per_sec())
     };
     assert!(is_near(used(Configuration::DEFAULT, &bench.board), 0.01));
-    let off = Configuration { learn_bias: false, ..Configuration::DEFAULT };
+    let off = Configuration { learn: false, ..Configuration::DEFAULT };
     assert_eq!(used(off, &bench.board), None);
     assert_eq!(ask(&mut bench.board, &set(&off)), Ok(()));
     let (mut board, before) = (start(&flash), *bench.board.learned());
@@ -97,4 +101,74 @@ fn a_tester_reads_what_was_learnt_and_has_it_forgotten() {
     assert_eq!(learned(&bench.board, 20.0), None);
     assert_eq!(learned(&start(&flash), 20.0), None);
     assert_eq!(ask(&mut bench.board, &Request::Calibrate(Calibrate::Forget)), Ok(()));
+}
+
+/// Lets the board see a drive with the sensor's x axis this far to the left of forward, deg: speed and yaw rate change
+/// in waves.
+fn drive(board: &mut Board, seconds: u64, yaw_deg: f64) {
+    let (sin, cos) = yaw_deg.to_radians().sin_cos();
+    let mut noise = Noise::new(3);
+    for tick in 0..100 * seconds {
+        let time = 0.01 * tick as f64;
+        let (speed, turn) = (15.0 + 5.0 * (0.2 * time).sin(), 0.2 * (0.13 * time).sin());
+        let (ahead, left) = ((0.2 * time).cos() + 0.4 * noise.normal(), speed * turn + 0.4 * noise.normal());
+        let force = [cos * ahead + sin * left, cos * left - sin * ahead, 9.81].map(|axis| axis as f32);
+        let sample = sample(tick, force, turn as f32);
+        let speeds = [Some(WheelSpeed((speed * 65_536.0) as i32)); 4];
+        let wheels = WheelSample { speeds, ..WheelSample::without_speeds(Standstill::Moving) };
+        board.observe(Some(&sample), tick as u32, (Status::Ready, Faults::NONE), &wheels);
+    }
+}
+
+fn moved_events(board: &Board) -> usize {
+    board.events(0).events.iter().filter(|event| event.kind == EventKind::MountMoved).count()
+}
+
+#[test]
+fn a_drive_shows_where_forward_is_and_that_the_sensor_was_moved() {
+    let (flash, mut bench) = bench();
+    assert_eq!(ask(&mut bench.board, &set(&Configuration::DEFAULT)), Ok(()));
+    bench.expect(&[0x22, 0x01, 0x16], &[0x62, 0x01, 0x16, 0, 0, 0, 0, 0]);
+    drive(&mut bench.board, 60, 20.0);
+    assert_eq!(bench.board.forward_deg(), None, "where up is only a standstill shows");
+    observe(&mut bench.board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    drive(&mut bench.board, 120, 20.0);
+    let [yaw, sigma] = bench.board.forward_deg().expect("a drive");
+    assert!((yaw + 20.0).abs() < 3.0 * sigma && sigma < 3.0, "{yaw} +- {sigma}");
+    let hundredths = |angle: f32| ((100.0 * angle).round() as i16).to_be_bytes();
+    let response = [&[0x62, 0x01, 0x16, 2][..], &hundredths(yaw), &hundredths(sigma)].concat();
+    bench.expect(&[0x22, 0x01, 0x16], &response);
+    assert!(!bench.board.take_mount_moved());
+
+    // At the next stop it is stored; a start knows it.
+    observe(&mut bench.board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    let mut board = start(&flash);
+    assert_eq!(board.forward_deg(), Some([yaw, sigma]));
+    let before = *board.learned();
+
+    // Somebody has turned the sensor: it stands as level as before.
+    drive(&mut board, 120, 80.0);
+    assert!(board.take_mount_moved() && !board.take_mount_moved(), "once");
+    assert_eq!(moved_events(&board), 1);
+    observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    assert_eq!(*board.learned(), before, "nothing is learnt");
+
+    // Its owner says that this is right.
+    assert_eq!(ask(&mut board, &Request::Calibrate(Calibrate::Start(Task::Static))), Ok(()));
+    observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    drive(&mut board, 120, 80.0);
+    let [yaw, sigma] = board.forward_deg().expect("a drive");
+    assert!((yaw + 80.0).abs() < 3.0 * sigma && !board.take_mount_moved(), "{yaw} +- {sigma}");
+}
+
+#[test]
+fn a_board_that_must_not_learn_does_not_look_for_forward() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let off = Configuration { learn: false, ..Configuration::DEFAULT };
+    assert_eq!(ask(&mut start(&flash), &set(&off)), Ok(()));
+    let mut board = start(&flash);
+    observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    drive(&mut board, 120, 20.0);
+    assert_eq!(board.forward_deg(), None);
 }

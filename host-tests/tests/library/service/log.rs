@@ -2,7 +2,7 @@
 
 use super::{IDENTITY, bare, info, sample};
 use gyronet::health::{Faults, Status};
-use gyronet::sample::Standstill;
+use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::{EventKind, ResetCause, SensorFault};
 
 #[test]
@@ -32,7 +32,7 @@ fn the_log_is_bounded_and_reports_what_is_lost() {
             Some(&sample(k, [0.0, 0.0, 9.8], 0.0)),
             k as u32,
             (status, Faults::NONE),
-            Standstill::Still,
+            &WheelSample::without_speeds(Standstill::Still),
         );
     }
     let (mut after, mut events, mut lost) = (2, 0, 0);

@@ -4,7 +4,7 @@
 use super::{Board, sample, start};
 use gyronet::health::{Faults, Status};
 use gyronet::model::weights;
-use gyronet::sample::Standstill;
+use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
@@ -58,12 +58,17 @@ impl Bench {
         for k in 0..400 {
             let at_rest = sample(k, [0.0, 0.0, 9.81], 0.0);
             let good = (Status::Ready, Faults::NONE);
-            self.board.observe(Some(&at_rest), k as u32, good, Standstill::Still);
+            self.board.observe(
+                Some(&at_rest),
+                k as u32,
+                good,
+                &WheelSample::without_speeds(Standstill::Still),
+            );
         }
     }
 
     fn fail(&mut self, status: Status, faults: Faults) {
-        self.board.observe(None, 0, (status, faults), Standstill::Unknown);
+        self.board.observe(None, 0, (status, faults), &WheelSample::without_speeds(Standstill::Unknown));
         self.server.turn(&mut self.board, &AllCounters::default(), self.now, || None);
     }
 }
@@ -208,7 +213,12 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     let (flash, mut bench) = bench();
     // Something has been stored before: there is room without an erase.
     assert_eq!(super::ask(&mut bench.board, &super::set(&Configuration::DEFAULT)), Ok(()));
-    bench.board.observe(None, 1_234, (Status::Silent, Faults::GAP), Standstill::Unknown);
+    bench.board.observe(
+        None,
+        1_234,
+        (Status::Silent, Faults::GAP),
+        &WheelSample::without_speeds(Standstill::Unknown),
+    );
     let operations = flash.borrow().operations();
     bench.server.turn(&mut bench.board, &AllCounters::default(), 0, || None);
     assert!(flash.borrow().operations() > operations);
@@ -269,7 +279,12 @@ fn messages_are_stopped_at_standstill_and_for_the_length_of_a_session() {
     let (_, mut bench) = bench();
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
-    bench.board.observe(Some(&turning), 0, (Status::Ready, Faults::NONE), Standstill::Moving);
+    bench.board.observe(
+        Some(&turning),
+        0,
+        (Status::Ready, Faults::NONE),
+        &WheelSample::without_speeds(Standstill::Moving),
+    );
     bench.expect(&[0x28, 1, 1], &[0x7F, 0x28, 0x22]);
     assert!(!bench.server.is_silenced());
     bench.stand();
@@ -294,7 +309,12 @@ fn a_configuration_is_read_changed_and_written_at_standstill() {
     write.extend(postcard::to_stdvec(&changed).expect("it fits"));
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
-    bench.board.observe(Some(&turning), 0, (Status::Ready, Faults::NONE), Standstill::Moving);
+    bench.board.observe(
+        Some(&turning),
+        0,
+        (Status::Ready, Faults::NONE),
+        &WheelSample::without_speeds(Standstill::Moving),
+    );
     bench.expect(&write, &[0x7F, 0x2E, 0x22]);
     bench.stand();
     bench.expect(&write, &[0x6E, 1, 0]);

@@ -8,11 +8,15 @@ use serde_json::{Value, json};
 /// The bias by temperature is printed at these, deg C.
 const TEMPERATURES: [f32; 6] = [-20.0, 0.0, 20.0, 40.0, 60.0, 80.0];
 
-/// Both by names with units.
+/// Both by names with units, and where forward is, with its sigma, deg.
 ///
 /// # Errors
 /// [`serde_json::Error`], which no calibration gives.
-pub fn to_value(calibration: &Calibration, learned: &Learned) -> serde_json::Result<Value> {
+pub fn to_value(
+    calibration: &Calibration,
+    learned: &Learned,
+    forward: Option<[f32; 2]>,
+) -> serde_json::Result<Value> {
     let points = TEMPERATURES.into_iter().filter_map(|celsius| {
         let bias = learned.bias_curve.at(celsius)?;
         Some(json!({
@@ -24,6 +28,7 @@ pub fn to_value(calibration: &Calibration, learned: &Learned) -> serde_json::Res
     Ok(json!({
         "bias_curve": points.collect::<Value>(),
         "specific_force_m_per_s2": learned.specific_force.map(|force| force.map(SpecificForce::metre_per_sec2)),
+        "forward": forward.map(|[yaw, sigma]| json!({ "yaw_deg": yaw, "sigma_deg": sigma })),
         "level": value(&calibration.level)?,
         "unit": calibration.unit.map(|unit| {
             json!({ "gyro_map": unit.gyro_map.elements(), "weights": unit.weights })
@@ -43,15 +48,16 @@ mod tests {
         let bias = [0.01, -0.002, 0.0].map(|rate| AngularRate::from_rad_per_sec(rate).unwrap());
         let (mut calibration, mut learned) = (Calibration::NONE, Learned::NOTHING);
         assert_eq!(
-            to_value(&calibration, &learned).unwrap(),
-            json!({ "bias_curve": [], "specific_force_m_per_s2": null, "level": null, "unit": null })
+            to_value(&calibration, &learned, None).unwrap(),
+            json!({ "bias_curve": [], "specific_force_m_per_s2": null, "forward": null, "level": null, "unit": null })
         );
         let mut filter = CurveFilter::new(&learned.bias_curve);
         (0..100).for_each(|_| filter.add(CentiCelsius(2_000), bias));
         learned.bias_curve = filter.curve();
         learned.specific_force = Some([SpecificForce(1 << 20); 3]);
         calibration.level = Some(Level { roll_deg: 1.5, pitch_deg: -0.25 });
-        let value = to_value(&calibration, &learned).unwrap();
+        let value = to_value(&calibration, &learned, Some([1.5, 2.0])).unwrap();
+        assert_eq!(value["forward"], json!({ "yaw_deg": 1.5, "sigma_deg": 2.0 }));
         let point = &value["bias_curve"][2];
         let [x, y, z] = [0, 1, 2].map(|axis| point["gyro_bias_rad_per_s"][axis].as_f64().unwrap());
         assert!((x - 0.01).abs() < 1e-4 && (y + 0.002).abs() < 1e-4 && z == 0.0, "{value}");

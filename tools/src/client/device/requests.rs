@@ -34,6 +34,7 @@ pub const FOG_MESSAGES: u16 = 0x0112;
 pub const ACCESS: u16 = 0x0111;
 const ACCESS_COUNTERS: u16 = 0x0113;
 const LEARNED: u16 = 0x0115;
+const FORWARD: u16 = 0x0116;
 /// The request for all counters.
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
@@ -121,7 +122,22 @@ impl<B: Bus> Device<B> {
         decode(&self.read(LEARNED)?)
     }
 
-    /// Has the board forget what standstills have shown about its sensor.
+    /// Returns where forward is in the configured axes, deg to the left of x, and its sigma, once drives have shown it.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn forward_deg(&mut self) -> Result<Option<[f32; 2]>> {
+        match *self.read(FORWARD)?.as_slice() {
+            [0, ..] => Ok(None),
+            [_, a, b, c, d] => {
+                let angles = [[a, b], [c, d]].map(i16::from_be_bytes);
+                Ok(Some(angles.map(|angle| f32::from(angle) / 100.0)))
+            }
+            _ => Err(DeviceError::Mismatch),
+        }
+    }
+
+    /// Has the board forget what standstills and drives have shown about its sensor.
     ///
     /// # Errors
     /// [`DeviceError`].

@@ -18,9 +18,9 @@ pub enum What {
     Unit,
     /// Remove the stored gain and mounting.
     NoUnit,
-    /// Forget the bias by temperature, after another sensor was fitted or the sensor was moved.
+    /// Forget what the board has learnt, after another sensor was fitted or the sensor was moved.
     Forget,
-    /// Print the calibration, and the bias by temperature that the board has learnt.
+    /// Print the calibration, and what the board has learnt: the bias by temperature, and where forward is.
     Show,
     /// Stop without a result.
     Cancel,
@@ -79,7 +79,9 @@ pub fn run(
                 if store {
                     device.store_calibration()?;
                 }
-                return print_value(&to_value(&device.calibration()?, &device.learned()?)?, json);
+                let (calibration, learned, forward) =
+                    (device.calibration()?, device.learned()?, device.forward_deg()?);
+                return print_value(&to_value(&calibration, &learned, forward)?, json);
             }
         }
     }

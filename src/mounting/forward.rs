@@ -1,0 +1,294 @@
+//! The vehicle's forward direction shows in the specific force when the wheels change their speed.
+//!
+//! The mean specific force of a second is gravity, plus the change of speed along the forward axis, plus speed times
+//! yaw rate along the left one. Gravity hardly changes from one second to the next, so the differences of neighbouring
+//! seconds depend on the direction of the two axes alone, and least squares finds it. Slopes, bumps and slip are what
+//! is left of the differences; they give the sigma.
+
+use super::Rotation;
+use crate::sample::{ImuSample, RATE_HZ, WheelSample};
+use crate::units::{AngularRate, SpecificForce, WheelSpeed};
+
+/// A slower vehicle may be reversing, which most wheels do not tell, m/s.
+const SLOWEST: f32 = 3.0;
+/// Each second the older ones count this much less, so that some ten minutes are remembered.
+const MEMORY: f32 = 1.0 - 1.0 / 600.0;
+/// The spread of the estimates of five recorded drives (trials 02, 03, 04, 06 and 07) over the sigma that independent
+/// errors would have: roads are uneven for longer than a second.
+const SPREAD: f32 = 1.5;
+/// Fewer seconds show no sigma.
+const FEWEST: f32 = 20.0;
+/// Plausible accelerations by the accelerometer over those by the wheels: others are slip, or another sensor's.
+const PLAUSIBLE: [f32; 2] = [0.5, 2.0];
+
+/// Holds the forward direction of the vehicle in the sensor's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Forward {
+    /// A unit vector.
+    pub direction: [f32; 3],
+    /// Sigma of its angle about the vertical, rad.
+    pub sigma: f32,
+}
+
+impl Forward {
+    /// Returns the angle from the x axis of a mounting to this direction, to the left, rad: 0 where the mounting is
+    /// right. The specific force at rest is in the sensor's axes, too.
+    #[must_use]
+    pub fn yaw(&self, mounting: &Rotation, rest: [SpecificForce; 3]) -> f32 {
+        let level = Rotation::levelling(mounting.force(rest)).map_or(Rotation::IDENTITY, |(level, _)| level);
+        // A unit vector is within the range of the code.
+        let code = self.direction.map(|axis| SpecificForce::from_metre_per_sec2(axis).unwrap_or_default());
+        let [x, y, _] = mounting.then(&level).force(code);
+        libm::atan2f(y.0 as f32, x.0 as f32)
+    }
+
+    /// Returns whether another direction is further away than an angle with this cosine.
+    #[must_use]
+    pub fn is_beyond(&self, other: &Self, cos: f32) -> bool {
+        dot(&self.direction, &other.direction) < cos
+    }
+
+    /// Returns whether this is a direction.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        libm::fabsf(dot(&self.direction, &self.direction) - 1.0) < 0.01 && self.sigma >= 0.0
+    }
+}
+
+/// Finds the forward direction while the vehicle drives.
+#[derive(Debug, Clone)]
+pub struct ForwardEstimator {
+    second: Second,
+    /// Force and motion of the second before.
+    before: Option<([f32; 3], [f32; 2])>,
+    /// Sums over the differences: force turned by motion, squares of both, and their number.
+    turned: [f32; 3],
+    force: f32,
+    motion: f32,
+    count: f32,
+}
+
+/// Holds the sums of the second under way.
+#[derive(Debug, Clone, Copy)]
+struct Second {
+    samples: u32,
+    /// Speed at its begin, m/s.
+    begin: f32,
+    /// Specific force, m/s^2.
+    force: [f32; 3],
+    /// Speed times angular rate about each axis, m/s^2.
+    turning: [f32; 3],
+}
+
+impl Second {
+    const EMPTY: Self = Self { samples: 0, begin: 0.0, force: [0.0; 3], turning: [0.0; 3] };
+}
+
+impl ForwardEstimator {
+    /// Starts with nothing shown.
+    pub const START: Self =
+        Self { second: Second::EMPTY, before: None, turned: [0.0; 3], force: 0.0, motion: 0.0, count: 0.0 };
+
+    /// Takes a sample in the sensor's axes (`None` while it is silent), the wheels, and the mean specific force at rest,
+    /// which shows where up is. Returns whether it has learnt something.
+    pub fn add(
+        &mut self,
+        sample: Option<&ImuSample>,
+        wheels: &WheelSample,
+        rest: &[SpecificForce; 3],
+    ) -> bool {
+        let sample = sample.filter(|sample| sample.validity.is_good());
+        let Some((sample, speed)) = sample.zip(mean_speed(wheels).filter(|speed| *speed > SLOWEST)) else {
+            (self.second, self.before) = (Second::EMPTY, None);
+            return false;
+        };
+        let is_full = self.second.samples == RATE_HZ;
+        let has_learnt = is_full && self.end_second(speed, rest);
+        if is_full || self.second.samples == 0 {
+            self.second = Second { begin: speed, ..Second::EMPTY };
+        }
+        self.second.samples += 1;
+        let rate = sample.angular_rate.map(|axis| axis.0 as f32 / AngularRate::PER_RAD_PER_SEC);
+        for (sum, force) in self.second.force.iter_mut().zip(metre_per_sec2(&sample.specific_force)) {
+            *sum += force;
+        }
+        for (sum, rate) in self.second.turning.iter_mut().zip(rate) {
+            *sum += speed * rate;
+        }
+        has_learnt
+    }
+
+    /// Compares a full second with the one before.
+    fn end_second(&mut self, end: f32, rest: &[SpecificForce; 3]) -> bool {
+        let Second { begin, force, turning, .. } = self.second;
+        let rest = metre_per_sec2(rest);
+        let up = scaled(&rest, 1.0 / crate::root::sqrt(dot(&rest, &rest)).max(1.0));
+        let mean = |sums: &[f32; 3]| scaled(sums, 1.0 / RATE_HZ as f32);
+        let (force, motion) = (mean(&force), [end - begin, dot(&mean(&turning), &up)]);
+        let Some((force_before, [ahead, left])) = self.before.replace((force, motion)) else { return false };
+        let [ahead, left] = [motion[0] - ahead, motion[1] - left];
+        let change = core::array::from_fn(|axis| force[axis] - force_before[axis]);
+        let vertical = dot(&change, &up);
+        let change = core::array::from_fn(|axis| change[axis] - vertical * up[axis]);
+        // For a forward axis f the change is ahead f + left (up x f); its transpose gives ahead d - left (up x d).
+        let across = cross(&up, &change);
+        for (axis, sum) in self.turned.iter_mut().enumerate() {
+            *sum = *sum * MEMORY + ahead * change[axis] - left * across[axis];
+        }
+        self.force = self.force * MEMORY + dot(&change, &change);
+        self.motion = self.motion * MEMORY + ahead * ahead + left * left;
+        self.count = self.count * MEMORY + 1.0;
+        true
+    }
+
+    /// Returns the direction; `None` before the vehicle has driven for long enough, and where the accelerations
+    /// of sensor and wheels do not belong together.
+    #[must_use]
+    pub fn forward(&self) -> Option<Forward> {
+        let length = crate::root::sqrt(dot(&self.turned, &self.turned));
+        let gain = length / self.motion;
+        // Not where the gain is not a number, either.
+        if self.count < FEWEST || !(PLAUSIBLE[0]..=PLAUSIBLE[1]).contains(&gain) {
+            return None;
+        }
+        let left = (self.force - length * gain).max(0.0) / (2.0 * self.count - 2.0);
+        let sigma = SPREAD * crate::root::sqrt(left / self.motion) / gain;
+        Some(Forward { direction: scaled(&self.turned, 1.0 / length), sigma })
+    }
+}
+
+/// Returns the mean speed of the wheels that have one, m/s.
+fn mean_speed(wheels: &WheelSample) -> Option<f32> {
+    let known = || wheels.speeds.iter().flatten();
+    let sum: f32 = known().map(|speed| speed.0 as f32).sum();
+    let codes = known().count() << WheelSpeed::FRACTION_BITS;
+    (codes > 0).then(|| sum / codes as f32)
+}
+
+fn metre_per_sec2(force: &[SpecificForce; 3]) -> [f32; 3] {
+    force.each_ref().map(|axis| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2)
+}
+
+fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn scaled(vector: &[f32; 3], by: f32) -> [f32; 3] {
+    vector.map(|axis| axis * by)
+}
+
+fn cross(a: &[f32; 3], b: &[f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::{Standstill, Validity};
+    use crate::units::Micros;
+
+    const REST: [f32; 3] = [0.0, 0.0, 9.81];
+
+    fn code(force: [f32; 3]) -> [SpecificForce; 3] {
+        force.map(|axis| SpecificForce::from_metre_per_sec2(axis).unwrap())
+    }
+
+    /// Drives for seconds: speed and yaw rate change in waves. The sensor is turned by `yaw`, rad, to the left of the
+    /// vehicle's axes, or lies on its side. `bump` is added to its second axis.
+    fn drive(
+        estimator: &mut ForwardEstimator,
+        seconds: u32,
+        (yaw, is_on_its_side): (f32, bool),
+        bump: impl Fn(f32) -> f32,
+    ) {
+        let (sin, cos) = (libm::sinf(yaw), libm::cosf(yaw));
+        let turn = |[x, y, z]: [f32; 3]| {
+            let [x, y, z] = [cos * x + sin * y, cos * y - sin * x, z];
+            if is_on_its_side { [x, z, -y] } else { [x, y, z] }
+        };
+        for tick in 0..seconds * RATE_HZ {
+            let time = tick as f32 / RATE_HZ as f32;
+            let (speed, rate) = (15.0 + 5.0 * libm::sinf(0.2 * time), 0.2 * libm::sinf(0.13 * time));
+            let acceleration = libm::cosf(0.2 * time);
+            let [x, y, z] = turn([acceleration, speed * rate, REST[2]]);
+            let sample = ImuSample {
+                time: Micros(u64::from(tick) * 10_000),
+                angular_rate: turn([0.0, 0.0, rate]).map(|axis| AngularRate::from_rad_per_sec(axis).unwrap()),
+                specific_force: code([x, y + bump(time), z]),
+                temperature: None,
+                validity: Validity::Good,
+            };
+            let speeds = [Some(WheelSpeed((speed * 65_536.0) as i32)); 4];
+            let wheels = WheelSample { speeds, ..WheelSample::without_speeds(Standstill::Moving) };
+            estimator.add(Some(&sample), &wheels, &code(turn(REST)));
+        }
+    }
+
+    fn is_close(found: [f32; 3], expected: [f32; 3]) -> bool {
+        found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 2e-3)
+    }
+
+    #[test]
+    fn the_direction_of_a_drive_without_noise_is_exact() {
+        for yaw in [0.0, 0.1, 1.5, 3.1, -2.0f32] {
+            let mut estimator = ForwardEstimator::START;
+            drive(&mut estimator, 20, (yaw, false), |_| 0.0);
+            assert_eq!(estimator.forward(), None, "too short");
+            estimator = ForwardEstimator::START;
+            drive(&mut estimator, 60, (yaw, false), |_| 0.0);
+            let found = estimator.forward().unwrap();
+            assert!(is_close(found.direction, [yaw.cos(), -yaw.sin(), 0.0]), "{yaw}: {found:?}");
+            assert!(found.sigma < 2e-3, "{yaw}: {found:?}");
+            let angle = found.yaw(&Rotation::IDENTITY, code(REST));
+            assert!((angle + yaw).abs() < 2e-3, "{yaw}: {angle}");
+            // The mounting that is right says so.
+            let mounting = Rotation::from_mounting(0.0, 0.0, yaw.to_degrees()).unwrap();
+            assert!(found.yaw(&mounting, code(REST)).abs() < 2e-3, "{yaw}");
+        }
+    }
+
+    #[test]
+    fn a_sensor_on_its_side_shows_it_too() {
+        let mut estimator = ForwardEstimator::START;
+        drive(&mut estimator, 80, (0.5, true), |_| 0.0);
+        let found = estimator.forward().unwrap();
+        assert!(is_close(found.direction, [libm::cosf(0.5), 0.0, libm::sinf(0.5)]), "{found:?}");
+        assert!((found.yaw(&Rotation::IDENTITY, code([0.0, 9.81, 0.0])) + 0.5).abs() < 2e-3);
+    }
+
+    #[test]
+    fn the_sigma_covers_an_uneven_road() {
+        let mut estimator = ForwardEstimator::START;
+        drive(&mut estimator, 200, (0.0, false), |time| 0.7 * libm::sinf(1.7 * time));
+        let Forward { direction: [x, y, _], sigma } = estimator.forward().unwrap();
+        assert!((0.05..0.3).contains(&sigma) && libm::atan2f(y, x).abs() < 3.0 * sigma, "{sigma} {y}");
+    }
+
+    #[test]
+    fn wheels_without_speed_slow_ones_and_silence_show_nothing() {
+        let mut estimator = ForwardEstimator::START;
+        let wheels = WheelSample::without_speeds(Standstill::Moving);
+        let sample = ImuSample {
+            time: Micros(0),
+            specific_force: code(REST),
+            angular_rate: [AngularRate::ZERO; 3],
+            temperature: None,
+            validity: Validity::Good,
+        };
+        for _ in 0..10_000 {
+            assert!(!estimator.add(Some(&sample), &wheels, &code(REST)));
+            assert!(!estimator.add(None, &wheels, &code(REST)));
+        }
+        assert_eq!(estimator.forward(), None);
+    }
+
+    #[test]
+    fn accelerations_that_do_not_belong_together_show_nothing() {
+        // Slip or a sensor in a hand: the force changes by far more than the wheels say.
+        let mut estimator = ForwardEstimator::START;
+        drive(&mut estimator, 100, (0.0, false), |time| 60.0 * libm::sinf(0.13 * time));
+        assert_eq!(estimator.forward(), None);
+    }
+}
