@@ -164,8 +164,11 @@ fn status(board: &mut Board) -> String {
     // It is taken with a tick, and waits for the bytes that DMA is sending.
     board.run(5 * MS);
     let text = String::from_utf8(board.sent(SLCAN)).expect("ASCII");
-    // An answer is sent between two frames.
-    let status = text.split('\r').find_map(|line| line.strip_prefix('F'));
+    // An answer is sent between two frames; the first line may be the end of one.
+    let mut lines = text.split('\r');
+    let first = lines.next();
+    let status =
+        lines.chain(first).find_map(|line| line.strip_prefix('F').filter(|status| status.len() == 2));
     status.unwrap_or_else(|| panic!("no status in {text:?}")).to_owned()
 }
 
