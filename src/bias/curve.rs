@@ -111,7 +111,7 @@ pub struct CurveFilter {
     before: BiasCurve,
     states: [[f32; STATES]; 3],
     covariance: [[f32; STATES]; STATES],
-    /// Mean square of the first rest's difference from the curve, (rad/s)^2.
+    /// Square of the offset as the first rest shows it, (rad/s)^2.
     first: Option<f32>,
 }
 
@@ -145,7 +145,9 @@ impl CurveFilter {
                 *state += spread / variance * off;
             }
         }
-        self.first.get_or_insert(square);
+        // The curve's own variance and the error of the rest are part of the difference.
+        let of_offset = self.covariance[COEFFICIENTS][COEFFICIENTS];
+        self.first.get_or_insert((square - (variance - of_offset)).max(0.0));
         for (row, left) in self.covariance.iter_mut().zip(spread) {
             for (value, right) in row.iter_mut().zip(spread) {
                 *value -= left * right / variance;
@@ -257,6 +259,12 @@ mod tests {
         assert!((0.8e-3..2e-3).contains(&sigma), "{sigma}");
         assert!(curve.change_sigma(10.0, 30.0) < 2e-4, "{}", curve.change_sigma(10.0, 30.0));
         assert!(curve.is_plausible());
+    }
+
+    #[test]
+    fn the_first_cold_start_is_no_offset() {
+        let curve = learned(&[(25.0, 0.0), (-10.0, 0.0)], |celsius| 0.005 + SLOPE * (celsius - 25.0));
+        assert!(curve.offset_square < 1.1 * FIRST_OFFSET * FIRST_OFFSET, "{}", curve.offset_square);
     }
 
     #[test]

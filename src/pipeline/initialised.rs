@@ -48,6 +48,7 @@ impl Pipeline {
         if before.is_some_and(|before| is_moved(&before, &rest.specific_force)) {
             self.mount_moved();
         }
+        self.state.sensor_bias.refer();
         self.state.initialised = Some(Initialised {
             levelling,
             zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),

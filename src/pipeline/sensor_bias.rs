@@ -7,6 +7,8 @@ use crate::mounting::{Rotation, is_moved};
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
+/// A sensor that has seemed to be moved for so many seconds was: no braking is so hard for so long.
+const MOVED_SECONDS: u32 = 4;
 /// Each second the temperature in use goes this part of the way to the measured one: a wrong reading moves the bias little.
 const SMOOTHING: f32 = 0.125;
 
@@ -27,6 +29,11 @@ pub(super) struct SensorBias {
     /// The rotation beyond the configured mounting that earlier drives have shown, and the specific force at rest that
     /// it belongs to, in the sensor's axes.
     early: Option<(Rotation, [SpecificForce; 3])>,
+    /// Specific force of this second, codes, and its good samples.
+    force: ([i64; 3], i64),
+    /// The last seconds' mean has shown that the sensor was not moved since; the seconds since it last has.
+    in_place: bool,
+    elsewhere: u32,
 }
 
 impl SensorBias {
@@ -39,6 +46,9 @@ impl SensorBias {
         reference: None,
         change_sigma: 0.0,
         early: None,
+        force: ([0; 3], 0),
+        in_place: false,
+        elsewhere: 0,
     };
 
     /// Subtracts the curve's bias from a reading in the sensor's axes; `initialised`: static initialisation has been done.
@@ -53,9 +63,15 @@ impl SensorBias {
         let before = self.newest.is_some();
         if self.wait == 0 {
             self.wait = RATE_HZ;
+            self.end_second();
             self.take_temperature(sample, config);
         }
         self.wait -= 1;
+        if sample.validity.is_good() {
+            let (sums, count) = &mut self.force;
+            sums.iter_mut().zip(sample.specific_force).for_each(|(sum, axis)| *sum += i64::from(axis.0));
+            *count += 1;
+        }
         let Some(CurveBias { gyro_bias, .. }) = self.newest else { return false };
         if !before && initialised {
             self.found = gyro_bias;
@@ -64,6 +80,19 @@ impl SensorBias {
             *rate = AngularRate(rate.0.saturating_sub(bias.0.saturating_sub(found.0)));
         }
         !before
+    }
+
+    /// Compares a second's mean specific force with that of earlier drives: a single sample shows bumps and braking.
+    fn end_second(&mut self) {
+        let (sums, count) = core::mem::take(&mut self.force);
+        let Some((_, before)) = self.early.filter(|_| count > 0) else { return };
+        let mean = sums.map(|sum| SpecificForce((sum / count) as i32));
+        if is_moved(&before, &mean) {
+            self.elsewhere = self.elsewhere.saturating_add(1);
+        } else {
+            self.elsewhere = 0;
+        }
+        self.in_place = self.elsewhere == 0 || self.in_place && self.elsewhere < MOVED_SECONDS;
     }
 
     fn take_temperature(&mut self, sample: &ImuSample, config: &PipelineConfig) {
@@ -93,12 +122,12 @@ impl SensorBias {
     }
 
     /// Returns the levelling and the bias' sigma, rad/s, for a reading in the sensor's axes before static initialisation;
-    /// `None` where earlier drives have shown no bias, the sensor was moved since, or the reading is not good.
+    /// `None` where earlier drives have shown no bias, in the first second, where the sensor was moved since, and for a
+    /// reading that is not good.
     pub(super) fn early(&self, sample: &ImuSample) -> Option<(Rotation, f32)> {
-        let (levelling, force) = self.early?;
+        let (levelling, _) = self.early?;
         let sigma = self.newest?.sigma;
-        let is_usable = sample.validity.is_good() && !is_moved(&force, &sample.specific_force);
-        is_usable.then_some((levelling, sigma))
+        (self.in_place && sample.validity.is_good()).then_some((levelling, sigma))
     }
 }
 

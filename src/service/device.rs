@@ -382,9 +382,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 self.calibration_state = State::Idle;
             }
             Calibrate::Forget => {
-                self.learned = Learned::NOTHING;
+                let before = core::mem::replace(&mut self.learned, Learned::NOTHING);
+                self.store_learned().inspect_err(|_| self.learned = before)?;
                 self.learner = Learner::new();
-                self.store_learned()?;
             }
             Calibrate::SetUnit(unit) => self.set_unit(unit)?,
         }

@@ -2,8 +2,8 @@
 //! standstills, forward while the vehicle drives.
 //!
 //! Without wheels a long straight can look like a standstill; then only static calibrations add to the curve. What three
-//! seconds at rest have shown is stored after the first time, the second, the fourth and so on, and the forward
-//! direction each time its sigma has halved, so that the flash is written some fifteen times in a start.
+//! seconds at rest have shown is stored after the first time, the second, the fourth and so on, some ten times in a
+//! start, and the forward direction each time its sigma has become a third less, some six times in all.
 
 use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
 use crate::mounting::{Forward, ForwardEstimator, MOVED};
@@ -13,8 +13,10 @@ use crate::units::CentiCelsius;
 
 /// A forward direction with this sigma is known, rad: 10 degrees. A wrong mounting by that much costs nothing.
 const KNOWN: f32 = 0.175;
-/// With this one it can show that the sensor was moved by 25 degrees, rad: 6 degrees.
-const SURE: f32 = 0.105;
+/// Two with this one can show that the sensor was moved by 25 degrees, rad: 5 degrees each.
+const SURE: f32 = 0.087;
+/// A direction replaces one with a sigma that is larger by more than this factor.
+const BETTER: f32 = 0.7;
 
 /// Learns from the rests and the drive of this start.
 #[derive(Debug)]
@@ -23,6 +25,8 @@ pub struct Learner {
     /// It exists from the first rest on.
     filter: Option<CurveFilter>,
     rests: u32,
+    /// This standstill's specific force has been taken.
+    has_stood: bool,
     forward: ForwardEstimator,
     /// The sensor is mounted otherwise than in earlier drives: nothing is learnt.
     is_moved: bool,
@@ -35,7 +39,15 @@ impl Learner {
     #[must_use]
     pub const fn new() -> Self {
         let forward = ForwardEstimator::START;
-        Self { rest: None, filter: None, rests: 0, forward, is_moved: false, is_changed: false }
+        Self {
+            rest: None,
+            filter: None,
+            rests: 0,
+            has_stood: false,
+            forward,
+            is_moved: false,
+            is_changed: false,
+        }
     }
 
     /// Takes a sample (`None` while the sensor is silent), the wheels, and the limits of a rest. Returns whether this has
@@ -61,25 +73,25 @@ impl Learner {
                 self.learn_rest(&rest, sample.temperature, learned);
             }
         } else {
-            self.rest = None;
+            (self.rest, self.has_stood) = (None, false);
         }
         self.is_moved && !was_moved
     }
 
     /// Takes three seconds at rest of a static calibration, which holds for a sensor that was moved, too.
     pub fn calibrated(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
-        learned.specific_force = Some(rest.specific_force);
-        if core::mem::take(&mut self.is_moved) {
-            learned.forward = None;
-            self.forward = ForwardEstimator::START;
-        }
+        (learned.specific_force, learned.forward) = (None, None);
+        (self.forward, self.has_stood, self.is_moved) = (ForwardEstimator::START, false, false);
         self.learn_rest(rest, temperature, learned);
     }
 
     fn learn_rest(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
-        self.is_moved |= !learned.accept(rest.specific_force);
+        self.is_moved |= learned.is_moved(&rest.specific_force);
         if self.is_moved {
             return;
+        }
+        if !core::mem::replace(&mut self.has_stood, true) {
+            learned.stood(rest.specific_force);
         }
         if let Some(temperature) = temperature {
             let filter = self.filter.get_or_insert_with(|| CurveFilter::new(&learned.bias_curve));
@@ -93,8 +105,9 @@ impl Learner {
     /// Holds the direction of this start against the one that is known, and keeps the better one.
     fn learn_forward(&mut self, forward: Forward, learned: &mut Learned) {
         let known = learned.forward;
-        self.is_moved |= forward.sigma < SURE && known.is_some_and(|known| known.is_beyond(&forward, MOVED));
-        let is_better = forward.sigma < known.map_or(KNOWN, |known| known.sigma / 2.0);
+        let sure = forward.sigma < SURE && known.is_some_and(|known| known.sigma < SURE);
+        self.is_moved |= sure && known.is_some_and(|known| known.is_beyond(&forward, MOVED));
+        let is_better = forward.sigma < known.map_or(KNOWN, |known| BETTER * known.sigma);
         if is_better && !self.is_moved {
             learned.forward = Some(forward);
             self.is_changed = true;

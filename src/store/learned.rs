@@ -26,16 +26,18 @@ impl Learned {
     /// Nothing is known.
     pub const NOTHING: Self = Self { bias_curve: BiasCurve::UNKNOWN, specific_force: None, forward: None };
 
-    /// Takes the mean specific force of a standstill. Returns whether it is that of a sensor that was not moved.
-    pub fn accept(&mut self, specific_force: [SpecificForce; 3]) -> bool {
+    /// Returns whether a specific force at rest is that of a sensor that was moved.
+    #[must_use]
+    pub fn is_moved(&self, specific_force: &[SpecificForce; 3]) -> bool {
+        self.specific_force.is_some_and(|known| is_moved(&known, specific_force))
+    }
+
+    /// Takes the mean specific force of a standstill, once for each.
+    pub fn stood(&mut self, specific_force: [SpecificForce; 3]) {
         let known = self.specific_force.get_or_insert(specific_force);
-        if is_moved(known, &specific_force) {
-            return false;
-        }
         for (mean, force) in known.iter_mut().zip(specific_force) {
             mean.0 += ((i64::from(force.0) - i64::from(mean.0)) / MEMORY) as i32;
         }
-        true
     }
 }
 
@@ -75,11 +77,11 @@ mod tests {
     #[test]
     fn a_sensor_that_was_moved_is_told_from_a_steep_street() {
         let mut learned = Learned::NOTHING;
-        assert!(learned.accept(force(0.0, 9.8)));
+        assert!(!learned.is_moved(&force(6.0, 7.7)), "nothing is known");
+        learned.stood(force(0.0, 9.8));
         // A street of 15 degrees.
-        assert!(learned.accept(force(2.54, 9.47)));
-        let before = learned;
-        assert!(!learned.accept(force(6.0, 7.7)));
-        assert_eq!(learned, before);
+        assert!(!learned.is_moved(&force(2.54, 9.47)));
+        learned.stood(force(2.54, 9.47));
+        assert!(learned.is_moved(&force(6.0, 7.7)));
     }
 }

@@ -207,13 +207,14 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Moves the newest records to the other sector, which needs an erase, where little room is left. Call it at the
-    /// start, when nothing is lost by an erase: what is stored while the vehicle drives has to fit without one.
+    /// start, when nothing is lost by an erase: what is stored while the vehicle drives has to fit without one. A sector
+    /// with damage stays as it is: it alone shows that a record was lost.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
     pub fn make_room(&mut self) -> Result<(), StoreError> {
         let mut raw = Raw::EMPTY;
-        if self.current.is_none() || self.room() >= FEW * BUFFER as u32 {
+        if self.damaged() || self.current.is_none() || self.room() >= FEW * BUFFER as u32 {
             return Ok(());
         }
         for key in 1..=MAX_KEY {

@@ -77,12 +77,15 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             (_, Origin::Refused(_)) => None,
             (access, _) => Some(access.unwrap_or(Access::OPEN)),
         };
-        if self.writable
+        self.flash = if store.damaged() {
+            FlashState::Damaged
+        } else if self.writable
             && let Err(error) = store.make_room()
         {
-            self.note(EventKind::LearnedRefused(error));
-        }
-        self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
+            FlashState::Failed(error)
+        } else {
+            FlashState::Ready
+        };
         self.store = self.writable.then_some(store);
     }
 

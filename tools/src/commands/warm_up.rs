@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet warm-up                        # 16 devices, in three minutes
+  gyronet warm-up                        # 16 devices, in a minute or two
   gyronet warm-up --devices 2 --plot warm_up.svg")]
 pub struct Args {
     /// Number of devices (1 to 1000).

@@ -82,6 +82,8 @@ fn damaged_record_is_noted() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
     assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), Ok(()));
+    // Another record is whole.
+    assert_eq!(ask(&mut board, &Request::SetWheels(WheelSettings::TOYOTA)), Ok(()));
     flash.borrow_mut().damage(layout::STORE.start as usize + 20, 4);
     let mut board = start(&flash);
     assert_eq!(info(&mut board).flash, FlashState::Damaged);
@@ -89,7 +91,8 @@ fn damaged_record_is_noted() {
     assert!(board.stored_damaged() && board.configuration_lost());
     let page = board.events(0);
     assert!(page.events.iter().any(|event| event.kind == EventKind::RecordsDamaged));
-    // Until it is stored again.
+    // At every start, until it is stored again.
+    assert!(start(&flash).configuration_lost());
     assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), Ok(()));
     let board = start(&flash);
     assert!(!board.stored_damaged() && !board.configuration_lost());

@@ -154,12 +154,26 @@ fn a_drive_shows_where_forward_is_and_that_the_sensor_was_moved() {
     observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
     assert_eq!(*board.learned(), before, "nothing is learnt");
 
-    // Its owner says that this is right.
+    // After the next start its owner says that this is right.
+    let mut board = start(&flash);
     assert_eq!(ask(&mut board, &Request::Calibrate(Calibrate::Start(Task::Static))), Ok(()));
     observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    assert_eq!(ask(&mut board, &Request::Calibrate(Calibrate::Store)), Ok(()));
+    let mut board = start(&flash);
     drive(&mut board, 120, 80.0);
     let [yaw, sigma] = board.forward_deg().expect("a drive");
     assert!((yaw + 80.0).abs() < 3.0 * sigma && !board.take_mount_moved(), "{yaw} +- {sigma}");
+}
+
+#[test]
+fn a_minute_on_a_ramp_is_one_standstill() {
+    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    let ramp = [2.2, 0.0, 9.56];
+    observe(&mut board, 1, (0.01, 20), LEVEL, Standstill::Moving);
+    observe(&mut board, 60, (0.01, 20), ramp, Standstill::Still);
+    let [ahead, ..] = board.learned().specific_force.expect("two standstills");
+    assert!((ahead.metre_per_sec2() - 2.2 / 8.0).abs() < 0.01, "{ahead:?}");
 }
 
 #[test]
