@@ -302,6 +302,8 @@ fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands() {
     board.configure("SPI1.imu_rates_dps", json!([BIAS[0], BIAS[1], BIAS[2] + 5.0]));
     board.power_on();
     board.run(START);
+    // The first second shows whether the sensor is where it was.
+    roll(&mut board, 1, 30.0);
     let _ = judged(&mut board);
     roll(&mut board, 2, 30.0);
     let rates = judged(&mut board);
