@@ -15,6 +15,7 @@ pub mod drive;
 pub mod error;
 mod format;
 mod grid;
+mod input;
 pub mod log;
 mod mcap;
 mod ros_bag;
@@ -23,6 +24,7 @@ pub mod samples;
 mod select;
 mod table;
 mod ulog;
+pub mod value;
 mod zstd;
 
 pub use format::{read_bytes, read_file};

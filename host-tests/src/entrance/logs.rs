@@ -3,8 +3,8 @@
 use super::Seed;
 use gyronet_tools::drive::vehicle::Columns;
 use gyronet_tools::import::can::Bus;
-use gyronet_tools::import::log::Value;
 use gyronet_tools::import::read_bytes;
+use gyronet_tools::import::value::Value;
 
 /// Signals of every kind that a frame can hold.
 const DBC: &str = r#"VERSION ""

@@ -4,7 +4,7 @@
 //! begins elsewhere than it expects.
 
 use super::can::{Bus, Frame, add};
-use super::format::{Input, read_up_to};
+use super::input::{Input, read_up_to};
 use super::log::Log;
 
 /// First bytes of a file.

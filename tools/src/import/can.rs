@@ -1,7 +1,8 @@
 //! The signals of CAN frames, by a DBC file.
 
 use super::error::ImportError;
-use super::log::{Log, Value};
+use super::log::Log;
+use super::value::Value;
 use crate::wheels::dbc::invalid_code;
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValueType, ValueType};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! CAN logs as text: candump's, Vector's ASC and PEAK's TRC.
 
 use super::can::{Bus, Frame, add};
-use super::format::{Input, read_line};
+use super::input::{Input, read_line};
 use super::log::Log;
 
 /// A line of 64 bytes of CAN FD with Vector's statistics has some 400.

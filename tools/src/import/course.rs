@@ -5,7 +5,7 @@
 //! of neighbouring fixes. That scatter is taken from third differences, which a vehicle's motion hardly reaches: the
 //! error that fixes share, most of a cheap receiver's, moves the path and does not turn it.
 
-use super::log::Fix;
+use super::value::Fix;
 
 /// Below this speed the direction is noise, m/s.
 const SLOWEST: f64 = 1.0;

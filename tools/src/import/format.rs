@@ -2,15 +2,13 @@
 
 use super::can::Bus;
 use super::error::ImportError;
+use super::input::Input;
 use super::log::Log;
 use super::{blf, candump, mcap, ros_bag, table, ulog};
 use crate::drive::vehicle::Columns;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::BufReader;
 use std::path::Path;
-
-/// Formats read from this.
-pub type Input<'a> = dyn BufRead + 'a;
 
 /// Formats that are known but not read, by their first bytes, and what turns them into one that is.
 const REFUSED: [(&[u8], &str); 3] = [
@@ -100,20 +98,4 @@ fn read(
         return Err(io(source));
     }
     Ok(log)
-}
-
-/// Reads `len` bytes, or as many as there are.
-pub fn read_up_to(input: &mut Input<'_>, len: usize) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    input.take(len as u64).read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-/// Reads a line without its end (fields of spaces stay), of at most `most` bytes; what is beyond them is the next line.
-pub fn read_line(input: &mut Input<'_>, most: u64) -> std::io::Result<Option<String>> {
-    let mut bytes = Vec::new();
-    if input.take(most).read_until(b'\n', &mut bytes)? == 0 {
-        return Ok(None);
-    }
-    Ok(Some(String::from_utf8_lossy(&bytes).trim_end_matches(['\r', '\n']).to_owned()))
 }

@@ -1,6 +1,6 @@
 //! MCAP with ROS 1 or ROS 2 messages in it.
 
-use super::format::Input;
+use super::input::Input;
 use super::log::Log;
 use super::ros_message::{self, Encoding};
 use super::zstd::Zstd;

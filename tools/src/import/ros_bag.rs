@@ -3,7 +3,7 @@
 //! The `rosbag` crate maps the whole file and finds its chunks by the index at the end, which a recording that was cut
 //! short does not have. Here records are read as they come, and the index is never needed.
 
-use super::format::{Input, read_up_to};
+use super::input::{Input, read_up_to};
 use super::log::Log;
 use super::ros_message::{self, Encoding};
 use std::collections::BTreeMap;

@@ -3,7 +3,8 @@
 //! The two differ in three ways: CDR aligns each number to its size, ends a string with a zero, and names its byte
 //! order; a ROS 1 header begins with a sequence number.
 
-use super::log::{Fix, Log, Value};
+use super::log::Log;
+use super::value::{Fix, Value};
 
 /// Says how the numbers of a message lie in its bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

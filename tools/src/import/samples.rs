@@ -1,7 +1,7 @@
 //! The samples of a channel are in memory as far as they are few; beyond that they lie in a temporary file, so that a log
 //! of many gigabytes takes no more memory than a small one.
 
-use super::log::{Fix, Kind, Sample, Value};
+use super::value::{Fix, Kind, Sample, Value};
 use std::cell::OnceCell;
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Write};

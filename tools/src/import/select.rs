@@ -2,8 +2,9 @@
 
 use super::error::ImportError;
 use super::grid::Stream;
-use super::log::{Fix, Kind, Log, Sample, Value};
+use super::log::Log;
 use super::samples::Samples;
+use super::value::{Fix, Kind, Sample, Value};
 use crate::drive::vehicle::Vehicle;
 
 /// The name with which a role is left out.

@@ -3,9 +3,10 @@
 //! Each column that is a number becomes a channel. Three of a gyro and three of an accelerometer become an IMU, latitude
 //! and longitude a position.
 
-use super::format::{Input, read_line};
-use super::log::{Fix, Log, Value};
+use super::input::{Input, read_line};
+use super::log::Log;
 use super::select::{REFERENCE, WHEELS};
+use super::value::{Fix, Value};
 use crate::drive::vehicle::{Column, Columns};
 
 /// Longest line.

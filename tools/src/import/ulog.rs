@@ -2,8 +2,9 @@
 //!
 //! PX4's body axes are x forward, y right, z down; they are turned to y left, z up here.
 
-use super::format::{Input, read_up_to};
-use super::log::{Fix, Log, Value};
+use super::input::{Input, read_up_to};
+use super::log::Log;
+use super::value::{Fix, Value};
 use px4_ulog::stream_parser::LogParser;
 use px4_ulog::stream_parser::model::{DataMessage, FlattenedFieldType as Type};
 
