@@ -56,7 +56,7 @@ impl Levelling {
 
 /// Cosine of the angle from which on a sensor counts as moved: 25 degrees, since streets are no steeper than 15, and the
 /// mean of several is less.
-pub(crate) const MOVED: f32 = 0.906;
+const MOVED: f32 = 0.906;
 
 /// Returns whether two mean specific forces at standstill are so far apart that the sensor was moved between them.
 #[must_use]

@@ -17,6 +17,7 @@ mod error;
 #[doc(hidden)]
 pub mod layout;
 mod learned;
+mod place;
 pub(crate) mod record;
 #[doc(hidden)]
 pub mod slots;
@@ -29,7 +30,8 @@ pub use calibration::{Calibration, Level, UnitMap};
 pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};
 pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use learned::Learned;
+pub use place::{Place, Slot};
 pub use record::{Record, Store};
-pub use slots::{Accepted, Slot};
+pub use slots::Accepted;
 pub use troubles::{MOST_TROUBLES, Snapshot, StoredTrouble, Troubles};
-pub use upload::{Place, Upload};
+pub use upload::Upload;

@@ -145,9 +145,10 @@ impl CurveFilter {
                 *state += spread / variance * off;
             }
         }
-        // The curve's own variance and the error of the rest are part of the difference.
+        // The expected square of the offset, given the difference: the curve and the rest have their part of it.
         let of_offset = self.covariance[COEFFICIENTS][COEFFICIENTS];
-        self.first.get_or_insert((square - (variance - of_offset)).max(0.0));
+        let gain = of_offset / variance;
+        self.first.get_or_insert(gain * gain * square + of_offset * (1.0 - gain));
         for (row, left) in self.covariance.iter_mut().zip(spread) {
             for (value, right) in row.iter_mut().zip(spread) {
                 *value -= left * right / variance;
@@ -263,8 +264,17 @@ mod tests {
 
     #[test]
     fn the_first_cold_start_is_no_offset() {
-        let curve = learned(&[(25.0, 0.0), (-10.0, 0.0)], |celsius| 0.005 + SLOPE * (celsius - 25.0));
-        assert!(curve.offset_square < 1.1 * FIRST_OFFSET * FIRST_OFFSET, "{}", curve.offset_square);
+        // Three times the slope that parts have, about all axes.
+        let bias = |celsius: f32| 3.0 * SLOPE * (celsius - 25.0);
+        let mut curve = BiasCurve::UNKNOWN;
+        for celsius in [25.0f32, -10.0] {
+            let mut filter = CurveFilter::new(&curve);
+            let rate = AngularRate::from_rad_per_sec(bias(celsius)).unwrap();
+            (0..10).for_each(|_| filter.add(CentiCelsius((100.0 * celsius) as i16), [rate; 3]));
+            curve = filter.curve();
+        }
+        let ratio = curve.offset_square / (FIRST_OFFSET * FIRST_OFFSET);
+        assert!((0.7..1.4).contains(&ratio), "{ratio}");
     }
 
     #[test]

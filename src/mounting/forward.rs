@@ -44,10 +44,13 @@ impl Forward {
         libm::atan2f(y.0 as f32, x.0 as f32)
     }
 
-    /// Returns whether another direction is further away than an angle with this cosine.
+    /// Returns the angle to another direction, rad, and its sigma.
     #[must_use]
-    pub fn is_beyond(&self, other: &Self, cos: f32) -> bool {
-        dot(&self.direction, &other.direction) < cos
+    pub fn angle_to(&self, other: &Self) -> [f32; 2] {
+        let sine = cross(&self.direction, &other.direction);
+        let angle =
+            libm::atan2f(crate::root::sqrt(dot(&sine, &sine)), dot(&self.direction, &other.direction));
+        [angle, crate::root::sqrt(self.sigma * self.sigma + other.sigma * other.sigma)]
     }
 
     /// Returns whether this is a direction.

@@ -111,6 +111,8 @@ pub enum EventKind {
     LearnedStored,
     /// The sensor is mounted otherwise than in earlier drives.
     MountMoved,
+    /// The start could not make room for new records.
+    NoRoom(StoreError),
 }
 
 /// Something that happened.

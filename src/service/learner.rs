@@ -6,15 +6,15 @@
 //! start, and the forward direction each time its sigma has become a third less, some six times in all.
 
 use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
-use crate::mounting::{Forward, ForwardEstimator, MOVED};
+use crate::mounting::{Forward, ForwardEstimator};
 use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::store::Learned;
 use crate::units::CentiCelsius;
 
 /// A forward direction with this sigma is known, rad: 10 degrees. A wrong mounting by that much costs nothing.
 const KNOWN: f32 = 0.175;
-/// Two with this one can show that the sensor was moved by 25 degrees, rad: 5 degrees each.
-const SURE: f32 = 0.087;
+/// The sensor was moved where the directions of two starts are this far apart, rad (25 degrees), and two sigmas more.
+const MOVED: f32 = 0.436;
 /// A direction replaces one with a sigma that is larger by more than this factor.
 const BETTER: f32 = 0.7;
 
@@ -73,7 +73,8 @@ impl Learner {
                 self.learn_rest(&rest, sample.temperature, learned);
             }
         } else {
-            (self.rest, self.has_stood) = (None, false);
+            self.rest = None;
+            self.has_stood &= still;
         }
         self.is_moved && !was_moved
     }
@@ -83,6 +84,7 @@ impl Learner {
         (learned.specific_force, learned.forward) = (None, None);
         (self.forward, self.has_stood, self.is_moved) = (ForwardEstimator::START, false, false);
         self.learn_rest(rest, temperature, learned);
+        self.is_changed = true;
     }
 
     fn learn_rest(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
@@ -105,8 +107,11 @@ impl Learner {
     /// Holds the direction of this start against the one that is known, and keeps the better one.
     fn learn_forward(&mut self, forward: Forward, learned: &mut Learned) {
         let known = learned.forward;
-        let sure = forward.sigma < SURE && known.is_some_and(|known| known.sigma < SURE);
-        self.is_moved |= sure && known.is_some_and(|known| known.is_beyond(&forward, MOVED));
+        let moved = |known: Forward| {
+            let [angle, sigma] = known.angle_to(&forward);
+            forward.sigma < KNOWN && angle > MOVED + 2.0 * sigma
+        };
+        self.is_moved |= known.is_some_and(moved);
         let is_better = forward.sigma < known.map_or(KNOWN, |known| BETTER * known.sigma);
         if is_better && !self.is_moved {
             learned.forward = Some(forward);

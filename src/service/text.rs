@@ -109,6 +109,7 @@ impl Display for EventKind {
             Self::KeyRemoved => f.write_str("key removed: everyone may write"),
             Self::LearnedRefused(error) => write!(f, "what was learnt not read or stored: {error}"),
             Self::LearnedStored => f.write_str("what was learnt stored"),
+            Self::NoRoom(error) => write!(f, "no room made for new records: {error}"),
             Self::MountMoved => f.write_str("the sensor was moved since earlier drives"),
             Self::TroublesRefused(error) => write!(f, "memory of troubles not read or stored: {error}"),
             Self::Sensor(Some(fault)) => write!(f, "sensor not set up: {fault}"),

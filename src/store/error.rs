@@ -148,6 +148,9 @@ pub enum StoreError {
     /// A value is out of its range.
     #[error(transparent)]
     Field(FieldError),
+    /// The record was damaged, and none has been stored since.
+    #[error("the record was damaged, and none has been stored since")]
+    Lost,
 }
 
 impl From<FieldError> for StoreError {

@@ -11,8 +11,10 @@
 //! All little-endian. Records are appended until the sector in use is full, or ends in a record that a power cut has
 //! torn. Then the *other* sector is erased, the newest record of each key is copied there with the new one, and the
 //! header comes last, with the next generation: only then does that sector take over. So the sector in use is never the
-//! one being erased or filled, and it does not matter in what state an interrupted erasure leaves the other.
+//! one being erased or filled, and it does not matter in what state an interrupted erasure leaves the other. Where the
+//! configuration was damaged, a record of layout 0 says so there.
 
+use super::Configuration;
 use super::error::{FieldError, FlashFault, StoreError};
 use crate::model::blob::CRC;
 use core::ops::Range;
@@ -29,6 +31,8 @@ pub(crate) const MAX_LEN: usize = 248;
 const BUFFER: usize = MAX_LEN + 2 * WORD;
 /// Records of the longest kind that must fit after a start.
 const FEW: u32 = 8;
+/// The layout of a record that was lost; those of records begin at 1.
+const LOST: u8 = 0;
 /// Highest key.
 const MAX_KEY: u8 = 7;
 /// This mark in the header's checksum tells our sectors from other uses of the flash.
@@ -82,6 +86,14 @@ impl Raw {
         Some(())
     }
 
+    /// Makes the mark of a record that was lost.
+    fn lose(&mut self, key: u8) {
+        (self.words, self.len) = ([0xFF; BUFFER], 0);
+        self.words[..WORD].copy_from_slice(&[key, LOST, 0, 0]);
+        let crc = CRC.checksum(&self.words[..WORD]).to_le_bytes();
+        self.words[WORD..2 * WORD].copy_from_slice(&crc);
+    }
+
     fn bytes(&self) -> &[u8] {
         self.words.get(..Self::size(self.len)).unwrap_or_default()
     }
@@ -99,6 +111,9 @@ impl Raw {
 
     fn decode<R: Record>(&self) -> Result<R, StoreError> {
         let [_, found, ..] = self.words;
+        if found == LOST {
+            return Err(StoreError::Lost);
+        }
         let missing = if found == R::VERSION { Some(&[][..]) } else { R::missing(found) };
         let missing = missing.ok_or(StoreError::Version { found, expected: R::VERSION })?;
         let mut content = self.words;
@@ -134,6 +149,8 @@ pub struct Store<F> {
     /// The place of the next record, while there is room.
     free: Option<u32>,
     damaged: bool,
+    /// A damaged record may have been the configuration.
+    configuration_damaged: bool,
     /// A header is neither valid nor blank: the newest sector may be lost.
     header_damaged: bool,
 }
@@ -147,9 +164,16 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Flash`].
     pub fn open(flash: F, start: u32, zeros_are_blank: bool) -> Result<Self, StoreError> {
         const { assert!(F::READ_SIZE <= WORD && WORD.is_multiple_of(F::WRITE_SIZE)) };
-        let (damaged, header_damaged) = (false, false);
-        let mut store =
-            Self { flash, start, zeros_are_blank, current: None, free: None, damaged, header_damaged };
+        let mut store = Self {
+            flash,
+            start,
+            zeros_are_blank,
+            current: None,
+            free: None,
+            damaged: false,
+            configuration_damaged: false,
+            header_damaged: false,
+        };
         for sector in [0, 1] {
             let generation = store.generation(sector)?;
             let newest = store.current.map(|(_, generation)| generation);
@@ -207,14 +231,13 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Moves the newest records to the other sector, which needs an erase, where little room is left. Call it at the
-    /// start, when nothing is lost by an erase: what is stored while the vehicle drives has to fit without one. A sector
-    /// with damage stays as it is: it alone shows that a record was lost.
+    /// start, when nothing is lost by an erase: what is stored while the vehicle drives has to fit without one.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
     pub fn make_room(&mut self) -> Result<(), StoreError> {
         let mut raw = Raw::EMPTY;
-        if self.damaged() || self.current.is_none() || self.room() >= FEW * BUFFER as u32 {
+        if self.current.is_none() || self.room() >= FEW * BUFFER as u32 {
             return Ok(());
         }
         for key in 1..=MAX_KEY {
@@ -293,7 +316,7 @@ impl<F: NorFlash> Store<F> {
         let mut at = self.range(sector).start + HEADER;
         let mut raw = Raw::EMPTY;
         let mut found = false;
-        self.damaged = false;
+        (self.damaged, self.configuration_damaged) = (false, false);
         loop {
             // Each turn goes on by a record's length, of two words at least.
             match self.place(sector, at, &mut raw)? {
@@ -301,6 +324,8 @@ impl<F: NorFlash> Store<F> {
                     at += Raw::size(raw.len) as u32;
                     if !raw.is_whole() {
                         self.damaged = true;
+                        // A power cut leaves the first word, which has the key; flipped bits may not.
+                        self.configuration_damaged |= !(2..=MAX_KEY).contains(&raw.key());
                     } else if raw.key() == key {
                         *newest = raw;
                         found = true;
@@ -312,7 +337,9 @@ impl<F: NorFlash> Store<F> {
                     return Ok(found);
                 }
                 Place::End => {
-                    self.damaged |= at + WORD_U32 <= self.range(sector).end;
+                    let is_damage = at + WORD_U32 <= self.range(sector).end;
+                    self.damaged |= is_damage;
+                    self.configuration_damaged |= is_damage;
                     self.free = None;
                     return Ok(found);
                 }
@@ -334,7 +361,8 @@ impl<F: NorFlash> Store<F> {
         written.map(|()| Some(end))
     }
 
-    /// Starts the other sector with the newest record of each key, the given one among them.
+    /// Starts the other sector with the newest record of each key, the given one among them. Of a configuration that was
+    /// damaged a mark stays, [`StoreError::Lost`], until one is stored: without it the vehicle's axes are not known.
     #[inline(never)]
     fn change_sector(&mut self, newest: &Raw) -> Result<(), StoreError> {
         let (sector, generation) = match self.current {
@@ -346,9 +374,14 @@ impl<F: NorFlash> Store<F> {
         let mut at = start + HEADER;
         let mut raw = Raw::EMPTY;
         for key in (1..=MAX_KEY).filter(|key| *key != newest.key()) {
-            if self.find(key, &mut raw)? {
-                at = self.append(sector, at, &raw)?.ok_or(StoreError::Full)?;
+            let is_lost =
+                !self.find(key, &mut raw)? && key == Configuration::KEY && self.configuration_damaged;
+            if is_lost {
+                raw.lose(key);
+            } else if raw.key() != key {
+                continue;
             }
+            at = self.append(sector, at, &raw)?.ok_or(StoreError::Full)?;
         }
         let free = self.append(sector, at, newest)?.ok_or(StoreError::Full)?;
         self.flash.write(start, &generation.to_le_bytes()).map_err(fault)?;

@@ -8,59 +8,11 @@
 //! no file there that was accepted, and the gyro is corrected without a network.
 
 use super::error::{FieldError, FlashFault};
-use super::layout::{SLOT_SIZE, SLOTS};
+use super::place::{Place, Slot};
 use super::record::Record;
-use super::upload::Place;
 use crate::fog::NotForThisGyro;
 use crate::model::{Blob, BlobError, FogBlob};
 use serde::{Deserialize, Serialize};
-
-/// Names one of the two slots.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Slot {
-    /// Sector 10.
-    A,
-    /// Sector 11.
-    B,
-}
-
-impl Slot {
-    /// Both slots, in order.
-    pub const ALL: [Self; 2] = [Self::A, Self::B];
-
-    /// Returns the other slot.
-    #[must_use]
-    pub const fn other(self) -> Self {
-        match self {
-            Self::A => Self::B,
-            Self::B => Self::A,
-        }
-    }
-
-    /// Returns the offset of the slot's first byte into the flash.
-    #[must_use]
-    pub const fn offset(self) -> u32 {
-        match self {
-            Self::A => SLOTS.start,
-            Self::B => SLOTS.start + SLOT_SIZE as u32,
-        }
-    }
-
-    /// Returns this slot's element of a pair.
-    pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
-        match self {
-            Self::A => a,
-            Self::B => b,
-        }
-    }
-}
-
-impl core::fmt::Display for Slot {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(Self::of(*self, ["A", "B"]))
-    }
-}
 
 /// Records the files that were accepted, and the one to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

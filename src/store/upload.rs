@@ -1,42 +1,11 @@
 //! A weight file is uploaded block by block to its place in the flash; whole sectors are erased as the file reaches them.
 
 use super::error::FlashFault;
-use super::layout::{FOGNET, SLOT_SIZE, sector};
-use super::slots::{Slot, SlotError, bytes, file};
+use super::layout::sector;
+use super::place::Place;
+use super::slots::{SlotError, bytes, file};
 use crate::model::FogBlob;
-use core::ops::Range;
 use embedded_storage::nor_flash::{NorFlash, NorFlashError};
-use serde::{Deserialize, Serialize};
-
-/// Names a place for a weight file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Place {
-    /// A slot for GyroNet's.
-    Slot(Slot),
-    /// The place for FoGNet's.
-    FogNet,
-}
-
-impl Place {
-    /// Returns its offsets into the flash: whole sectors.
-    #[must_use]
-    pub const fn range(self) -> Range<u32> {
-        match self {
-            Self::Slot(slot) => slot.offset()..slot.offset() + SLOT_SIZE as u32,
-            Self::FogNet => FOGNET,
-        }
-    }
-}
-
-impl core::fmt::Display for Place {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Slot(slot) => write!(f, "slot {slot}"),
-            Self::FogNet => f.write_str("FoGNet's place"),
-        }
-    }
-}
 
 /// Tracks a file that is being uploaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

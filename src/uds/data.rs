@@ -32,7 +32,7 @@
 //! Numbers are big-endian, as everywhere in ISO 14229.
 
 use super::isotp::TransportErrors;
-use super::response::{Nrc, Response, nrc, put};
+use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use super::security::{self, Security};
 use super::settings;
 use crate::fog::FogCounters;
@@ -42,8 +42,6 @@ use crate::service::{Device, MappedSlots};
 use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 /// A forward direction with a smaller sigma is fine, others are coarse, deg.
 const FINE_DEG: f32 = 3.0;
@@ -201,25 +199,6 @@ fn write_wheels<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R
 #[inline(never)]
 fn write_unit<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R, W>) -> Result<(), Nrc> {
     device.act(&Request::Calibrate(Calibrate::SetUnit(decode(bytes)?))).map_err(nrc)
-}
-
-/// Decodes a value in postcard's encoding; no byte may be left.
-pub(super) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Nrc> {
-    match postcard::take_from_bytes(bytes) {
-        Ok((value, [])) => Ok(value),
-        Ok(_) | Err(_) => Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
-    }
-}
-
-/// Appends a value in postcard's encoding.
-pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<(), Nrc> {
-    let start = out.len();
-    let room = out.capacity();
-    out.resize_default(room).map_err(|_| Nrc::ResponseTooLong)?;
-    let written =
-        postcard::to_slice(record, out.get_mut(start..).unwrap_or_default()).map(|bytes| bytes.len());
-    out.truncate(start + written.as_ref().map_or(0, |len| *len));
-    written.map(|_| ()).map_err(|_| Nrc::ResponseTooLong)
 }
 
 fn hex(byte: u8) -> [u8; 2] {

@@ -1,4 +1,4 @@
-//! Responses are written by these, and refusals get the standard's codes (ISO 14229-1 A.1).
+//! Values are read from requests and written to responses by these, and refusals get the standard's codes (ISO 14229-1 A.1).
 
 use super::isotp::LONGEST;
 use crate::service::message::Refusal;
@@ -6,6 +6,8 @@ use crate::store::StoreError;
 use crate::store::slots::SlotError;
 pub use automotive_diag::uds::UdsError as Nrc;
 use heapless::Vec;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// A response as it is written.
 pub(super) type Response = Vec<u8, LONGEST>;
@@ -20,14 +22,33 @@ pub(super) fn exactly<const N: usize>(bytes: &[u8]) -> Result<[u8; N], Nrc> {
     bytes.try_into().map_err(|_| Nrc::IncorrectMessageLengthOrInvalidFormat)
 }
 
+/// Decodes a value in postcard's encoding; no byte may be left.
+pub(super) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Nrc> {
+    match postcard::take_from_bytes(bytes) {
+        Ok((value, [])) => Ok(value),
+        Ok(_) | Err(_) => Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
+    }
+}
+
+/// Appends a value in postcard's encoding.
+pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<(), Nrc> {
+    let start = out.len();
+    let room = out.capacity();
+    out.resize_default(room).map_err(|_| Nrc::ResponseTooLong)?;
+    let written =
+        postcard::to_slice(record, out.get_mut(start..).unwrap_or_default()).map(|bytes| bytes.len());
+    out.truncate(start + written.as_ref().map_or(0, |len| *len));
+    written.map(|_| ()).map_err(|_| Nrc::ResponseTooLong)
+}
+
 /// Returns the standard's code for a refusal.
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
         Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,
         Refusal::Version { .. } | Refusal::OtherWeights { .. } => Nrc::RequestOutOfRange,
-        Refusal::Store(StoreError::Field(_) | StoreError::Version { .. } | StoreError::Encoding) => {
-            Nrc::RequestOutOfRange
-        }
+        Refusal::Store(
+            StoreError::Field(_) | StoreError::Version { .. } | StoreError::Encoding | StoreError::Lost,
+        ) => Nrc::RequestOutOfRange,
         Refusal::Locked => Nrc::SecurityAccessDenied,
         Refusal::Unsigned => Nrc::IncorrectMessageLengthOrInvalidFormat,
         Refusal::Answer | Refusal::Signature => Nrc::InvalidKey,

@@ -1,8 +1,7 @@
 //! Routines (service 0x31): calibrations, the log, a self-test, and the use of a download.
 
-use super::data;
 use super::download::Download;
-use super::response::{Nrc, Response, exactly, nrc, put};
+use super::response::{Nrc, Response, exactly, nrc, put, put_record};
 use super::security::{self, Seed};
 use super::services::Services;
 use super::session::Session;
@@ -16,8 +15,6 @@ use embedded_storage::nor_flash::NorFlash;
 const SELF_TEST: u16 = 0x0204;
 /// Forgets what the board has learnt about its sensor.
 const FORGET: u16 = 0x0205;
-/// Begins a request for the log.
-pub(super) const READ_LOG: [u8; 3] = [1, 0x02, 0x03];
 /// Reads the log.
 const LOG: u16 = 0x0203;
 /// Has a download used.
@@ -54,7 +51,7 @@ impl Services {
         let id = u16::from_be_bytes(*id);
         let control = RoutineControlType::from_repr(sub).ok_or(Nrc::SubFunctionNotSupported)?;
         if id == LOG && control == RoutineControlType::StartRoutine {
-            return data::put_record(out, &device.events(u32::from_be_bytes(exactly(option)?)));
+            return put_record(out, &device.events(u32::from_be_bytes(exactly(option)?)));
         }
         if id == SELF_TEST && control == RoutineControlType::StartRoutine {
             let [] = exactly(option)?;

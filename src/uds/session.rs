@@ -1,7 +1,9 @@
 //! These tables say which session a service needs, and which services have sub-functions (ISO 14229-1).
 
-use super::routines::READ_LOG;
 use automotive_diag::uds::UdsCommand;
+
+/// Begins a request for the log: start of routine 0203.
+const READ_LOG: [u8; 3] = [1, 0x02, 0x03];
 
 /// A diagnostic session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

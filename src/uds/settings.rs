@@ -4,8 +4,7 @@
 //! are in postcard's encoding. What is written goes into the stored configuration, is checked with all of it, and is
 //! used from the next start on; what is read is what that start will use. `tools/README.md` has units and ranges.
 
-use super::data::{decode, put_record};
-use super::response::{Nrc, Response, exactly, nrc, put};
+use super::response::{Nrc, Response, decode, exactly, nrc, put, put_record};
 use crate::can::config::{BoschSettings, E2e, Vdc2Settings};
 use crate::can::diagnosis::DiagnosisIds;
 use crate::can::latitude::LatitudeSettings;

@@ -77,15 +77,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             (_, Origin::Refused(_)) => None,
             (access, _) => Some(access.unwrap_or(Access::OPEN)),
         };
-        self.flash = if store.damaged() {
-            FlashState::Damaged
-        } else if self.writable
+        self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
+        if self.writable
             && let Err(error) = store.make_room()
         {
-            FlashState::Failed(error)
-        } else {
-            FlashState::Ready
-        };
+            self.refuse(EventKind::NoRoom(error));
+        }
         self.store = self.writable.then_some(store);
     }
 

@@ -91,9 +91,30 @@ fn damaged_record_is_noted() {
     assert!(board.stored_damaged() && board.configuration_lost());
     let page = board.events(0);
     assert!(page.events.iter().any(|event| event.kind == EventKind::RecordsDamaged));
-    // At every start, until it is stored again.
-    assert!(start(&flash).configuration_lost());
-    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), Ok(()));
+    // At every start, whatever else is stored, until it is stored again.
+    for _ in 0..2 {
+        let mut board = start(&flash);
+        assert_eq!(info(&mut board).configuration, Origin::Refused(StoreError::Lost));
+        assert!(board.stored_damaged() && board.configuration_lost());
+        assert_eq!(ask(&mut board, &Request::SetWheels(WheelSettings::TOYOTA)), Ok(()));
+    }
+    assert_eq!(ask(&mut start(&flash), &set(&Configuration::DEFAULT)), Ok(()));
+    let board = start(&flash);
+    assert!(!board.stored_damaged() && !board.configuration_lost());
+}
+
+#[test]
+fn a_torn_record_of_something_else_heals_at_the_next_start() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    // No configuration is stored. Of two records of the wheels the second one is torn: its checksum is missing.
+    let mut board = start(&flash);
+    for _ in 0..2 {
+        assert_eq!(ask(&mut board, &Request::SetWheels(WheelSettings::TOYOTA)), Ok(()));
+    }
+    let first = layout::STORE.start as usize + 8;
+    let size = 8 + usize::from(flash.borrow().bytes()[first + 2]).next_multiple_of(4);
+    flash.borrow_mut().damage(first + 2 * size - 4, 4);
+    assert!(start(&flash).stored_damaged());
     let board = start(&flash);
     assert!(!board.stored_damaged() && !board.configuration_lost());
 }

@@ -3,13 +3,16 @@
 
 use super::uds::{Bench, bench};
 use super::{Board, ask, sample, set, start};
+use gyronet::bias::StaticConfig;
 use gyronet::health::{Faults, Status};
+use gyronet::mounting::Forward;
 use gyronet::sample::{ImuSample, Standstill, WheelSample};
-use gyronet::service::Request;
+
 use gyronet::service::calibrate::Task;
 use gyronet::service::event::EventKind;
 use gyronet::service::message::Calibrate;
-use gyronet::store::{Calibration, Configuration};
+use gyronet::service::{Learner, Request};
+use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::{CentiCelsius, WheelSpeed};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::noise::Noise;
@@ -103,20 +106,25 @@ fn a_tester_reads_what_was_learnt_and_has_it_forgotten() {
     assert_eq!(ask(&mut bench.board, &Request::Calibrate(Calibrate::Forget)), Ok(()));
 }
 
-/// Lets the board see a drive with the sensor's x axis this far to the left of forward, deg: speed and yaw rate change
-/// in waves.
-fn drive(board: &mut Board, seconds: u64, yaw_deg: f64) {
+/// A drive with the sensor's x axis this far to the left of forward, deg: speed and yaw rate change in waves.
+fn driven(seconds: u64, yaw_deg: f64) -> impl Iterator<Item = (ImuSample, WheelSample)> {
     let (sin, cos) = yaw_deg.to_radians().sin_cos();
     let mut noise = Noise::new(3);
-    for tick in 0..100 * seconds {
+    (0..100 * seconds).map(move |tick| {
         let time = 0.01 * tick as f64;
         let (speed, turn) = (15.0 + 5.0 * (0.2 * time).sin(), 0.2 * (0.13 * time).sin());
         let (ahead, left) = ((0.2 * time).cos() + 0.4 * noise.normal(), speed * turn + 0.4 * noise.normal());
         let force = [cos * ahead + sin * left, cos * left - sin * ahead, 9.81].map(|axis| axis as f32);
-        let sample = sample(tick, force, turn as f32);
         let speeds = [Some(WheelSpeed((speed * 65_536.0) as i32)); 4];
         let wheels = WheelSample { speeds, ..WheelSample::without_speeds(Standstill::Moving) };
-        board.observe(Some(&sample), tick as u32, (Status::Ready, Faults::NONE), &wheels);
+        (sample(tick, force, turn as f32), wheels)
+    })
+}
+
+/// Lets the board see it.
+fn drive(board: &mut Board, seconds: u64, yaw_deg: f64) {
+    for (sample, wheels) in driven(seconds, yaw_deg) {
+        board.observe(Some(&sample), 0, (Status::Ready, Faults::NONE), &wheels);
     }
 }
 
@@ -166,12 +174,34 @@ fn a_drive_shows_where_forward_is_and_that_the_sensor_was_moved() {
 }
 
 #[test]
+fn how_far_a_sensor_must_be_moved_depends_on_how_well_forward_was_known() {
+    for (sigma_deg, turned, moved) in
+        [(1.0, 20.0, false), (1.0, 35.0, true), (9.0, 35.0, false), (9.0, 90.0, true)]
+    {
+        let mut learned = Learned::NOTHING;
+        learned.stood(sample(0, LEVEL, 0.0).specific_force);
+        let known = Forward { direction: [1.0, 0.0, 0.0], sigma: f32::to_radians(sigma_deg) };
+        learned.forward = Some(known);
+        let (mut learner, limits) = (Learner::new(), StaticConfig::DEFAULT);
+        let reports = driven(180, turned)
+            .filter(|(sample, wheels)| learner.observe(Some(sample), wheels, &limits, &mut learned));
+        assert_eq!(reports.count(), usize::from(moved), "{turned} deg, known within {sigma_deg} deg");
+        assert!(!moved || learned.forward == Some(known), "what was known stays");
+    }
+}
+
+#[test]
 fn a_minute_on_a_ramp_is_one_standstill() {
     let mut board = start(&Rc::new(RefCell::new(F405::default())));
     observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
     let ramp = [2.2, 0.0, 9.56];
     observe(&mut board, 1, (0.01, 20), LEVEL, Standstill::Moving);
-    observe(&mut board, 60, (0.01, 20), ramp, Standstill::Still);
+    for _ in 0..15 {
+        observe(&mut board, 4, (0.01, 20), ramp, Standstill::Still);
+        // A sample is missing.
+        let still = WheelSample::without_speeds(Standstill::Still);
+        board.observe(None, 0, (Status::Ready, Faults::GAP), &still);
+    }
     let [ahead, ..] = board.learned().specific_force.expect("two standstills");
     assert!((ahead.metre_per_sec2() - 2.2 / 8.0).abs() < 0.01, "{ahead:?}");
 }

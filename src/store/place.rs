@@ -1,0 +1,82 @@
+//! The places for weight files in the flash.
+
+use super::layout::{FOGNET, SLOT_SIZE, SLOTS};
+use core::ops::Range;
+use serde::{Deserialize, Serialize};
+
+/// Names one of the two slots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Slot {
+    /// Sector 10.
+    A,
+    /// Sector 11.
+    B,
+}
+
+impl Slot {
+    /// Both slots, in order.
+    pub const ALL: [Self; 2] = [Self::A, Self::B];
+
+    /// Returns the other slot.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+
+    /// Returns the offset of the slot's first byte into the flash.
+    #[must_use]
+    pub const fn offset(self) -> u32 {
+        match self {
+            Self::A => SLOTS.start,
+            Self::B => SLOTS.start + SLOT_SIZE as u32,
+        }
+    }
+
+    /// Returns this slot's element of a pair.
+    pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
+        match self {
+            Self::A => a,
+            Self::B => b,
+        }
+    }
+}
+
+impl core::fmt::Display for Slot {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(Self::of(*self, ["A", "B"]))
+    }
+}
+
+/// Names a place for a weight file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Place {
+    /// A slot for GyroNet's.
+    Slot(Slot),
+    /// The place for FoGNet's.
+    FogNet,
+}
+
+impl Place {
+    /// Returns its offsets into the flash: whole sectors.
+    #[must_use]
+    pub const fn range(self) -> Range<u32> {
+        match self {
+            Self::Slot(slot) => slot.offset()..slot.offset() + SLOT_SIZE as u32,
+            Self::FogNet => FOGNET,
+        }
+    }
+}
+
+impl core::fmt::Display for Place {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Slot(slot) => write!(f, "slot {slot}"),
+            Self::FogNet => f.write_str("FoGNet's place"),
+        }
+    }
+}
