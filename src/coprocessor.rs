@@ -324,6 +324,12 @@ impl Coprocessor {
         self.handover.stop();
     }
 
+    /// Notes that FoGNet's weights have been erased or no longer fit their checksum. The gyro's rates that follow are
+    /// without it, and report that.
+    pub fn fognet_gone(&mut self) {
+        self.fog.network_gone();
+    }
+
     /// Notes that the sensor was moved since earlier drives. The next messages report it.
     pub fn mount_moved(&mut self) {
         self.pipeline.mount_moved();

@@ -212,7 +212,7 @@ impl FogPipeline {
         let by_network = uses_network.then(|| {
             let output = self.corrector.correct(&FogFrame { turn: kept, inertial, wheels });
             self.note(&output);
-            output.turn.filter(|_| output.corrected && has_latitude)
+            output.turn.filter(|_| output.corrected && has_latitude && self.has_network)
         });
         let by_network = by_network.flatten();
         let both = kept.zip(by_network).map(|(kept, by_network)| [kept, by_network]);
@@ -260,6 +260,12 @@ impl FogPipeline {
         let spread = sqrt(shake * shake + changed * changed);
         let sigma = turn.is_some().then(|| self.lane.sigma(rate, spread));
         Some(YawEstimate { tick, rate, correction, yaw, sigma, status, source, quality, faults, latency_us })
+    }
+
+    /// Notes that FoGNet's weights are gone: the rates that follow are without it and report that.
+    pub fn network_gone(&mut self) {
+        (self.has_network, self.due, self.awaited) = (false, None, false);
+        self.estimate_faults = Faults::NONE;
     }
 
     /// Stops FoGNet until the next start. Its estimate still is in this step's rate.

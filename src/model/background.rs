@@ -1,7 +1,7 @@
 //! The background check compares the weights in use with their checksum, a piece at a time, because flash can lose
 //! bits.
 
-use super::blob::{Blob, BlobError, CRC};
+use super::blob::{BlobError, CRC};
 
 /// Checks the weights over and over, one bounded piece at a time.
 pub struct BackgroundCheck<'w> {
@@ -12,10 +12,10 @@ pub struct BackgroundCheck<'w> {
 }
 
 impl<'w> BackgroundCheck<'w> {
-    /// Begins at the first byte.
+    /// Begins at the first byte of a file's content, whose checksum was this when the file was loaded.
     #[must_use]
-    pub fn new(blob: &Blob<'w>) -> Self {
-        Self { content: blob.content, stored: blob.crc, digest: CRC.digest(), at: 0 }
+    pub fn new(content: &'w [u8], crc: u32) -> Self {
+        Self { content, stored: crc, digest: CRC.digest(), at: 0 }
     }
 
     /// Returns the number of bytes of one round.

@@ -109,8 +109,9 @@ pub struct FogBlob<'w> {
     pub lstm2: [Layer<'w>; 2],
     /// The weights of FC2 times FC4's factor for it.
     pub fc2: Dense<'w>,
-    /// The file's own checksum, which identifies this set of weights.
+    /// The file's own checksum, which identifies this set of weights, and the bytes that it is of.
     pub crc: u32,
+    pub content: &'w [u8],
 }
 
 /// Returns the number of bytes of a FoGNet file with `provenance` bytes of padded text.
@@ -152,6 +153,8 @@ impl<'w> FogBlob<'w> {
         check_rows(&lstm2, input_clamp.into(), 2)?;
         check_dense(&fc1)?;
         check_dense(&fc2)?;
+        // The header has been read: the checksum is there.
+        let content = bytes.get(..bytes.len().saturating_sub(4)).unwrap_or_default();
         Ok(Self {
             provenance,
             training,
@@ -164,6 +167,7 @@ impl<'w> FogBlob<'w> {
             lstm2,
             fc2,
             crc,
+            content,
         })
     }
 

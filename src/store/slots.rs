@@ -29,6 +29,18 @@ impl Accepted {
     /// No file has been accepted.
     pub const NONE: Self = Self { active: None, files: [None; 2], fognet: None };
 
+    /// Returns these without the file in a place: it is being replaced.
+    #[must_use]
+    pub const fn without(mut self, place: Place) -> Self {
+        let [a, b] = self.files;
+        match place {
+            Place::Slot(Slot::A) => self.files = [None, b],
+            Place::Slot(Slot::B) => self.files = [a, None],
+            Place::FogNet => self.fognet = None,
+        }
+        self
+    }
+
     /// Returns the record with a checked file added in its place; a slot becomes the one to use.
     #[must_use]
     pub const fn with(mut self, place: Place, file: u32) -> Self {

@@ -16,6 +16,15 @@ pub struct Upload {
 }
 
 impl Upload {
+    /// Checks the length of a file.
+    ///
+    /// # Errors
+    /// [`SlotError::Length`].
+    pub fn check(place: Place, length: u32) -> Result<(), SlotError> {
+        let fits = length as usize <= place.range().len() && length > 0 && length.is_multiple_of(4);
+        if fits { Ok(()) } else { Err(SlotError::Length(length)) }
+    }
+
     /// Begins an upload and erases the first sector of its place; the others follow with the blocks that begin them. The
     /// processor stands still meanwhile: one to two seconds on an F405 (its datasheet, 128 KiB sector). Offsets of `flash`
     /// are those into the whole flash.
@@ -23,9 +32,7 @@ impl Upload {
     /// # Errors
     /// [`SlotError::Length`], [`SlotError::Flash`].
     pub fn begin<F: NorFlash>(flash: &mut F, place: Place, length: u32) -> Result<Self, SlotError> {
-        if length as usize > place.range().len() || length == 0 || !length.is_multiple_of(4) {
-            return Err(SlotError::Length(length));
-        }
+        Self::check(place, length)?;
         let upload = Self { place, length, written: 0 };
         upload.erase_sector(flash)?;
         Ok(upload)

@@ -110,12 +110,12 @@ impl Services {
         }
     }
 
-    /// Returns whether a request may erase the flash.
+    /// Returns whether a request may erase the flash, or checks a whole file.
     pub fn takes_long(&self, request: &[u8]) -> bool {
         self.session != Session::Default
             && matches!(
                 request,
-                [0x2E | 0x34, ..]
+                [0x2E | 0x34 | 0x37, ..]
                     | [0x27, 2 | 0x82, ..]
                     | [0x31, 1, 0x02, 0x02 | 0x05]
                     | [0x31, 1, 0xFF, 0x01, ..]

@@ -5,7 +5,8 @@ use gyronet::service::calibrate::CalibrationFault;
 use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
 use gyronet::service::message::{FlashState, Origin};
-use gyronet::store::slots::{Slot, SlotError, WeightSource};
+use gyronet::store::Slot;
+use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{FieldError, FlashFault, StoreError};
 
 #[test]

@@ -252,4 +252,11 @@ fn fognets_file_is_replaced_and_runs() {
     assert_eq!(info.weights, WeightSource::BuiltIn);
     let (erased, _) = erased_and_reset(&mut board);
     assert_eq!(erased[..5], [3, 4, 5, 6, 7]);
+    // The next upload stops it, and that is reported, before anything new is accepted.
+    let (done, _) =
+        timed(&mut board, |board| upload(&mut on_bus(board), Network::FogNet, &file[..256], |_| {}));
+    assert!(done.is_err(), "no whole file");
+    assert_eq!(service::info(&mut board).fognet, Some(Err(SlotError::Empty)));
+    restart(&mut board);
+    assert!(matches!(service::info(&mut board).fognet, Some(Err(_))));
 }

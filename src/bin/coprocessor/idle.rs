@@ -7,6 +7,7 @@ use crate::imu::BringUp;
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::stm32f405::{clocks, timer};
+use gyronet::coprocessor::Coprocessor;
 use gyronet::health::{Faults, Status};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::{ImuSample, WheelSample};
@@ -36,14 +37,35 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
 
 /// Faults that the idle task has found, for the coprocessor.
 pub struct Found {
-    pub weights_damaged: bool,
-    pub mount_moved: bool,
+    weights_damaged: bool,
+    fognet_gone: bool,
+    mount_moved: bool,
+}
+
+impl Found {
+    /// Returns whether there is anything to report.
+    pub fn is_something(&self) -> bool {
+        self.weights_damaged || self.fognet_gone || self.mount_moved
+    }
+
+    /// Reports it.
+    pub fn report(&self, coprocessor: &mut Coprocessor) {
+        if self.weights_damaged {
+            coprocessor.weights_damaged();
+        }
+        if self.fognet_gone {
+            coprocessor.fognet_gone();
+        }
+        if self.mount_moved {
+            coprocessor.mount_moved();
+        }
+    }
 }
 
 /// Holds the state of the idle task.
 pub struct Idle {
     device: &'static mut Device<Records, Weights>,
-    check: Option<BackgroundCheck<'static>>,
+    checks: Checks,
     diagnosis: Diagnosis,
     fog_network: FogNetwork,
     bring_up: Option<BringUp>,
@@ -53,20 +75,26 @@ pub struct Idle {
     milliseconds: u32,
 }
 
-/// The stored data, and the check of the weights in use.
-pub type Stored = (&'static mut Device<Records, Weights>, Option<BackgroundCheck<'static>>);
+/// The checks of the weights in use.
+pub struct Checks {
+    pub weights: Option<BackgroundCheck<'static>>,
+    pub fognet: Option<BackgroundCheck<'static>>,
+}
+
+/// The stored data, and the checks.
+pub type Stored = (&'static mut Device<Records, Weights>, Checks);
 
 impl Idle {
     #[inline(never)]
     pub fn new(
-        (device, check): Stored,
+        (device, checks): Stored,
         diagnosis: Diagnosis,
         fog_network: Option<&'static mut FogParts>,
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
     ) -> Self {
         let fog_network = FogNetwork::new(fog_network);
-        Self { device, check, diagnosis, fog_network, bring_up, clock_fault, retried: 0, milliseconds: 0 }
+        Self { device, checks, diagnosis, fog_network, bring_up, clock_fault, retried: 0, milliseconds: 0 }
     }
 
     /// Does a bounded piece of work, and returns what it has found.
@@ -78,11 +106,14 @@ impl Idle {
         }
         counters.lines.service_errors = self.diagnosis.refused();
         self.diagnosis.turn(self.device, counters);
-        if self.device.fognet_is_gone() {
-            self.fog_network.stop();
-        }
         self.retry_clock();
-        Found { weights_damaged: self.check(), mount_moved: self.device.take_mount_moved() }
+        let weights_damaged = self.check();
+        let fognet_gone = self.device.take_fognet_gone();
+        if fognet_gone {
+            self.fog_network.stop();
+            self.checks.fognet = None;
+        }
+        Found { weights_damaged, fognet_gone, mount_moved: self.device.take_mount_moved() }
     }
 
     #[inline(never)]
@@ -114,15 +145,27 @@ impl Idle {
         &mut self.fog_network
     }
 
+    /// Checks a piece of the weights in use, and returns whether GyroNet's were found to be damaged.
     fn check(&mut self) -> bool {
         let now = timer::milliseconds();
-        let Some(check) = self.check.as_mut().filter(|_| now != self.milliseconds) else { return false };
+        if now == self.milliseconds {
+            return false;
+        }
         self.milliseconds = now;
-        let piece = check.len() / CHECK_MS + 1;
-        let damaged = check.advance(piece).is_some_and(|pass| pass.is_err());
+        let is_damaged = |check: &mut Option<BackgroundCheck<'static>>| {
+            let pass = check.as_mut().and_then(|check| check.advance(check.len() / CHECK_MS + 1));
+            let damaged = pass.is_some_and(|pass| pass.is_err());
+            if damaged {
+                *check = None;
+            }
+            damaged
+        };
+        if is_damaged(&mut self.checks.fognet) {
+            self.device.fognet_damaged();
+        }
+        let damaged = is_damaged(&mut self.checks.weights);
         if damaged {
             self.device.weights_damaged();
-            self.check = None;
         }
         damaged
     }

@@ -241,11 +241,8 @@ mod app {
         loop {
             let mut counters = cx.shared.counters.lock(|counters| *counters);
             let found = cx.local.rest.turn(&mut counters);
-            if found.weights_damaged {
-                cx.shared.coprocessor.lock(|coprocessor| coprocessor.weights_damaged());
-            }
-            if found.mount_moved {
-                cx.shared.coprocessor.lock(|coprocessor| coprocessor.mount_moved());
+            if found.is_something() {
+                cx.shared.coprocessor.lock(|coprocessor| found.report(coprocessor));
             }
             let fog_network = cx.local.rest.fog_network();
             if fog_network.is_waiting() {

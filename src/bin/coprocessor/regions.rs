@@ -3,6 +3,7 @@
 
 use crate::pause;
 use crate::stm32f405::flash::{Flash, FlashError, WORD};
+use crate::stm32f405::watchdog;
 use core::ops::Range;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use gyronet::service::MappedSlots;
@@ -96,6 +97,10 @@ impl MappedSlots for Weights {
 
     fn fognet(&self) -> &[u8] {
         fognet_at_start()
+    }
+
+    fn check<T>(&self, work: impl FnOnce() -> T) -> T {
+        watchdog::lengthened(work)
     }
 }
 

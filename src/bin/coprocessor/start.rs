@@ -4,7 +4,7 @@
 use crate::board::Board;
 use crate::diagnosis;
 use crate::fog_network::FogParts;
-use crate::idle::Stored;
+use crate::idle::{Checks, Stored};
 use crate::output::OutputParts;
 use crate::regions::{self, Records, Weights};
 use crate::stm32f405::{can::BITS_PER_SECOND, flash::Flash, pac};
@@ -63,8 +63,12 @@ pub fn parts(board: &Board) -> Option<Parts> {
     // Without good weights the pipeline still runs: the status says degraded, and the rate is
     // the gyro's less its static bias.
     let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
-    let check = blob.as_ref().map(BackgroundCheck::new);
-    let fog_network = device.fognet(regions::fognet_at_start()).and_then(fog_network);
+    let fog_blob = device.fognet(regions::fognet_at_start());
+    let check = Checks {
+        weights: blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc)),
+        fognet: fog_blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc)),
+    };
+    let fog_network = fog_blob.and_then(fog_network);
     let configuration = device.configuration();
     let weights = blob.map_or(0, |blob| blob.crc);
     let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);

@@ -16,6 +16,11 @@ pub trait MappedSlots: NorFlash {
     fn slots(&self) -> [&[u8]; 2];
     /// Returns the place of FoGNet's file, on a word boundary.
     fn fognet(&self) -> &[u8];
+
+    /// Checks a file: a tenth of a second, for which a board may have to lengthen its watchdog.
+    fn check<T>(&self, work: impl FnOnce() -> T) -> T {
+        work()
+    }
 }
 
 /// An upload, and its file's checksum once checked.
@@ -58,10 +63,23 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         found.map_err(|error| self.refuse(EventKind::FogNetRefused(error))).ok()
     }
 
-    /// Returns whether FoGNet's file has been erased since the start: what runs on it must stop.
-    #[must_use]
-    pub fn fognet_is_gone(&self) -> bool {
-        self.fognet_gone
+    /// Returns once whether FoGNet's file has been erased or damaged since the start: what runs on it must stop, and
+    /// [`Coprocessor::fognet_gone`](crate::Coprocessor::fognet_gone).
+    pub fn take_fognet_gone(&mut self) -> bool {
+        core::mem::take(&mut self.fognet_gone)
+    }
+
+    /// Notes that FoGNet's file no longer fits its checksum; it is not used until the next start, which checks it again.
+    pub fn fognet_damaged(&mut self) {
+        if let Some(Ok(crc)) = self.fognet {
+            self.lose_fognet(SlotError::NotAccepted(crc));
+            self.note(EventKind::WeightsDamaged);
+        }
+    }
+
+    fn lose_fognet(&mut self, why: SlotError) {
+        self.fognet = self.fognet.map(|_| Err(why));
+        self.fognet_gone = true;
     }
 
     /// Notes that the weights in use no longer fit their checksum; they are not used until the next start, which
@@ -86,10 +104,22 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             Network::GyroNet => Place::Slot(self.unused_slot()),
             Network::FogNet => Place::FogNet,
         };
+        Upload::check(place, length)?;
         self.uploading = None;
+        if self.slots.is_none() {
+            return Err(SlotError::NoFlash.into());
+        }
+        // What was accepted there is no more: whoever uploads can give a file any checksum.
+        let accepted = self.accepted.without(place);
+        if accepted != self.accepted {
+            self.store.as_mut().ok_or(SlotError::NoFlash)?.set(&accepted)?;
+            self.accepted = accepted;
+        }
+        if network == Network::FogNet {
+            // An erase that fails may have erased a part.
+            self.lose_fognet(SlotError::Empty);
+        }
         let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        // An erase that fails may have erased a part.
-        self.fognet_gone |= network == Network::FogNet;
         let upload = Upload::begin(flash, place, length)?;
         self.uploading = Some(Uploading { upload, checked: None });
         Ok(())
@@ -117,7 +147,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub(super) fn weights_verify(&mut self) -> Result<(), Refusal> {
         let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-        uploading.checked = Some(uploading.upload.verify(flash.slots(), flash.fognet())?);
+        let upload = &uploading.upload;
+        uploading.checked = Some(flash.check(|| upload.verify(flash.slots(), flash.fognet()))?);
         Ok(())
     }
 

@@ -183,7 +183,7 @@ fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate
 ///
 /// Only the pass in which the flip is seen needs to be computed, because every pass from that one on has the wrong sum.
 fn found_after(damaged: &Blob<'_>, flipped: usize, at: usize) -> Option<usize> {
-    let mut check = BackgroundCheck::new(damaged);
+    let mut check = BackgroundCheck::new(damaged.content, damaged.crc);
     let length = check.len();
     let finds = check.advance(length)?.is_err();
     // A byte that this pass has checked already is seen in the next one.

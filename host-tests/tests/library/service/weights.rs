@@ -58,14 +58,12 @@ fn weights_are_replaced() {
     assert!(matches!(ask(&mut board, &Request::WeightsVerify), Err(Refusal::Slot(_))));
     assert!(matches!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(_))));
     assert_eq!(info(&mut start(&flash)).weights, WeightSource::Slot(Slot::A));
-    // Both slots damaged: the built-in weights, and both are named.
-    for slot in [Slot::A, Slot::B] {
-        flash.borrow_mut().damage(slot.offset() as usize + 70_000, 0x10);
-    }
+    // The slot in use damaged, and nothing accepted in the other: the built-in weights, and it is named.
+    flash.borrow_mut().damage(Slot::A.offset() as usize + 70_000, 0x10);
     let mut board = start(&flash);
     let about = info(&mut board);
     assert_eq!(about.weights, WeightSource::BuiltIn);
-    assert!(about.refused_slots.iter().all(Option::is_some), "{:?}", about.refused_slots);
+    assert!(matches!(about.refused_slots, [Some(SlotError::Blob(_)), None]), "{:?}", about.refused_slots);
 }
 
 /// Uploads a file and has it checked.
@@ -127,7 +125,7 @@ fn fognets_weights_run_on_the_gyro_that_they_were_trained_for() {
     let mut board = start(&flash);
     upload(&mut board, &weights::FOGNET.0);
     assert_eq!(board.uploaded(), Some((Place::FogNet, crc)));
-    assert!(board.fognet_is_gone());
+    assert!(board.take_fognet_gone() && !board.take_fognet_gone(), "once");
     // It is there, but nobody has accepted it.
     assert_eq!(fognet(&flash, &own), Some(Err(SlotError::NotAccepted(crc))));
     let mut board = start(&flash);
@@ -177,6 +175,57 @@ fn fognets_weights_run_on_the_gyro_that_they_were_trained_for() {
 }
 
 /// FoGNet's file has one place: a cut leaves the new file, or none that would run.
+/// A checksum is no signature: four bytes of a file give it any.
+#[test]
+fn a_file_with_the_checksum_of_an_accepted_one_is_not_accepted_with_it() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let own = with_fognet(FogNetUse::Simulated, FogPart::Dsp1760, 1);
+    let (fognets, gyronets) = (&weights::FOGNET.0[..], &weights::GYRONET.0[..]);
+    let mut board = start(&flash);
+    for file in [fognets, gyronets, gyronets] {
+        upload(&mut board, file);
+        assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+        board = start(&flash);
+    }
+    let accepted = |flash: &Rc<RefCell<F405>>| open(flash).unwrap().get::<Accepted>().unwrap().unwrap();
+    assert!(accepted(&flash).files.iter().all(Option::is_some));
+    assert!(fognet(&flash, &own).unwrap().is_ok());
+    // The same bytes again, which nobody accepts.
+    for file in [fognets, gyronets] {
+        upload(&mut start(&flash), file);
+    }
+    assert!(matches!(fognet(&flash, &own), Some(Err(SlotError::NotAccepted(_)))));
+    assert_eq!(accepted(&flash).files.iter().flatten().count(), 1, "the slot in use");
+}
+
+#[test]
+fn an_upload_that_is_refused_stops_nothing() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let own = with_fognet(FogNetUse::Simulated, FogPart::Dsp1760, 1);
+    let mut board = start(&flash);
+    upload(&mut board, &weights::FOGNET.0);
+    assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+    assert!(fognet(&flash, &own).unwrap().is_ok());
+    let (mut board, before) = (start(&flash), flash.borrow().operations());
+    let running = info(&mut board).fognet;
+    for length in [0, 3, u32::MAX] {
+        let request = Request::WeightsBegin { network: Network::FogNet, length };
+        assert_eq!(ask(&mut board, &request), Err(Refusal::Slot(SlotError::Length(length))));
+    }
+    assert_eq!((info(&mut board).fognet, flash.borrow().operations()), (running, before));
+    assert!(!board.take_fognet_gone());
+    // One that begins stops it, and damage does.
+    let request = Request::WeightsBegin { network: Network::FogNet, length: 64 };
+    let mut damaged = start(&flash);
+    damaged.fognet_damaged();
+    assert_eq!(ask(&mut board, &request), Ok(()));
+    for (mut board, why) in [(board, None), (damaged, running.and_then(Result::ok))] {
+        let why = why.map_or(SlotError::Empty, SlotError::NotAccepted);
+        assert_eq!(info(&mut board).fognet, Some(Err(why)));
+        assert!(board.take_fognet_gone());
+    }
+}
+
 #[test]
 fn a_power_cut_during_the_upload_of_fognet_leaves_none() {
     let old = &weights::FOGNET.0;
@@ -203,20 +252,24 @@ fn a_power_cut_during_the_upload_of_fognet_leaves_none() {
         board.act(&Request::WeightsVerify)?;
         board.act(&Request::WeightsActivate)
     };
+    let begun = Rc::new(RefCell::new(before.clone()));
+    assert_eq!(start(&begun).act(&begin(&new)), Ok(()));
+    // First of all the record that the old file is accepted no more.
+    let record = begun.borrow().operations() - before.operations() - 1;
     let whole = Rc::new(RefCell::new(before.clone()));
     assert_eq!(replace(&whole), Ok(()));
     let operations = whole.borrow().operations() - before.operations();
-    // Five sectors, each erased when the file reaches it; the record at the end.
-    let sectors = [0, 1, 4_097, 20_482, 53_251, 86_020].map(|after| after..after + 3);
-    let last = operations - 8..operations;
-    for after in sectors.into_iter().chain([last]).flatten() {
+    // Five sectors, each erased when the file reaches it; another record at the end.
+    let sectors = [0, 1, 4_097, 20_482, 53_251, 86_020].map(|after| record + after..record + after + 3);
+    let (first, last) = (0..record, operations - 8..operations);
+    for after in sectors.into_iter().chain([first, last]).flatten() {
         let cut = Cut::ALL[after as usize % Cut::ALL.len()];
         let flash = Rc::new(RefCell::new(before.clone()));
         flash.borrow_mut().cut_after(after, cut);
         assert!(replace(&flash).is_err(), "cut {cut:?} at operation {after} of {operations}");
         assert!(flash.borrow_mut().restore());
         let found = info(&mut start(&flash)).fognet.expect("it is asked for");
-        let untouched = after == 0 && found == Ok(crc(old));
+        let untouched = after < record && found == Ok(crc(old));
         assert!(untouched || found.is_err() || found == Ok(crc(&new)), "{cut:?} at {after}: {found:?}");
         let accepted = open(&flash).and_then(|mut store| store.get::<Accepted>()).expect("records are whole");
         assert!(accepted.is_some_and(|accepted| accepted.active.is_none()));
