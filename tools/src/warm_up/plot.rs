@@ -46,15 +46,18 @@ pub fn svg(states: &[State]) -> Result<String, PlotError> {
             ],
         ),
         panel(
-            "expected error, deg/s",
-            vec![line(without, |state| state.static_sigma), line(learned, |state| state.curve_sigma)],
+            "expected error, deg/h",
+            vec![
+                line(without, |state| 3_600.0 * state.static_sigma),
+                line(learned, |state| 3_600.0 * state.curve_sigma),
+            ],
         ),
         panel(
             "heading error, deg",
             vec![line(without, |state| state.static_error), line(learned, |state| state.curve_error)],
         ),
     ];
-    let title = "half an hour without a stop while the sensor warms up (simulated)";
+    let title = "Half an hour without a stop while the sensor warms up (simulated)";
     let legend = vec![
         ("truth".to_owned(), Stroke::TRUTH),
         ("static calibration, zero-rate updates".to_owned(), without),
