@@ -2,23 +2,25 @@
 //! bits.
 
 use super::blob::{BlobError, CRC};
+use super::file::CrcTable;
 
 /// Checks the weights over and over, one bounded piece at a time.
 pub struct BackgroundCheck<'w> {
     content: &'w [u8],
     stored: u32,
-    digest: crc::Digest<'static, u32>,
+    digest: crc::Digest<'static, u32, CrcTable>,
     at: usize,
 }
 
 impl<'w> BackgroundCheck<'w> {
-    /// Begins at the first byte of a file's content, whose checksum was this when the file was loaded.
+    /// Creates a check that starts at the first byte of a file's content; `crc` is its checksum when the file was
+    /// loaded.
     #[must_use]
     pub fn new(content: &'w [u8], crc: u32) -> Self {
         Self { content, stored: crc, digest: CRC.digest(), at: 0 }
     }
 
-    /// Returns the number of bytes of one round.
+    /// Returns the number of bytes that one round checks.
     #[must_use]
     pub fn len(&self) -> usize {
         self.content.len()

@@ -1,7 +1,7 @@
 //! The weight files of all networks share a header, its checks, and typed access without a copy.
 //!
-//! All numbers are little-endian, and every field lies on a 4-byte boundary, so that a microcontroller can read it
-//! where it lies in flash.
+//! All numbers are little-endian, and every field lies on a 4-byte boundary, so that a microcontroller can read it in
+//! place in flash.
 //!
 //! | offset | type | field |
 //! |---|---|---|
@@ -10,11 +10,11 @@
 //! | 6 | u16 | network, 1 = GyroNet, 2 = FoGNet |
 //! | 8 | u32 | length of the whole file, checksum included |
 //! | 12 | u16 x 4 | window, inputs, hidden units a direction, layers |
-//! | 20 | u32 | outputs of the linear part, 0 = there is none |
+//! | 20 | u32 | outputs of the linear part, 0 = no linear part |
 //! | 24 | u32 | length P of the provenance text, a multiple of 4 (padded with spaces) |
 //! | 28 | i32 | input clamp L, in normalised Q10 |
 //! | 32 | (i32, i32) x inputs | offset and multiplier of each input, see [`Normalisation`] |
-//! | | | what the network adds: [`super::blob`], [`super::fognet_blob`] |
+//! | | | fields of the network: [`super::blob`], [`super::fognet_blob`] |
 //! | end - 4 | u32 | CRC-32 (ISO-HDLC, as in zip and Ethernet) of everything before it |
 //!
 //! A direction consists of its input records, then its recurrent records, as [`crate::nn::lstm`] lays them out; a row
@@ -33,8 +33,14 @@ pub const FOGNET_VERSION: u16 = 4;
 pub const GYRONET: u16 = 1;
 /// This number in the header stands for FoGNet.
 pub const FOGNET: u16 = 2;
+/// The lookup table of [`CRC`]: 1 KiB on a microcontroller, the faster 16 KiB on a host.
+#[cfg(target_os = "none")]
+pub type CrcTable = crc::Table<1>;
+/// The lookup table of [`CRC`]: 1 KiB on a microcontroller, the faster 16 KiB on a host.
+#[cfg(not(target_os = "none"))]
+pub type CrcTable = crc::Table<16>;
 /// Computes CRC-32 as in zip and Ethernet.
-pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+pub static CRC: crc::Crc<u32, CrcTable> = crc::Crc::<u32, CrcTable>::new(&crc::CRC_32_ISO_HDLC);
 
 #[cfg(target_endian = "big")]
 compile_error!("weights are read in place as little-endian words");
@@ -50,10 +56,10 @@ pub type Topology = [u16; 6];
 #[non_exhaustive]
 pub enum BlobError {
     /// The file does not begin with [`MAGIC`].
-    #[error("weight file: this is none, it begins with {0:02x?}, not {MAGIC:02x?}")]
+    #[error("weight file: it begins with {0:02x?}, should be {MAGIC:02x?}")]
     Magic([u8; 4]),
     /// The file has a format version that this code does not read.
-    #[error("weight file: format version {found}, this reads {expected}")]
+    #[error("weight file: format version {found}, should be {expected}")]
     Version {
         /// The version in the file.
         found: u16,
@@ -84,8 +90,8 @@ pub enum BlobError {
     /// The bytes do not begin on a 4-byte boundary.
     #[error("weight file: not on a 4-byte boundary")]
     Misaligned,
-    /// The checksum does not fit the content.
-    #[error("weight file: checksum is {computed:08x}, the file says {stored:08x}")]
+    /// The checksum does not match the content.
+    #[error("weight file: checksum is {computed:08x}, the file has {stored:08x}")]
     Crc {
         /// The checksum computed over the content.
         computed: u32,
@@ -105,20 +111,20 @@ pub enum BlobError {
         layer: u8,
         /// Direction, 0 forward, 1 backward.
         direction: u8,
-        /// Unit.
+        /// Index of the unit.
         unit: u16,
     },
     /// The gyro that the network was trained for has an unknown number.
-    #[error("weight file: trained for gyro {0}, which this code does not know")]
+    #[error("weight file: trained for gyro {0}, which is not supported")]
     Gyro(u16),
     /// A row of the linear part could overflow its accumulator.
     #[error("weight file: output {output} of the linear part could overflow its accumulator")]
     LinearBound {
-        /// Output.
+        /// Index of the output.
         output: u16,
     },
     /// The network is larger than the memory that the caller provides.
-    #[error("weight file: {found} units a direction, there is memory for {largest}")]
+    #[error("weight file: {found} units a direction, memory holds {largest}")]
     Units {
         /// Units in the file.
         found: u16,
@@ -146,7 +152,7 @@ pub struct Normalisation {
     pub multiplier: i32,
 }
 
-/// Returns the length in bytes of the common header for a network of so many inputs.
+/// Returns the length in bytes of the common header for a network with this many inputs.
 pub(super) const fn header_len(inputs: usize) -> usize {
     32 + 8 * inputs
 }
@@ -166,7 +172,7 @@ pub(super) const fn dense_len(columns: usize) -> usize {
     2 * columns + 8
 }
 
-/// Holds the header's fields, once they are known to fit the file.
+/// Holds the header's fields, which have been checked against the file.
 pub(super) struct Header<const INPUTS: usize, S> {
     /// The shape, as the network reads it.
     pub shape: S,
@@ -177,8 +183,8 @@ pub(super) struct Header<const INPUTS: usize, S> {
 }
 
 impl<const INPUTS: usize, S> Header<INPUTS, S> {
-    /// Checks header, length and checksum of a file; `shape` accepts its topology, and `expected` goes into the error
-    /// if it does not.
+    /// Checks header, length and checksum of a file. `shape` reads its topology; if it returns `None`, the error
+    /// reports `expected`.
     pub fn read(
         reader: &mut Reader<'_>,
         expected: Topology,
@@ -229,11 +235,11 @@ impl<const INPUTS: usize, S> Header<INPUTS, S> {
 /// Checks that no input up to `input_max` can overflow a gate's accumulator.
 pub(super) fn check_rows(layers: &[Layer<'_>; 2], input_max: i32, first: u8) -> Result<(), BlobError> {
     for ((l, layer), input_max) in (first..).zip(layers).zip([input_max, HIDDEN_MAX]) {
-        for (d, direction) in (0..).zip([&layer.forward, &layer.backward]) {
-            for unit in 0..direction.units() {
-                let bound = row_bound(direction, unit, input_max);
+        for (direction, weights) in (0..).zip([&layer.forward, &layer.backward]) {
+            for unit in 0..weights.units() {
+                let bound = row_bound(weights, unit, input_max);
                 if bound.iter().zip(ROW_LIMIT).any(|(bound, limit)| *bound >= limit) {
-                    return Err(BlobError::RowBound { layer: l, direction: d, unit: unit as u16 });
+                    return Err(BlobError::RowBound { layer: l, direction, unit: unit as u16 });
                 }
             }
         }
@@ -247,11 +253,11 @@ pub(super) fn check_dense(row: &Dense<'_>) -> Result<(), BlobError> {
     if sum + i64::from(row.bias).abs() >= 1 << 31 { Err(BlobError::Scale) } else { Ok(()) }
 }
 
-/// Takes typed slices off the front of the file.
+/// Reads typed slices from the front of the file.
 pub(super) struct Reader<'w> {
     bytes: &'w [u8],
     len: usize,
-    /// The shortest that a file of the network can be.
+    /// Bytes of the shortest file of the network.
     shortest: usize,
 }
 
@@ -280,7 +286,7 @@ impl<'w> Reader<'w> {
         self.array().map(|bytes| i32::from_le_bytes(*bytes))
     }
 
-    /// Takes `len` elements of `T`, in place.
+    /// Reads `len` elements of `T`, in place.
     pub fn slice<T: bytemuck::AnyBitPattern>(&mut self, len: usize) -> Result<&'w [T], BlobError> {
         let bytes = self.take(len * size_of::<T>())?;
         if !bytes.as_ptr().addr().is_multiple_of(4) {
@@ -294,7 +300,7 @@ impl<'w> Reader<'w> {
         Ok(text.trim_end_matches(' '))
     }
 
-    /// Takes two bidirectional layers.
+    /// Reads two bidirectional layers.
     pub fn layers(&mut self, units: usize, inputs: usize) -> Result<[Layer<'w>; 2], BlobError> {
         let mut layer = |inputs| {
             Ok(Layer { forward: self.direction(units, inputs)?, backward: self.direction(units, inputs)? })
@@ -308,13 +314,13 @@ impl<'w> Reader<'w> {
         DirectionWeights::new(units, inputs, input, recurrent).ok_or(BlobError::Misaligned)
     }
 
-    /// Takes the rows of a linear part.
+    /// Reads the rows of a linear part.
     pub fn linear(&mut self, outputs: usize, inputs: usize) -> Result<Linear<'w>, BlobError> {
         let overflow = |output| BlobError::LinearBound { output: output as u16 };
         Linear::new(inputs, self.slice(outputs * inputs)?).map_err(overflow)
     }
 
-    /// Takes a row of an output layer.
+    /// Reads a row of an output layer.
     pub fn dense(&mut self, columns: usize) -> Result<Dense<'w>, BlobError> {
         Ok(Dense { weights: self.slice(columns)?, bias: self.i32()?, multiplier: self.i32()? })
     }

@@ -60,25 +60,26 @@ fn accumulate<const STEPS: usize>(
 }
 
 pub(in crate::nn) fn project<const U: usize>(
-    direction: &DirectionWeights<'_>,
+    weights: &DirectionWeights<'_>,
     x: &[u32],
     projection: &mut [Projection<U>],
 ) {
-    for (x, projection) in x.chunks_exact(direction.inputs().max(1)).zip(projection) {
-        project_pair(direction, x, projection);
+    for (x, [first, second]) in x.chunks_exact(weights.inputs().max(1)).zip(projection) {
+        project_pair(weights, x, first, second);
     }
 }
 
-fn project_pair<const U: usize>(
-    direction: &DirectionWeights<'_>,
+fn project_pair(
+    weights: &DirectionWeights<'_>,
     x: &[u32],
-    [first, second]: &mut Projection<U>,
+    first: &mut [Accumulators],
+    second: &mut [Accumulators],
 ) {
-    let inputs = direction.inputs();
+    let inputs = weights.inputs();
     let (x_quads, x_tail) = x.as_chunks::<4>();
     // Units come in pairs, so that the columns are laid out once for two of them.
     let outputs = first.as_chunks_mut::<2>().0.iter_mut().zip(second.as_chunks_mut::<2>().0);
-    for (pair, (first, second)) in direction.input().chunks_exact(2 * (4 + inputs)).zip(outputs) {
+    for (pair, (first, second)) in weights.input().chunks_exact(2 * (4 + inputs)).zip(outputs) {
         let (a, b) = pair.split_at(4 + inputs);
         let ((a_bias, a), (b_bias, b)) = (a.split_at(4), b.split_at(4));
         let mut sums = [[Sums::ZERO; 2]; 2];
@@ -98,16 +99,26 @@ fn project_pair<const U: usize>(
 }
 
 pub(in crate::nn) fn step<const U: usize, const W: usize>(
-    direction: &DirectionWeights<'_>,
+    weights: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
+    step_units(weights, projection, previous.map(<[u32; W]>::as_slice), cell_state, hidden);
+}
+
+fn step_units(
+    weights: &DirectionWeights<'_>,
+    projection: &[Accumulators],
+    previous: Option<&[u32]>,
+    cell_state: &mut [i32],
+    hidden: &mut [u32],
+) {
     let projection = projection.as_chunks::<2>().0;
     let cell_state = cell_state.as_chunks_mut::<2>().0;
-    let columns = DirectionWeights::padded(direction.units());
-    let pairs = direction.recurrent().chunks_exact(2 * (columns + 2));
+    let columns = DirectionWeights::padded(weights.units());
+    let pairs = weights.recurrent().chunks_exact(2 * (columns + 2));
     for (((pair, start), cell_state), hidden) in pairs.zip(projection).zip(cell_state).zip(hidden) {
         let (a, b) = pair.split_at(columns + 2);
         let ((a, a_multipliers), (b, b_multipliers)) = (a.split_at(columns), b.split_at(columns));
