@@ -1,12 +1,12 @@
 //! The coprocessor on a Cortex-M0 with 16 KiB of RAM, with the default model.
 //!
-//! `cargo run -p gyronet --release --example cortex_m0 --features microbit --target thumbv6m-none-eabi` runs it in QEMU:
-//! a parked car and a turn; the exit status says whether the last rate is that of the turn.
+//! `cargo run -p gyronet --release --example cortex_m0 --features microbit --target thumbv6m-none-eabi` runs it in
+//! QEMU: a parked car and a turn; the exit status reports whether the last rate is that of the turn.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    eprintln!("this is for a Cortex-M0: add --features microbit --target thumbv6m-none-eabi");
+    eprintln!("this example runs on a Cortex-M0: add --features microbit --target thumbv6m-none-eabi");
 }
 
 #[cfg(target_os = "none")]
@@ -36,7 +36,7 @@ mod firmware {
         }
     }
 
-    /// Makes both over their statics.
+    /// Creates both over statics, because they are too large for the stack.
     fn parts() -> Option<(&'static mut Coprocessor, Model)> {
         let blob = Blob::new_checked(&weights::DEFAULT.0).ok()?;
         let state = cortex_m::singleton!(: State = GyroNetState::ZERO)?;
@@ -54,7 +54,7 @@ mod firmware {
                 let _ = coprocessor.deliver(window.end, network.estimate(&window.features));
             }
             while let Some(sent) = coprocessor.next_frame() {
-                // To your CAN controller.
+                // Pass the frame to your CAN controller here.
                 core::hint::black_box(sent.frame);
             }
         }
@@ -64,9 +64,10 @@ mod firmware {
         good && (rate.rate.rad_per_sec() - 0.1).abs() < 0.001
     }
 
-    /// Your sensor. This one has a bias of 0.01 rad/s; its car is parked for four seconds and then turns at 0.1 rad/s.
+    /// Stands in for your sensor: it has a bias of 0.01 rad/s, on a car that is parked for four seconds and then
+    /// turns at 0.1 rad/s.
     fn read(number: u32, time: Micros) -> ImuSample {
-        // A least bit that moves: an axis without noise is a stuck one.
+        // One bit of noise: the monitor reports an axis without noise as stuck.
         let noise = (number % 2) as i32;
         let yaw_rate = if number < 400 { 1_342_177 } else { 14_763_950 };
         ImuSample {

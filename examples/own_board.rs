@@ -2,7 +2,8 @@ use embedded_can::nb::Can;
 use gyronet::sensor::Source;
 use gyronet::{Coprocessor, ImuSample, Micros, TransmitQueue, WindowNetwork};
 
-/// Call it every few milliseconds; `now` is your clock. Errors are counted and reported on the bus.
+/// Runs everything that is due. Call it every few milliseconds; `now` is your clock. Errors are counted and reported
+/// on the bus.
 pub fn poll<CAN: Can>(
     coprocessor: &mut Coprocessor,
     network: &mut impl WindowNetwork,
@@ -14,10 +15,10 @@ pub fn poll<CAN: Can>(
     match imu.next_sample() {
         Some(Ok(sample)) => drop(coprocessor.imu(sample, now)),
         Some(Err(_)) => coprocessor.imu_error(),
-        // A sensor that has fallen silent is reported too.
+        // This also reports a silent sensor.
         None => drop(coprocessor.poll(now)),
     }
-    // Or in a task of lower priority: the estimate is used two samples later, not before.
+    // This can run in a task of lower priority: the estimate is used two samples later, not before.
     if let Some(window) = coprocessor.window() {
         let _ = coprocessor.deliver(window.end, network.estimate(&window.features));
     }

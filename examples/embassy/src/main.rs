@@ -1,7 +1,7 @@
 //! The coprocessor on an STM32F405 with embassy: an Xsens MTi on USART1 in, frames on CAN1 out.
 //!
-//! Pins and crystal are those of the Netduino Plus 2. The network has an executor of its own, with a priority below that
-//! of bytes and frames. Build it in the repository's root:
+//! Pins and crystal are those of the Netduino Plus 2. The network has its own executor, with a priority below that of
+//! bytes and frames. Build it in the repository's root:
 //!
 //! ```sh
 //! cargo build --release --manifest-path examples/embassy/Cargo.toml --target thumbv7em-none-eabihf
@@ -69,16 +69,16 @@ async fn correct(coprocessor: &'static mut Coprocessor, mut uart: RingBufferedUa
                 }
             }
             Either3::First(Err(_)) => coprocessor.imu_error(),
-            // One that is late is counted.
+            // A late estimate is counted.
             Either3::Second((end, estimate)) => drop(coprocessor.deliver(end, estimate)),
-            // A sensor that has fallen silent is reported.
+            // A silent sensor is reported.
             Either3::Third(()) => drop(coprocessor.poll(now)),
         }
         hand_over(coprocessor);
     }
 }
 
-/// Gives frames to the bus and a window to the network.
+/// Passes frames to the bus and a window to the network.
 fn hand_over(coprocessor: &mut Coprocessor) {
     while let Some(sent) = coprocessor.next_frame() {
         if sent.frame.convert().is_none_or(|frame| FRAMES.try_send(frame).is_err()) {
@@ -90,7 +90,7 @@ fn hand_over(coprocessor: &mut Coprocessor) {
     }
 }
 
-/// Sends the frames. Where the bus has not taken one for 20 ms all are dropped: nobody wants old rates.
+/// Sends the frames. If the bus has not accepted a frame for 20 ms, all are dropped, because old rates are useless.
 #[embassy_executor::task]
 async fn send(mut can: Can<'static>) {
     can.enable().await;
@@ -176,7 +176,7 @@ fn clocks() -> embassy_stm32::Config {
     config
 }
 
-/// A panic starts again: silence on the bus is better than a value that stands still.
+/// Resets after a panic: silence on the bus is better than a frozen value.
 #[panic_handler]
 fn panic(_: &PanicInfo) -> ! {
     SCB::sys_reset()
