@@ -1,39 +1,51 @@
-//! The data that the binary carries, so that it works from anywhere: the simulated drive, the f32 checkpoint of
-//! GyroNet and the weights of FoGNet.
+//! Data built into the binary, so that it runs from any folder: the simulated drive, the f32 checkpoint of GyroNet
+//! and the weights of FoGNet.
 
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
 use crate::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
 use crate::network::weight_file::WeightFileError;
+use crate::simulate::{Config, csv};
 use gyronet::model::FogBlob;
 use gyronet::model::weights::FOGNET;
 
 /// The drive that `gyronet simulate --seconds 90 --seed 1` writes.
 pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
 
-/// The checkpoint that [`gyronet::model::weights::GYRONET`] was made from.
+/// The checkpoint from which [`gyronet::model::weights::GYRONET`] was quantised.
 const CHECKPOINT: &[u8] = include_bytes!("../weights/gyronet.safetensors");
 
-/// The simulated drive.
+/// Returns the simulated drive.
 ///
 /// # Errors
-/// Never, unless the repository is broken.
+/// Never, unless the built-in file is corrupt.
 pub fn simulated_drive() -> Result<Recording, DataError> {
     Recording::parse("simulated_drive.csv", SIMULATED_DRIVE.as_bytes())
 }
 
-/// The f32 checkpoint.
+/// Returns the drive of `gyronet demo`: ten minutes of the same vehicle (`gyronet simulate --seconds 600 --seed 1`).
 ///
 /// # Errors
-/// Never, unless the repository is broken.
+/// [`DataError`] never, unless the simulation writes what cannot be read.
+pub fn demo_drive() -> Result<Recording, DataError> {
+    let config = Config { seconds: 600, seed: 1, ..Config::DEFAULT };
+    let mut bytes = Vec::new();
+    csv::write(&config, &mut bytes).expect("a vector takes all bytes");
+    Recording::parse("simulated_drive.csv", &bytes[..])
+}
+
+/// Returns the f32 checkpoint of GyroNet.
+///
+/// # Errors
+/// Never, unless the built-in file is corrupt.
 pub fn checkpoint() -> Result<Checkpoint<GyroNet>, CheckpointError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
 }
 
-/// FoGNet's weights.
+/// Returns FoGNet's weights.
 ///
 /// # Errors
-/// Never, unless the repository is broken.
+/// Never, unless the built-in file is corrupt.
 pub fn fog_blob() -> Result<FogBlob<'static>, WeightFileError> {
     FogBlob::new_checked(&FOGNET.0)
         .map_err(|source| WeightFileError::Blob { path: String::from("built-in FoGNet weights"), source })
@@ -42,7 +54,6 @@ pub fn fog_blob() -> Result<FogBlob<'static>, WeightFileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{Config, csv};
     use std::path::Path;
 
     #[test]

@@ -5,6 +5,7 @@ mod can_excerpt;
 mod costs;
 mod page;
 pub mod picture;
+mod short_table;
 mod trajectory;
 
 use crate::drive::recording::Recording;
@@ -17,6 +18,7 @@ use serde::Serialize;
 
 pub use can_excerpt::Message;
 pub use costs::Cost;
+pub use short_table::ShortTable;
 pub use trajectory::{Path, Trajectories};
 
 /// Holds the results of one drive.

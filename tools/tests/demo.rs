@@ -49,6 +49,14 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
 }
 
 #[test]
+fn the_readme_has_the_table_that_the_demo_prints() {
+    let (_, text) = demo("demo-text", &[]);
+    let table = text.split("\n\n").find(|part| part.starts_with("heading error")).expect("a table");
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).unwrap();
+    assert!(readme.contains(table), "{table}");
+}
+
+#[test]
 fn a_drive_without_reference_and_wheels_has_no_errors_and_no_path() {
     let mut csv = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
     for k in 0..600 {
@@ -60,7 +68,10 @@ fn a_drive_without_reference_and_wheels_has_no_errors_and_no_path() {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bare <drive>.csv");
     std::fs::write(&file, csv).unwrap();
     let (folder, text) = demo("demo-bare", &[file.to_str().unwrap()]);
-    assert!(text.contains("bare <drive>: no reference, so no errors"), "{text}");
+    assert!(
+        text.contains("bare <drive>, 6 s\n\nNo reference (ref_gyr_z or ref_yaw), so no errors."),
+        "{text}"
+    );
     assert!(!text.contains('\u{1b}'), "no colours without a terminal");
     let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
     assert!(page.contains("<h1>bare &lt;drive&gt;</h1>") && !page.contains("<h2>Path</h2>"));

@@ -1,14 +1,15 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, paint, print_json, progress, read_drive, weights, write_log};
+use super::{Common, WriteError, print_json, progress, read_drive, weights, write_log};
 use gyronet::can::config::Config;
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::Demo;
-use gyronet_tools::demo::board::{Agreement, BoardError, Difference, Figures, Outcome};
+use gyronet_tools::demo::board::{Agreement, BoardError, Figures, Outcome};
 use gyronet_tools::demo::picture;
+use gyronet_tools::demo::{Demo, ShortTable};
 use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError, Report};
+use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError};
+use gyronet_tools::plot::page::grouped;
 use gyronet_tools::target::bench;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -50,7 +51,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             let title = format!("Yaw of a recorded drive, {}", recording.name());
             (recording, title)
         }
-        None => (bundled::simulated_drive()?, String::from("Yaw of a simulated drive")),
+        None => (bundled::demo_drive()?, String::from("Yaw of a simulated drive")),
     };
     let rates = args.networks.rates(&recording, common)?;
     let errors = match DriveErrors::new(&recording, &rates) {
@@ -77,32 +78,30 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         print_json(&mut out, &json)?;
         return verdict(&demo);
     }
+    let seconds = recording.seconds();
     if simulated {
-        let mark = console::style("SIMULATED drive:").yellow().bold();
-        writeln!(out, "{mark} it shows the way of the data, not how good GyroNet is on a car.")?;
-        writeln!(out, "For a real one: gyronet demo FILE.csv\n")?;
+        let mark = console::style("A SIMULATED drive").yellow().bold();
+        writeln!(
+            out,
+            "{mark} of {seconds:.0} s, of another vehicle than the model was trained on: it shows what the board"
+        )?;
+        writeln!(out, "does, not what you gain. Your own drive: cargo demo DRIVE.csv\n")?;
+    } else {
+        writeln!(out, "{}, {seconds:.0} s\n", recording.name())?;
     }
     match &errors {
-        Some(errors) => write!(out, "{}", paint::report(&Report::new(vec![errors.clone()])))?,
-        None => writeln!(out, "{}: no reference, so no errors\n", recording.name())?,
+        Some(errors) => writeln!(out, "{}", ShortTable(errors))?,
+        None => writeln!(out, "No reference (ref_gyr_z or ref_yaw), so no errors.\n")?,
     }
-    writeln!(out, "{frames} CAN frames: {}", log.display())?;
-    writeln!(out, "picture: {}", picture.display())?;
-    match &demo.board {
-        Outcome::NotRun { why } => writeln!(out, "firmware image: not run: {why}")?,
-        Outcome::Run {
-            agreement: Agreement { frames, payload_bytes, difference: None, seconds, .. },
-            ..
-        } => writeln!(
-            out,
-            "firmware image in QEMU: {frames} frames, {payload_bytes} payload bytes, all as here ({seconds:.1} s)"
-        )?,
-        Outcome::Run { agreement: Agreement { difference: Some(difference), .. }, .. } => {
-            let Difference { number, board, host } = difference;
-            writeln!(out, "firmware image in QEMU: frame {number} is {board}, here {host}")?;
-        }
-    }
-    writeln!(out, "page: {}", page.display())?;
+    writeln!(out, "every result, as a page   {}", page.display())?;
+    writeln!(out, "yaw and its error         {}", picture.display())?;
+    writeln!(
+        out,
+        "{:<25} {} (cargo gyronet monitor FILE decodes it)",
+        format!("{} CAN frames", grouped(frames)),
+        log.display()
+    )?;
+    writeln!(out, "firmware image            {}", demo.board)?;
     verdict(&demo)
 }
 
@@ -142,9 +141,11 @@ fn board(
     Ok(Outcome::Run { agreement, figures })
 }
 
-/// `target/demo` of the workspace when cargo runs the binary, else of the working directory.
+/// Returns `target/demo` of the workspace when cargo runs the command, else of the working directory.
 fn default_folder() -> PathBuf {
     let workspace = std::env::var_os("CARGO_MANIFEST_DIR")
         .and_then(|manifest| Some(Path::new(&manifest).parent()?.to_owned()));
-    workspace.unwrap_or_default().join("target/demo")
+    // A short path where the user stands in the workspace.
+    let elsewhere = workspace.filter(|folder| std::env::current_dir().is_ok_and(|here| here != *folder));
+    elsewhere.unwrap_or_default().join("target/demo")
 }

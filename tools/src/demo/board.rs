@@ -15,6 +15,7 @@ use gyronet::can::{DataFrame, slcan};
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
 use serde::Serialize;
+use std::fmt;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -115,6 +116,26 @@ pub struct Figures {
     pub window_instructions: Option<u64>,
     /// Modelled cycles of the same at 5 wait states.
     pub window_cycles: Option<u64>,
+}
+
+/// One line: the reason why the image was not run, or its agreement with the library.
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let agreement = match self {
+            Self::NotRun { why } => return write!(f, "not run: {why}"),
+            Self::Run { agreement, .. } => agreement,
+        };
+        let Agreement { frames, payload_bytes, seconds, .. } = agreement;
+        match &agreement.difference {
+            None => write!(
+                f,
+                "in QEMU {frames} frames, {payload_bytes} payload bytes, all as here ({seconds:.1} s)"
+            ),
+            Some(Difference { number, board, host }) => {
+                write!(f, "in QEMU frame {number} is {board}, here {host}")
+            }
+        }
+    }
 }
 
 impl Outcome {

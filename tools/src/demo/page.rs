@@ -28,15 +28,14 @@ pub fn page(demo: &Demo<'_>) -> String {
     let name = demo.recording.name();
     let mut body = format!("<h1>{}</h1>\n", escaped(name));
     body += &format!(
-        "<p class=\"lead\">{} s at {RATE_HZ} Hz through the integer pipeline that is flashed, and what it is compared \
-         with. Written by <code>gyronet demo</code> {}.</p>\n",
+        "<p class=\"lead\">{} s at {RATE_HZ} Hz through the integer code of the firmware, beside other methods. \
+         Written by <code>gyronet demo</code> {}.</p>\n",
         format_args!("{:.0}", demo.recording.seconds()),
         env!("CARGO_PKG_VERSION"),
     );
     if demo.simulated {
-        body += "<p class=\"simulated\"><b>Simulated drive.</b> It shows the way of the data, not how good GyroNet is \
-                 on a car: these weights know one car's vibration. For a real one: <code>gyronet demo \
-                 FILE.csv</code>.</p>\n";
+        body += "<p class=\"simulated\"><b>Simulated drive.</b> It shows what the board does, not what you gain: the \
+                 weights were trained on another vehicle. Your own drive: <code>gyronet demo DRIVE.csv</code>.</p>\n";
     }
     body += &facts(demo);
     body += "<h2>Yaw</h2>\n";
@@ -121,10 +120,11 @@ fn yaw(demo: &Demo<'_>) -> String {
         }
         .html();
     }
-    html += &format!("<p class=\"note\">{HINT} From the end of static initialisation on (3 s at rest).");
+    html +=
+        &format!("<p class=\"note\">{HINT} Time begins at the end of static initialisation (3 s at rest).");
     html += match truth {
         Some(_) => {
-            " The errors' scale is that of the corrected methods; what keeps its bias runs off it.</p>\n"
+            " The scale of the errors fits the corrected methods; a method that keeps its bias leaves the chart.</p>\n"
         }
         None => " The drive has no reference yaw rate (<code>ref_gyr_z</code>), so no error is drawn.</p>\n",
     };
@@ -149,24 +149,23 @@ fn paths(trajectories: &Trajectories, radius: f64) -> String {
         Chart { title: "Seen from above", axes: "m, from where it started", same_scale: true, curves }.html();
     let of_wheels = if *wheels == 1 { "one wheel".into() } else { format!("the mean of {wheels} wheels") };
     format!(
-        "{chart}<p class=\"note\">Dead reckoning over {metres:.0} m: each method's yaw rate with the speed of \
-         {of_wheels}, the same for all, as recorded (radius {radius} m). The reference is the reference's yaw rate with the \
-         same speed.</p>\n"
+        "{chart}<p class=\"note\">Dead reckoning over {metres:.0} m: each method's yaw rate and the recorded \
+         speed of {of_wheels} (radius {radius} m). The reference path uses the reference's yaw rate and the same speed.</p>\n"
     )
 }
 
 fn methods(demo: &Demo<'_>) -> String {
     let Some(errors) = demo.errors else {
-        return "<p>No reference, so no errors.</p>\n".into();
+        return "<p>The drive has no reference, so there are no errors.</p>\n".into();
     };
     let ours = errors.over_best_classical.map(|ours| format!("<p>Sent for navigation: {ours}.</p>\n"));
     let rows = columns(&errors.methods).map(|(_, columns)| columns.to_vec());
     format!(
-        "{}{}<p class=\"note\">Mean error of the change of heading over windows of 1, 10 and 60 s, its RMS and its value at \
-         the end, over {:.1} s against <code>{}</code>; to static: of 1 s, or of the RMS where the reference is a course; \
-         mean: what is taken off beyond static initialisation and zero-rate updates. GyroNet and the linear window are \
-         settled estimates after static initialisation; the last two rows are what the board sends: with the sample \
-         (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
+        "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1, 10 and 60 s, RMS \
+         and value at the end. To static: the error in 1 s (the RMS where the reference is a course) over that of static \
+         initialisation. Mean: the mean correction beyond static initialisation and zero-rate updates. GyroNet and the \
+         linear window are settled estimates after static initialisation. The last two rows are the rates that the board \
+         sends: with the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
         ours.unwrap_or_default(),
         table("methods", "", &COLUMNS, rows),
         errors.seconds,
@@ -177,9 +176,9 @@ fn methods(demo: &Demo<'_>) -> String {
 fn excerpt(demo: &Demo<'_>) -> String {
     let Some(Message { time, .. }) = demo.excerpt.first() else { return String::new() };
     let mut html = format!(
-        "<p>What goes out {time} s into the drive, when the vehicle turns fastest; <code>tools/gyronet.dbc</code> has \
-         every signal, <code>can.log</code> all {} messages.</p>\n<div class=\"scroll\"><table class=\"frames\">\n\
-         <thead><tr><th>identifier</th><th>message</th><th>bytes</th><th>says</th></tr></thead>\n<tbody>\n",
+        "<p>The messages {time} s into the drive, when the vehicle turns fastest. <code>tools/gyronet.dbc</code> \
+         describes every signal, and <code>can.log</code> has all {} messages.</p>\n<div class=\"scroll\"><table class=\"frames\">\n\
+         <thead><tr><th>identifier</th><th>message</th><th>bytes</th><th>content</th></tr></thead>\n<tbody>\n",
         grouped(demo.frames)
     );
     for Message { name, id, data, says, .. } in &demo.excerpt {

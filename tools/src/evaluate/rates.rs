@@ -1,4 +1,4 @@
-//! This module computes the yaw rates of one drive by each method, from the same samples and through the same pipeline.
+//! This module computes the yaw rates of one drive with each method, from the same samples and in the same pipeline.
 
 use crate::drive::recording::{Recording, Row};
 use crate::drive::replay::{Replay, ReplayError};
@@ -17,15 +17,15 @@ use gyronet::pipeline::PipelineConfig;
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
-/// Holds a network of any kind and its shape.
+/// A network of any kind and its shape.
 pub struct Network<'a> {
-    run: &'a mut dyn WindowNetwork,
+    run: &'a mut (dyn WindowNetwork + Send),
     shape: Shape,
 }
 
 impl<'a> Network<'a> {
-    /// Takes a network of such a shape.
-    pub fn new(run: &'a mut dyn WindowNetwork, shape: Shape) -> Self {
+    /// Creates a network from an implementation and its shape.
+    pub fn new(run: &'a mut (dyn WindowNetwork + Send), shape: Shape) -> Self {
         Self { run, shape }
     }
 }
@@ -36,46 +36,47 @@ impl WindowNetwork for Network<'_> {
     }
 }
 
-/// Holds the networks that the methods run.
+/// The networks that the methods run.
 pub struct Networks<'a> {
     /// GyroNet in f32.
     pub float: Network<'a>,
     /// GyroNet in integers.
     pub integer: Network<'a>,
-    /// The model of the default weights: its linear part corrects.
+    /// The model of the default weights, whose linear part corrects the rate.
     pub default: Network<'a>,
-    /// The model of the rates that are sent, where that is not the default.
+    /// The model of the rates that are sent, if it is not the default.
     pub sent: Option<Network<'a>>,
 }
 
-/// Holds the yaw rates of one drive by each method, from the first sample after static initialisation.
+/// The yaw rates of one drive with each method, from the first sample after static initialisation.
 #[derive(Debug, Clone)]
 pub struct Rates {
-    /// Time of each sample since the recording's first, s.
+    /// Time of each sample since the first sample of the recording, s.
     pub seconds: Vec<f64>,
     /// The rates by each method, rad/s.
     pub rates: PerMethod<Vec<f64>>,
     /// The cost of each method.
     pub costs: PerMethod<Cost>,
-    /// The truth, where the drive has one.
+    /// The reference of the drive.
     pub reference: Option<Reference>,
-    /// Says whether the drive began while the vehicle moved, so that a simulated standstill was put before it.
+    /// Whether the drive begins in motion, so that a simulated standstill was inserted before it.
     pub simulated_rest: bool,
     /// The drive as the board would run it.
     pub drive: Replay,
-    /// The run time on this machine.
+    /// The run time of [`Rates::drive`] on this machine.
     pub run_time: Duration,
 }
 
-/// [`Rates::new`] runs through a recording at most this many times.
-pub const RUNS: usize = 5;
+/// Most replays of a recording by [`Rates::new`] that call `tick`.
+pub const RUNS: usize = 4;
 
 impl Rates {
-    /// Runs every method. All networks go through the same pipeline, and the pipeline without a network is that of
-    /// [`Method::STATIC_ZERO_RATE`]. `tick` is called for each row of each run.
+    /// Runs every method. All networks run in the same pipeline; the pipeline without a network is
+    /// [`Method::STATIC_ZERO_RATE`]. `tick` is called for each row of each run but the f32 network's, which has a thread of
+    /// its own.
     ///
     /// # Errors
-    /// [`ReplayError`], when static initialisation does not succeed and there is no course to simulate it by.
+    /// [`ReplayError`], if static initialisation fails and there is no course with which to simulate a standstill.
     pub fn new(
         recording: &Recording,
         networks: &mut Networks<'_>,
@@ -92,12 +93,18 @@ impl Rates {
                 (Cow::Owned(rested), run, true)
             }
         };
-        let mut run = |network: &mut Network<'_>| {
-            Replay::run(&recording, &PipelineConfig::DEFAULT, wheels.clone(), network, &mut tick)
+        let run = |network: &mut Network<'_>, tick: &mut dyn FnMut()| {
+            Replay::run(&recording, &PipelineConfig::DEFAULT, wheels.clone(), network, tick)
         };
-        let [float, integer] = [run(&mut networks.float)?, run(&mut networks.integer)?];
+        // The f32 network takes as long as all others.
+        let [float, integer] = std::thread::scope(|scope| {
+            let float = scope.spawn(|| run(&mut networks.float, &mut || {}));
+            let integer = run(&mut networks.integer, &mut tick);
+            [float.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), integer]
+        });
+        let [float, integer] = [float?, integer?];
         let mut start = Instant::now();
-        let default = run(&mut networks.default)?;
+        let default = run(&mut networks.default, &mut tick)?;
         let settled = |drive: &Replay| drive.settled().map(|rate| rate.rad_per_sec()).collect::<Vec<f64>>();
         let linear = settled(&default);
         let shapes = Shapes {
@@ -108,7 +115,7 @@ impl Rates {
         let drive = match &mut networks.sent {
             Some(sent) => {
                 start = Instant::now();
-                run(sent)?
+                run(sent, &mut tick)?
             }
             None => default,
         };
@@ -117,14 +124,14 @@ impl Rates {
         let compared = || drive.steps[drive.compared()].iter();
         let row = |row: usize| &recording.rows[row];
         let [.., bias] = drive.gyro_bias.map(|bias| bias.rad_per_sec());
-        // A filter starts with the recording.
+        // The filters run from the start of the recording.
         let raw: Vec<f64> = drive.steps.iter().map(|step| gyro(row(step.row))[2]).collect();
         let still: Vec<f64> = raw.iter().map(|rate| rate - bias).collect();
         let updated: Vec<f64> = zero_rate
             .steps
             .iter()
             .zip(&still)
-            // The static rate stands in before the first navigation rate and after the last one.
+            // The static rate is used before the first navigation rate and after the last one.
             .map(|(step, still)| step.navigation.map_or(*still, |sent| sent.rate.rad_per_sec()))
             .collect();
         let rates = PerMethod::new(|method| match method {
@@ -141,7 +148,7 @@ impl Rates {
             Method::GYRONET_INT => settled(&integer),
             Method::LINEAR => linear.clone(),
             Method::PROMPT => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
-            // The last one is `Method::NAVIGATION`.
+            // The remaining method is `Method::NAVIGATION`.
             _ => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
         });
         let costs = PerMethod::new(|method| Cost::new(method, &shapes));
