@@ -1,23 +1,19 @@
-//! This module gives each sample a step of the common 100 Hz grid by its time stamp.
+//! This module assigns each sample to a step of the common 100 Hz grid by its time stamp.
 //!
-//! The rule: the first sample sets the grid. A later one belongs to the step nearest to its
-//! time stamp, and must come within [`TOLERANCE_US`] of it; the grid then follows the sample,
-//! so that a clock which is slow or fast by some percent never runs out of step. A sample that
-//! is a duplicate, older than the last one or off the grid is an error and leaves the grid as
-//! it was. A jump of more than a second either way (a part that restarted, a cable that came
-//! back) is an error too, and the grid begins again from there: no wait without a bound.
+//! The first sample sets the grid. A later sample belongs to the step nearest to its time stamp, and must lie within
+//! [`TOLERANCE_US`] of that step. The grid then follows the sample, so a clock that is some percent slow or fast
+//! never runs out of step. A duplicate, a sample older than the last one and a sample off the grid are errors and
+//! leave the grid unchanged. A jump of more than a second either way (a part that restarted, a cable that was
+//! reconnected) is an error too, but the grid restarts there: no wait is unbounded.
 //!
-//! That is for one stream that comes at 100 Hz by itself, by the part's own clock. Streams of
-//! other rates, and two or more parts with a clock each, go through [`streams`] first: it takes
-//! the parts' clocks to the board's ([`clock`]), interpolates ([`resample`]) and sums
-//! ([`increments`]), and its samples lie on the grid. How fast a single stream's clock runs, against
-//! the board's, [`clock_ratio`] finds out.
+//! This is for the inertial sensor, at 100 Hz and paced by its own clock; [`clock_ratio`] measures how fast that clock
+//! runs against the board's. A fibre-optic gyro has another clock and another rate: [`fog_grid`] converts its time
+//! stamps to the board's clock ([`clock`]) and sums its increments over the steps of a grid ([`increments`]).
 
 pub mod clock;
 pub mod clock_ratio;
+pub mod fog_grid;
 pub mod increments;
-pub mod resample;
-pub mod streams;
 
 use crate::sample::{Frame, ImuSample, PERIOD_US};
 use crate::units::Micros;
@@ -32,18 +28,18 @@ pub const MAX_GAP: u32 = 100;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum AlignError {
-    /// The last sample once more.
-    #[error("the sample of {} us has come twice", .at.0)]
+    /// The sample repeats the last one.
+    #[error("duplicate sample at {} us", .at.0)]
     Duplicate {
         /// The time stamp, microseconds.
         at: Micros,
     },
-    /// Time stamp before the last one.
+    /// The time stamp is before the last one.
     #[error("time goes backwards, from {} to {} us", .last.0, .at.0)]
     Backwards {
         /// The last time stamp.
         last: Micros,
-        /// This one.
+        /// The time stamp of the refused sample.
         at: Micros,
     },
     /// The time stamp is further than [`TOLERANCE_US`] from every grid step.
@@ -51,35 +47,35 @@ pub enum AlignError {
     OffGrid {
         /// The last time stamp.
         last: Micros,
-        /// This one.
+        /// The time stamp of the refused sample.
         at: Micros,
     },
-    /// More than [`MAX_GAP`] steps away from the last sample, either way.
+    /// The time stamp is more than [`MAX_GAP`] steps from the last one, either way.
     #[error("time jumps from {} to {} us, more than 1 s", .last.0, .at.0)]
     Jump {
         /// The last time stamp.
         last: Micros,
-        /// This one.
+        /// The time stamp of the refused sample.
         at: Micros,
     },
 }
 
-/// The last sample that has a place on the grid, or from which the grid began again.
+/// The last sample on the grid, or the one at which the grid restarted.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     tick: u32,
-    /// The whole sample: another one of a clock that was set back may carry the same time.
+    /// The complete sample, because after a clock was set back another sample may carry the same time.
     sample: ImuSample,
 }
 
-/// Puts samples on the 100 Hz grid by their own time stamps; holds where the grid stands.
+/// Places samples on the 100 Hz grid by their time stamps, and holds the current step of the grid.
 #[derive(Debug, Clone, Default)]
 pub struct Aligner {
     last: Option<Placed>,
 }
 
 impl Aligner {
-    /// Starts before the first sample.
+    /// The state before the first sample.
     pub const START: Self = Self { last: None };
 
     /// Places a sample on the grid.

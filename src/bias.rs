@@ -1,9 +1,10 @@
 //! These modules estimate the gyro's reading at rest, and the uncertainty of that estimate.
 //!
-//! `static_init` takes the mean of three seconds at the start. `zero_rate` goes on whenever the vehicle stands: it
-//! estimates the remaining rate behind the network, so that the loop is closed around gyro and network together. The
-//! wheels show that the vehicle stands; where there are none, `quiet` looks at the inertial sensors, within limits that
-//! are tighter than those of the start. `curve` keeps what standstills have shown by temperature. `earth` keeps the rotation of the Earth from being taken off twice.
+//! `static_init` takes the mean of the first three seconds. `zero_rate` continues whenever the vehicle stands: it
+//! estimates the rate that remains after the network, so that the loop is closed around gyro and network together.
+//! The wheels show that the vehicle stands. Without wheel speeds, `quiet` checks the inertial sensors, within limits
+//! that are tighter than those of the start. `curve` stores the bias by temperature that standstills have shown.
+//! `earth` keeps the rotation of the Earth from being subtracted twice.
 
 mod curve;
 pub(crate) mod earth;

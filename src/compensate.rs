@@ -3,31 +3,32 @@
 //! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Mode`]). It is complete only
 //! some samples later, so two rates are sent for every sample:
 //!
-//! - the **prompt** one at once, for a receiver that steers by it. No window has seen the sample yet, so of its
-//!   correction only the steady part is known ([`SteadyGain`]: the mounting).
-//! - the **navigation** one [`CompensateConfig::lag`] samples later, for a receiver that sums it
-//!   up to a heading. Most of what there is to know is known by then.
+//! - the **prompt** rate at once, for a receiver that uses it for control. No window covers the sample yet, so only
+//!   the steady part of its correction is known ([`SteadyGain`]: the mounting).
+//! - the **navigation** rate [`CompensateConfig::lag`] samples later, for a receiver that integrates it to a heading.
+//!   Most windows that cover the sample have been evaluated by then.
 //!
 //! A revision by a later window is not lost: it is carried into the rates that follow, so that the sum of the rates
-//! arrives at the sum of the best estimates. One rate carries at most a bounded part of it, so that none jumps. With
-//! c_k(t) the estimate for sample k as known at sample t, and L the lag:
-//! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`.
-//! The prompt rate carries an eighth of its outstanding revisions with each sample. A revision mostly concerns the
-//! noise of past samples, which the newest sample does not have; carried at once, it would add that noise to it.
+//! reaches the sum of the best estimates. Each rate carries at most a bounded part of the revision, so that no rate
+//! jumps. With c_k(t) the estimate for sample k as known at sample t, and L the lag:
+//! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`. The prompt rate
+//! carries an eighth of its outstanding revisions with each sample. A revision mostly concerns the noise of past
+//! samples, which the newest sample does not have; carried at once, the revision would add that noise to the newest
+//! rate.
 //!
-//! No window of 0.1 s can know a constant error, and one that a model was trained to is wrong on another vehicle.
-//! The slow mean of the corrections is taken out of them: standstill finds the bias, and `calibrate` the gain. Nor does
-//! another vehicle's unit have the mounting of the one that a model was trained with: where driving shows that it has
-//! not, that part is taken out, too, until driving shows otherwise.
+//! A window of 0.1 s cannot observe a constant error, and one that a model has learnt is wrong on another vehicle.
+//! The slow mean of the corrections is therefore subtracted from them: standstill finds the bias, and `calibrate` the
+//! gain. Another vehicle's unit is also mounted differently from the one that a model was trained with. If driving
+//! shows that, the mounting's part is subtracted as well, until driving shows otherwise.
 //!
 //! | when | prompt | navigation |
 //! |---|---|---|
-//! | the first window is not full yet | gyro less bias | nothing for the lag, then gyro less bias |
+//! | the first window is not full yet | gyro less bias | no rate during the lag, then gyro less bias |
 //! | after a gap, clipping, a late or implausible estimate | gyro less bias until the next window | the best estimate of each sample, gyro less bias where it has none |
 //! | clipped sample | gyro less bias, marked; nothing is carried into it | the same |
-//! | wheels prove that the vehicle stands | as ever | zero |
+//! | wheels prove that the vehicle stands | unchanged | zero |
 //!
-//! Samples are counted, not time: a gap delays earlier samples and drops none.
+//! The lag counts samples, not time: a gap delays earlier samples and drops none.
 
 mod mode;
 mod mounting_check;
@@ -43,27 +44,27 @@ use crate::model::{Estimate, SteadyGain};
 use crate::sample::{RATE_HZ, Validity};
 use crate::units::AngularRate;
 
-/// The way from estimates of the gyro's error to corrected rates.
+/// Configures how estimates of the gyro's error become corrected rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CompensateConfig {
-    /// The estimates that are used.
+    /// The rule that selects the estimates.
     pub mode: Mode,
     /// The delay of the navigation rate.
     pub lag: Lag,
-    /// A window whose mean correction is larger is not believed (rad/s code). Vibration makes
-    /// single corrections large; their mean is bias-like and small.
+    /// Largest mean correction of a window that is accepted (rad/s code). Vibration makes single corrections large;
+    /// their mean is bias-like and small.
     pub max_mean: AngularRate,
-    /// Neither is one with a single correction that is larger.
+    /// Largest single correction of a window that is accepted.
     pub max_single: AngularRate,
     /// Largest part of the revisions that one rate carries.
     pub max_carry: AngularRate,
 }
 
 impl CompensateConfig {
-    /// A window every five samples, both estimates of a sample averaged; 70 ms, the least lag
-    /// that costs nothing on the validation drive (`cargo gyronet evaluate --lags`); 3 deg/s for
-    /// a window's mean, 30 deg/s for one correction, 1 deg/s of carry.
+    /// A window every five samples, with both estimates of a sample averaged; a lag of 70 ms, the shortest that does
+    /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 3 deg/s for a window's mean,
+    /// 30 deg/s for one correction, 1 deg/s of carry.
     pub const DEFAULT: Self = Self {
         mode: Mode::Overlap { hop: Hop::HALF },
         lag: match Lag::new(7) {
@@ -76,16 +77,15 @@ impl CompensateConfig {
     };
 }
 
-/// The prompt rate carries this fraction of its outstanding revisions with each sample, one part in so many: a time
-/// constant of 80 ms.
+/// With each sample the prompt rate carries its outstanding revisions divided by this: a time constant of 80 ms.
 const PROMPT_CARRY: i64 = 8;
-/// Samples over which a carry may be spread before it is reported: 0.25 deg with the default bound.
+/// A carry that needs more samples than this is reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
-/// The number of quarters of a second of standing whose angle may still be carried: the last second and the quarter
-/// that is not over. Wheels show late that a vehicle pulls away, but not later than that.
+/// Quarters of a second at standstill whose angle may still be carried: the last second and the current quarter.
+/// Wheels show late that a vehicle pulls away, but no later than this.
 const HELD_QUARTERS: usize = 5;
 
-/// Samples that are kept: the newest, and as many before it as a window can still change.
+/// The number of samples kept: the newest one, and those before it that a window can still change.
 const KEPT: usize = Lag::MAX.samples() + 1;
 
 /// Holds one sample and the best estimate for it so far.
@@ -95,11 +95,11 @@ struct Entry {
     /// Gyro less static bias, about x, y and z.
     rates: [AngularRate; 3],
     validity: Validity,
-    /// The navigation rate went out as zero, whatever the estimate.
+    /// The navigation rate was sent as zero, whatever the estimate.
     held: bool,
     sum: i64,
     count: i32,
-    /// The estimate; the steady part, which is known with the sample, where `count` is 0.
+    /// The estimate; while `count` is 0, the steady part, which is known with the sample.
     estimate: i32,
 }
 
@@ -111,7 +111,7 @@ impl Entry {
     }
 }
 
-/// A compensated rate and what was taken off for it.
+/// A compensated rate and the correction that was subtracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Compensated {
@@ -121,7 +121,7 @@ pub struct Compensated {
     pub rate: AngularRate,
     /// The correction that was subtracted from the gyro less its static bias.
     pub correction: AngularRate,
-    /// A window has covered this very sample.
+    /// A window has covered this sample.
     pub covered: bool,
     /// The validity of the sample's reading.
     pub validity: Validity,
@@ -149,39 +149,39 @@ impl Settled {
     }
 }
 
-/// A window's estimate was rejected.
+/// The reason why a window's estimate was rejected: its corrections are too large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Implausible {
     /// The mean correction of the window.
     pub mean: AngularRate,
-    /// Its largest one.
+    /// The largest single correction of the window.
     pub largest: AngularRate,
 }
 
-/// Holds the estimates of the samples that a window can still reach, and the revisions left to carry.
+/// Holds the estimates of the samples that a window can still change, and the revisions still to be carried.
 #[derive(Debug, Clone)]
 pub struct Compensator {
     config: CompensateConfig,
     /// The newest sample last.
     kept: [Option<Entry>; KEPT],
-    /// The steady gain of the newest estimate's model; none without an estimate.
+    /// The steady gain of the newest estimate's model; zero without an estimate.
     steady_gain: SteadyGain,
     mounting_check: MountingCheck,
-    /// The mean of the corrections.
+    /// The slow mean of the corrections.
     slow_mean: SlowMean,
     /// Revisions not yet in the prompt rate, and in the navigation rate.
     prompt_carry: i64,
     navigation_carry: i64,
-    /// The part of the navigation rates that standstill set to zero, beyond the estimates: in this quarter of a second
-    /// of standing and in those before it.
+    /// Gyro less estimate and bias of the samples that standstill set to zero, summed over the current quarter of a
+    /// second and those before it.
     held: [i64; HELD_QUARTERS],
-    /// The number of samples until the next quarter.
+    /// Samples until the next quarter begins.
     held_until: u32,
 }
 
 impl Compensator {
-    /// Begins without an estimate.
+    /// Creates a compensator without an estimate.
     #[must_use]
     pub const fn new(config: CompensateConfig) -> Self {
         Self {
@@ -221,9 +221,9 @@ impl Compensator {
         let used = mode.used();
         let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
         let window = self.kept.iter().skip(oldest).zip(corrections).take(used.end).skip(used.start);
-        let foreign = self.foreign();
+        let mismatched = self.mismatched_mounting();
         let own =
-            |entry: &Entry, c: &AngularRate| i64::from(c.0) - i64::from(foreign.correction(entry.rates).0);
+            |entry: &Entry, c: &AngularRate| i64::from(c.0) - i64::from(mismatched.correction(entry.rates).0);
         let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|entry| own(entry, c)));
         let used_mean = seen.sum::<i64>().checked_div(used.len() as i64).unwrap_or(0);
         self.slow_mean.observe(used_mean, mode.hop());
@@ -246,13 +246,17 @@ impl Compensator {
         Ok(())
     }
 
-    /// Takes in a sample: its gyro rates less static bias. `drives`: the vehicle is known to move. Returns whether the
-    /// model's mounting has just been found to be another unit's.
+    /// Adds a sample: its gyro rates less static bias. `drives` is true when the vehicle is known to move. Returns
+    /// whether the model's mounting has just been found to be another unit's.
     pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity, drives: bool) -> bool {
         self.kept.rotate_left(1);
         let steady = match self.steady_gain {
             SteadyGain::NONE => 0,
-            gain => gain.less(self.foreign()).correction(rates).0.saturating_sub(self.slow_mean.get() as i32),
+            gain => gain
+                .minus(self.mismatched_mounting())
+                .correction(rates)
+                .0
+                .saturating_sub(self.slow_mean.get() as i32),
         };
         self.kept[KEPT - 1] =
             Some(Entry { tick, rates, validity, held: false, sum: 0, count: 0, estimate: steady });
@@ -265,14 +269,14 @@ impl Compensator {
         self.mounting_check.observe(yaw_rate, mounting.correction(rates))
     }
 
-    /// Returns the mounting of the newest estimate's model if it is another unit's.
-    fn foreign(&self) -> SteadyGain {
-        if self.mounting_check.is_foreign() { self.steady_gain.mounting() } else { SteadyGain::NONE }
+    /// Returns the mounting's part of the newest estimate's model if it is another unit's.
+    fn mismatched_mounting(&self) -> SteadyGain {
+        if self.mounting_check.is_mismatched() { self.steady_gain.mounting() } else { SteadyGain::NONE }
     }
 
-    /// Returns the rate of the newest sample, less a bias that is subtracted beside the estimate.
+    /// Returns the rate of the newest sample, less the estimate and `bias`.
     ///
-    /// Revisions are not carried into a rate that a receiver drops: a clipped one.
+    /// Revisions are not carried into a clipped rate, because a receiver drops it.
     pub fn prompt(&mut self, bias: AngularRate) -> Option<Compensated> {
         let entry = self.kept[KEPT - 1]?;
         let taken = i64::from(entry.estimate) + i64::from(bias.0);
@@ -283,7 +287,7 @@ impl Compensator {
     /// Returns the rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before there is one.
     /// Call it once for each sample.
     ///
-    /// `stands`: the vehicle has stood since before that sample was taken, so its rate is zero.
+    /// `stands` is true when the vehicle has stood since before that sample was taken; its rate is then zero.
     pub fn navigation(&mut self, bias: AngularRate, stands: bool) -> Option<Compensated> {
         let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && entry.validity.is_good();
@@ -318,15 +322,15 @@ impl Compensator {
         self.steady_gain = SteadyGain::NONE;
     }
 
-    /// Notes that the vehicle stands no more. It may have moved before that was noticed, so what was held at zero in
-    /// the last second is carried into the next rates; what was before stays zero.
+    /// Notes that the vehicle no longer stands. It may have moved before that was detected, so the angle held at zero
+    /// in the last second is carried into the next rates; older angles stay zero.
     pub fn end_standstill(&mut self) {
         self.navigation_carry -= core::mem::take(&mut self.held).iter().sum::<i64>();
         self.held_until = 0;
     }
 
-    /// Returns whether the navigation rates have more to carry than a window revises, because the wheels stood
-    /// while the vehicle turned. Until it is carried, the rates are wrong by it.
+    /// Returns whether the navigation rates have more to carry than a window revises, because the wheels stood while
+    /// the vehicle turned. The rates are wrong until all of it is carried.
     #[must_use]
     pub fn carry_exceeds_limit(&self) -> bool {
         let much = LONG * u64::from(self.config.max_carry.0.unsigned_abs());
@@ -340,8 +344,8 @@ impl Compensator {
         -self.prompt_carry
     }
 
-    /// Returns the amount that the sum of the navigation rates still lacks: such revisions, and the samples that wait
-    /// for their turn.
+    /// Returns the amount that the sum of the navigation rates still lacks: revisions that are not carried yet, and
+    /// samples whose rates are not sent yet.
     #[must_use]
     pub fn navigation_owed(&self, bias: AngularRate) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
@@ -350,8 +354,8 @@ impl Compensator {
     }
 }
 
-/// Subtracts the estimate and `carried` of the carry, as far as the bound allows. A part that does not fit the code
-/// stays in the carry.
+/// Subtracts the estimate and, within the bound, `carried` of the carry. A part that does not fit the code stays in
+/// the carry.
 fn emit(entry: &Entry, taken: i64, carried: i64, carry: &mut i64, max_carry: AngularRate) -> Compensated {
     // A negative bound would disable the limit.
     let bound = if entry.validity.is_good() { i64::from(max_carry.0).max(0) } else { 0 };
@@ -369,7 +373,7 @@ fn emit(entry: &Entry, taken: i64, carried: i64, carry: &mut i64, max_carry: Ang
     }
 }
 
-/// Returns the mean of some corrections, rounded towards zero.
+/// Returns the mean correction, rounded towards zero.
 fn mean(corrections: &[AngularRate]) -> i32 {
     let sum: i64 = corrections.iter().map(|c| i64::from(c.0)).sum();
     (sum / corrections.len().max(1) as i64) as i32

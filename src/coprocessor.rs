@@ -1,22 +1,22 @@
 //! The coprocessor takes readings, CAN frames and time, and returns CAN frames, windows for the networks and
 //! observations.
 //!
-//! [`Coprocessor`] owns the order in which the parts of the product work, and does no input or output itself: the
-//! firmware image, a replay of a recorded drive, the fault campaign and a board of your own are adapters around
-//! it, so all of them run the same code. It owns the monitor of the inertial sensor, the pipeline, the wheels, the
-//! way of the fibre-optic gyro, the encoders of the messages, and the rule for late windows.
+//! [`Coprocessor`] defines the order in which the parts of the product run, and does no input or output itself. The
+//! firmware image, a replay of a recorded drive, the fault campaign and your own board are adapters around it, so all
+//! of them run the same code. It owns the monitor of the inertial sensor, the pipeline, the wheels, the pipeline of
+//! the fibre-optic gyro, the message encoders, and the rule for late windows.
 //!
 //! Use it in this order:
 //!
-//! 1. Give it the inputs that have come: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]; and call
-//!    [`Coprocessor::poll`] every millisecond or so, because silence is found there.
-//! 2. After each of these calls send what [`Coprocessor::next_frame`] returns, until it returns `None`.
+//! 1. Pass in the inputs that have arrived: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]. Call
+//!    [`Coprocessor::poll`] about every millisecond, because it detects a silent sensor.
+//! 2. After each of these calls, send the frames that [`Coprocessor::next_frame`] returns, until it returns `None`.
 //! 3. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_window`] through the networks, at once or in
-//!    a task of lower priority, and give the estimates to [`Coprocessor::deliver`] and [`Coprocessor::deliver_fog`].
+//!    a task of lower priority, and pass the estimates to [`Coprocessor::deliver`] and [`Coprocessor::deliver_fog`].
 //!
-//! A window's estimate is used [`crate::compensate::Mode::delay`] samples after it, however early it comes, so the
-//! frames do not depend on the speed of the machine. Should samples come faster than 100 times a second,
-//! [`Coprocessor::is_ready`] says when the next one has to wait for the estimate before it.
+//! A window's estimate is used [`crate::compensate::Mode::delay`] samples after the window, however early it arrives,
+//! so the frames do not depend on the speed of the machine. If samples arrive faster than 100 times a second,
+//! [`Coprocessor::is_ready`] tells when the next one has to wait for an estimate.
 
 mod config;
 mod handover;
@@ -47,7 +47,8 @@ use handover::Handover;
 use heapless::Deque;
 use timeline::Timeline;
 
-/// Frames that may wait for [`Coprocessor::next_frame`]: those of a sample and of a step of the fibre-optic gyro.
+/// Capacity of the queue that [`Coprocessor::next_frame`] empties: the frames of a sample and of a step of the
+/// fibre-optic gyro.
 const FRAMES: usize = MAX_MESSAGES + 3;
 
 /// A frame to send.
@@ -55,7 +56,7 @@ const FRAMES: usize = MAX_MESSAGES + 3;
 pub struct TimedFrame {
     /// The frame.
     pub frame: DataFrame,
-    /// The sensor's time of the sample that it belongs to.
+    /// Time stamp of the frame's sample, by the sensor's clock.
     pub time: Micros,
 }
 
@@ -64,9 +65,9 @@ pub struct TimedFrame {
 pub struct Observation {
     /// The sample with its validity; `None` where the sensor is silent.
     pub sample: Option<ImuSample>,
-    /// Everything that is sent for it.
+    /// Everything that is sent for the sample.
     pub vehicle: VehicleSample,
-    /// The wheels.
+    /// The newest report of the wheels.
     pub wheels: WheelSample,
     /// The sample whose estimate is final with this one.
     pub settled: Option<Settled>,
@@ -74,12 +75,12 @@ pub struct Observation {
     pub refused: Option<StaticError>,
 }
 
-/// The bus as the caller sees it.
+/// The state of the bus, as the caller reports it.
 #[derive(Debug, Clone, Copy)]
 struct Bus {
     lost: u32,
     is_off: bool,
-    /// The lost frames that the messages have reported.
+    /// The number of lost frames that the messages have reported.
     reported: u32,
 }
 
@@ -103,7 +104,7 @@ pub struct Coprocessor {
     encoder: CanEncoder,
     fog_encoder: FogEncoder,
     frames: Deque<TimedFrame, FRAMES>,
-    /// The newest sample: its own time, and when it came.
+    /// The newest sample's time stamp, and the time at which it arrived.
     sample_time: Micros,
     heard: Micros,
     /// The newest temperature: some parts send it with one sample in a hundred.
@@ -114,8 +115,8 @@ pub struct Coprocessor {
 }
 
 impl Coprocessor {
-    /// Starts at time 0 with the default configuration, for a static: configure it before the first input. It is some
-    /// 10 KB, which [`Coprocessor::new`] would return by way of the stack.
+    /// The initial value for a static: the default configuration at time 0. Configure it before the first input. It
+    /// is about 10 KB, which [`Coprocessor::new`] would return on the stack.
     pub const START: Self = {
         const CONFIG: Config = Config::DEFAULT;
         Self {
@@ -142,7 +143,7 @@ impl Coprocessor {
         }
     };
 
-    /// Begins before the first input, at time 0.
+    /// Creates a coprocessor before its first input, at time 0.
     #[must_use]
     pub fn new(config: Config) -> Self {
         let mut coprocessor = Self::START;
@@ -162,17 +163,17 @@ impl Coprocessor {
         self.fog.configure(config.fog, config.has_fognet);
         self.latitude = config.latitude;
         if config.fog_expected {
-            self.fog.expect(Micros(0));
+            self.fog.start_without_sample(Micros(0));
         }
         self.encoder = CanEncoder::new(config.can);
         self.fog_encoder = FogEncoder::new(config.fog_ids);
     }
 
-    /// Takes a sample of the inertial sensor that has come at `now`.
+    /// Processes a sample of the inertial sensor that arrived at `now`.
     ///
     /// # Errors
     /// [`InputError::Imu`] when its time stamp has no place on the grid, [`InputError::ClockWentBack`]. The sample is
-    /// counted and not used, and no frame is sent for it; the next ones report a gap.
+    /// counted and not used, and no frame is sent for it; the samples that follow report a gap.
     #[inline(never)]
     pub fn imu(&mut self, sample: ImuSample, now: Micros) -> Result<Observation, InputError> {
         let now = self.advance(now)?;
@@ -197,33 +198,33 @@ impl Coprocessor {
         Ok(Observation { sample: Some(sample), vehicle: output.vehicle, wheels, settled, refused })
     }
 
-    /// Counts bytes of the inertial sensor that were no sample.
+    /// Counts an input of the inertial sensor that was not a valid sample.
     pub fn imu_error(&mut self) {
         count(&mut self.counters.imu_errors, 1);
     }
 
-    /// Takes a sample of the fibre-optic gyro that has come at `now`.
+    /// Processes a sample of the fibre-optic gyro that arrived at `now`.
     ///
     /// # Errors
-    /// [`InputError::Fog`] when it is a duplicate or out of order, [`InputError::ClockWentBack`]; it is counted and
-    /// not used.
+    /// [`InputError::Fog`] when it is a duplicate or out of order, [`InputError::ClockWentBack`]; the sample is
+    /// counted and not used.
     pub fn fog(&mut self, sample: FogSample, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         self.fog.add(self.time(), sample).map_err(InputError::Fog)
     }
 
-    /// Counts bytes of the fibre-optic gyro that were no sample.
+    /// Counts an input of the fibre-optic gyro that was not a valid sample.
     pub fn fog_error(&mut self) {
         count(&mut self.counters.fog_errors, 1);
     }
 
-    /// Takes a frame that has come over the bus at `now`. Frames that carry no wheel speed and no latitude are passed
-    /// over.
+    /// Processes a frame received from the bus at `now`. Frames with neither a wheel speed nor a latitude are
+    /// ignored.
     ///
     /// # Errors
-    /// [`InputError::Wheels`] when a wheel frame is damaged or says that a speed is not valid,
-    /// [`InputError::Latitude`], [`InputError::ClockWentBack`]; it is counted. The wheels then fall silent by and by,
-    /// which is reported; the latitude in use stays.
+    /// [`InputError::Wheels`] when a wheel frame is corrupt or marks a speed as invalid, [`InputError::Latitude`],
+    /// [`InputError::ClockWentBack`]; the error is counted. Without a valid frame the wheels become silent after a
+    /// while, which is reported; the latitude in use is kept.
     pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         let time = self.time();
@@ -256,10 +257,10 @@ impl Coprocessor {
         }
     }
 
-    /// Does the work that is due at `now` without an input: messages of a silent sensor.
+    /// Does the work that is due at `now` without an input: it sends the messages of a silent sensor.
     ///
     /// # Errors
-    /// [`InputError::ClockWentBack`]; it is counted.
+    /// [`InputError::ClockWentBack`]; the error is counted.
     pub fn poll(&mut self, now: Micros) -> Result<Option<Observation>, InputError> {
         let now = self.advance(now)?;
         let Some(steps) = self.monitor.poll(now) else { return Ok(None) };
@@ -270,8 +271,8 @@ impl Coprocessor {
         Ok(Some(Observation { sample: None, vehicle, wheels, settled: None, refused: None }))
     }
 
-    /// Returns whether the next sample of the inertial sensor can be taken at `now`. Where it cannot, it needs an
-    /// estimate that is still under way: leave it where it waits. It is then late, and the sensor is not silent.
+    /// Returns whether the next sample of the inertial sensor can be processed at `now`. If not, the sample needs an
+    /// estimate that is still being computed: leave it in its buffer. The sensor does not count as silent meanwhile.
     pub fn is_ready(&mut self, now: Micros) -> bool {
         let now = self.timeline.at(now);
         let waits = self.handover.must_wait(self.pipeline.tick(), now);
@@ -281,8 +282,8 @@ impl Coprocessor {
         !waits
     }
 
-    /// Returns the next frame to send. Call it until `None` after every input: the steps of the fibre-optic gyro
-    /// are worked on here, one at a time.
+    /// Returns the next frame to send. Call it until `None` after every input, because it also processes the steps of
+    /// the fibre-optic gyro, one at a time.
     pub fn next_frame(&mut self) -> Option<TimedFrame> {
         if self.frames.is_empty() {
             self.step_fog();
@@ -295,11 +296,11 @@ impl Coprocessor {
         self.handover.take()
     }
 
-    /// Takes GyroNet's estimate of the window that ended with sample `end`.
+    /// Accepts GyroNet's estimate of the window that ended with sample `end`.
     ///
     /// # Errors
-    /// [`InputError::NoWindow`] when no window waits for it: it is too late, or there never was one. It is counted and
-    /// not used.
+    /// [`InputError::NoWindow`] when no window waits for the estimate: it is too late, or the window never existed.
+    /// It is counted and not used.
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> Result<(), InputError> {
         let wanted = self.handover.close(end) && self.pipeline.deliver(end, estimate);
         self.claim(wanted, end)
@@ -310,7 +311,7 @@ impl Coprocessor {
         self.fog.window()
     }
 
-    /// Takes FoGNet's estimate of a window.
+    /// Accepts FoGNet's estimate of a window.
     ///
     /// # Errors
     /// [`InputError::NoWindow`], as [`Coprocessor::deliver`].
@@ -319,15 +320,15 @@ impl Coprocessor {
         self.claim(wanted, number)
     }
 
-    /// Notes that GyroNet's weights are damaged: no window is due any more, and the messages report it.
+    /// Notes that GyroNet's weights are corrupt: no window becomes due any more, and the messages report it.
     pub fn weights_damaged(&mut self) {
         self.handover.stop();
     }
 
-    /// Notes that FoGNet's weights have been erased or no longer fit their checksum. The gyro's rates that follow are
-    /// without it, and report that.
-    pub fn fognet_gone(&mut self) {
-        self.fog.network_gone();
+    /// Notes that FoGNet's weights have been erased or no longer match their checksum. Later rates of the gyro are
+    /// computed without FoGNet and report that.
+    pub fn fognet_unavailable(&mut self) {
+        self.fog.fognet_unavailable();
     }
 
     /// Notes that the sensor was moved since earlier drives. The next messages report it.
@@ -353,20 +354,20 @@ impl Coprocessor {
         self.fog_estimate.as_ref()
     }
 
-    /// Returns the numbers of faults that the sensor monitor has found.
+    /// Returns the fault counters of the sensor monitor.
     #[must_use]
     pub fn monitor_counters(&self) -> &MonitorCounters {
         self.monitor.counters()
     }
 
-    /// Returns the numbers of events of the fibre-optic gyro.
+    /// Returns the event counters of the fibre-optic gyro.
     #[must_use]
     pub fn fog_counters(&self) -> &FogCounters {
         self.fog.counters()
     }
 
-    /// Withholds the rates, or sends them again. With the first call that withholds them, and in place of each sample's
-    /// message set from then on, a set without a rate is sent: the caller is about to be silent, to erase flash.
+    /// Withholds the rates, or sends them again. The first call that withholds them sends a message set without a
+    /// rate, and so does each later sample. The caller does this before it stops sending to erase flash.
     pub fn pause(&mut self, paused: bool) {
         let begins = paused && !self.paused;
         self.paused = paused;
@@ -376,7 +377,7 @@ impl Coprocessor {
         }
     }
 
-    /// Returns the numbers of inputs that were refused or replaced.
+    /// Returns the counters of inputs that were refused or replaced.
     #[must_use]
     pub fn input_counters(&self) -> &InputCounters {
         &self.counters
@@ -389,7 +390,7 @@ impl Coprocessor {
         })
     }
 
-    /// Returns the time that wheels and the fibre-optic gyro are judged by.
+    /// Returns the time that is used for the wheels, the latitude and the fibre-optic gyro.
     fn time(&self) -> Micros {
         match self.clock {
             Clock::Outside => self.timeline.now(),
@@ -403,7 +404,7 @@ impl Coprocessor {
         self.known_wheels
     }
 
-    /// Works on the next step of the fibre-optic gyro, if it is complete or due.
+    /// Processes the next step of the fibre-optic gyro, if it is complete or due.
     fn step_fog(&mut self) {
         let time = self.time();
         let wheels = self.poll_wheels();
@@ -435,7 +436,7 @@ impl Coprocessor {
         self.bus.reported = self.bus.lost;
     }
 
-    /// Queues a frame; the oldest one makes way where nobody has taken them.
+    /// Queues a frame; drops the oldest one if the queue is full.
     fn queue(&mut self, frame: DataFrame, time: Micros) {
         if self.frames.is_full() {
             self.frames.pop_front();

@@ -25,7 +25,7 @@ pub struct YawEstimate {
     pub source: Source,
     /// The quality of the rate for a receiver.
     pub quality: Quality,
-    /// The faults that hold at present.
+    /// The faults that are present.
     pub faults: Faults,
     /// The time from the sample to the message in microseconds, where it is known.
     pub latency_us: Option<u32>,
@@ -35,7 +35,7 @@ pub struct YawEstimate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VehicleSample {
-    /// The rate of this very sample, for receivers that steer by it: the Bosch messages and VDC2.
+    /// The rate of this sample, for receivers that use it for control: the Bosch messages and VDC2.
     pub prompt: YawEstimate,
     /// The rate of the sample [`crate::compensate::CompensateConfig::lag`] before it, for receivers that
     /// integrate it to a heading: our own messages.

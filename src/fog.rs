@@ -1,5 +1,5 @@
 //! This module corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
-//! bias (`lane`), and FoGNet's estimate of what they leave where the configuration selects FoGNet.
+//! bias (`lane`), and, if the configuration selects FoGNet, its estimate of the remaining error.
 //!
 //! # FoGNet
 //!
@@ -13,25 +13,25 @@
 //!
 //! `corrected = d - g d - (C - L) / 6000`
 //!
-//! The linear part (the error of the gyro's scale) is subtracted from the frame that it belongs to.
-//! The rest is spread evenly over a window's length: 60 windows with a sixtieth of it each. Both
-//! divisions carry their remainders, so that the sum of the output is exact.
+//! The linear part (the error of the gyro's scale) is subtracted from the frame that it belongs to. The rest is
+//! spread evenly over a window's length, so that each of 60 windows contributes a sixtieth. Both divisions carry
+//! their remainders, so that the sum of the output is exact.
 //!
 //! Spreading all of C evenly would give the same sum, but half a minute late after a turn.
 //! Using differences between overlapping windows instead would give 60 interleaved sums of
 //! single estimates, each with its own error.
 
+mod fognet_watch;
 mod lane;
 mod part;
 mod pipeline;
 mod rate;
 mod rest;
-mod trial;
 
 pub use lane::{Lane, Tilt};
 pub use part::FogErrors;
 pub use pipeline::{FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
-pub use rate::{IncrementRate, PseudoFog};
+pub use rate::IncrementRate;
 pub use rest::{RestOutcome, RestReading};
 
 use crate::bias::Latitude;
@@ -53,48 +53,48 @@ pub enum FogNetUse {
     /// FoGNet does not run.
     #[default]
     Off,
-    /// FoGNet runs, on weights that were trained on simulated drives, too. The rate is degraded at best.
+    /// FoGNet also runs on weights that were trained on simulated drives. The rate is degraded at best.
     Simulated,
     /// FoGNet runs on weights that were trained on recordings of this gyro.
     Recorded,
 }
 
-/// The reason why weights are not for the gyro that is fitted.
+/// The reason why weights do not fit the gyro that is configured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum NotForThisGyro {
-    /// They were trained for another gyro.
+pub enum GyroMismatch {
+    /// The weights were trained for another gyro.
     #[error("trained for a {trained}, the configuration has a {part} number {serial}")]
     Other {
-        /// What they were trained on.
+        /// The gyro and the drives that the weights were trained on.
         trained: Training,
         /// The part that is configured.
         part: Gyro,
-        /// Its number, 0 where none is configured.
+        /// Serial number of the configured gyro, 0 where none is configured.
         serial: u32,
     },
-    /// They were trained on simulated drives, and the configuration does not ask for such.
+    /// The weights were trained on simulated drives, which the configuration does not allow.
     #[error("trained on a {0}, which runs only where the configuration says Simulated")]
     Simulated(Training),
 }
 
-/// Checks that weights are for a gyro: trained for its part, for its number or any, and not on simulated drives unless
-/// these are asked for.
+/// Checks that weights are for a gyro: trained for its part and for its serial number or any, and on simulated drives
+/// only where `wanted` allows it.
 ///
 /// # Errors
-/// [`NotForThisGyro`].
+/// [`GyroMismatch`].
 pub fn check_training(
     trained: Training,
     part: Gyro,
     serial: u32,
     wanted: FogNetUse,
-) -> Result<(), NotForThisGyro> {
+) -> Result<(), GyroMismatch> {
     if trained.gyro != part || trained.serial != 0 && trained.serial != serial {
-        return Err(NotForThisGyro::Other { trained, part, serial });
+        return Err(GyroMismatch::Other { trained, part, serial });
     }
     if trained.simulated && wanted != FogNetUse::Simulated {
-        return Err(NotForThisGyro::Simulated(trained));
+        return Err(GyroMismatch::Simulated(trained));
     }
     Ok(())
 }
@@ -104,25 +104,25 @@ pub fn check_training(
 pub struct FogConfig {
     /// The expected errors of the gyro.
     pub errors: FogErrors,
-    /// The latitude; `None` where it is not known, or comes over the bus.
+    /// The latitude; `None` where it is unknown or received over the bus.
     pub latitude: Option<Latitude>,
     /// The tilt of the gyro's axis.
     pub tilt: Tilt,
-    /// The rate of shaking that a mean over a second still holds, 1 sigma, rad/s: of the standing and of the moving
-    /// vehicle. It is no turn of the vehicle, and adds up to zero.
+    /// Vibration that remains in a mean rate over a second, 1 sigma, rad/s: of the standing and of the moving
+    /// vehicle. It is not a turn of the vehicle, and sums to zero.
     pub shake: [f32; 2],
     /// Says whether FoGNet is used.
     pub fognet: FogNetUse,
     /// The filling of a window before a minute is over.
     pub padding: Padding,
-    /// A window's correction beyond this is rejected.
+    /// Largest correction of a window that is accepted.
     pub max_correction: Angle,
 }
 
 impl FogConfig {
-    /// Configures a level DSP-1760 on a car, without a latitude and without FoGNet. The shaking is that of
-    /// the simulated car on its training drives. A correction by FoGNet of 0.02 rad a minute is
-    /// four times what Earth's rate can add to it, and leaves room for 0.1 % of scale error over two full turns.
+    /// A level DSP-1760 on a car, without a latitude and without FoGNet. The shaking is that of the simulated car on
+    /// its training drives. The limit of 0.02 rad a minute on FoGNet's correction is four times what the Earth's rate
+    /// can add to it, and leaves room for 0.1 % of scale error over two full turns.
     pub const DEFAULT: Self = Self {
         errors: FogErrors::DSP1760,
         latitude: None,
@@ -134,7 +134,7 @@ impl FogConfig {
     };
 }
 
-/// A window's estimate was rejected as too large.
+/// The reason why a window's estimate was rejected: its correction is too large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImplausibleTurn {
@@ -159,7 +159,7 @@ pub struct FogOutput {
     pub broken: Option<Incomplete>,
     /// The reason why the estimate due with this frame was rejected.
     pub implausible: Option<ImplausibleTurn>,
-    /// Says whether the estimate due with this frame has not come in time.
+    /// The estimate due with this frame did not arrive in time.
     pub late: bool,
 }
 
@@ -171,7 +171,7 @@ pub struct FogCorrector {
     minute: Minute,
     /// Number of the next window.
     next: u32,
-    /// The window that is out, and its estimate when delivered.
+    /// The window that is handed out, and its estimate once delivered.
     out: Option<(u32, Option<FogEstimate>)>,
     estimate: Option<FogEstimate>,
     /// The remainders of the divisions: of the linear part, of the spread part.
@@ -180,7 +180,7 @@ pub struct FogCorrector {
 }
 
 impl FogCorrector {
-    /// Begins before the first frame.
+    /// Creates a corrector before its first frame.
     #[must_use]
     pub const fn new(config: FogConfig) -> Self {
         Self {
@@ -200,7 +200,7 @@ impl FogCorrector {
         self.config = config;
     }
 
-    /// Takes one frame of 10 ms and corrects its turn.
+    /// Corrects the turn of one frame of 10 ms.
     #[inline(never)]
     pub fn correct(&mut self, frame: &FogFrame) -> FogOutput {
         let correction = frame.turn.map_or(Angle::ZERO, |turn| self.correction_of(turn));
@@ -238,8 +238,8 @@ impl FogCorrector {
         self.minute.window(self.config.padding)
     }
 
-    /// Takes the estimate of a window that [`FogOutput::due`] announced. It is used when the next
-    /// second is over. Returns false for one that comes later or belongs to no window: it is not used.
+    /// Accepts the estimate of a window that [`FogOutput::due`] announced, to use it when the next second is over.
+    /// Returns false, and does not use the estimate, if it is late or belongs to no window.
     pub fn deliver(&mut self, number: u32, estimate: FogEstimate) -> bool {
         match &mut self.out {
             Some((due, slot @ None)) if *due == number => {
@@ -250,7 +250,7 @@ impl FogCorrector {
         }
     }
 
-    /// Drops the window and its estimate: neither may reach across a gap.
+    /// Drops the window and its estimate: neither may span a gap.
     pub fn break_window(&mut self) {
         self.sums = SecondSums::ZERO;
         self.minute.clear();
@@ -263,7 +263,7 @@ impl FogCorrector {
         let Some(FogEstimate { correction, linear, gain, .. }) = self.estimate else { return Angle::ZERO };
         let linear_part = self.linear_rest + i128::from(turn.0) * i128::from(gain);
         self.linear_rest = linear_part & ((1 << GAIN_FRACTION_BITS) - 1);
-        // Below the increment itself, for the gain is below 1.
+        // Smaller than the increment itself, because the gain is below 1.
         let linear_part = (linear_part >> GAIN_FRACTION_BITS) as i64;
         let spread = self.spread_rest + correction.0.saturating_sub(linear.0);
         self.spread_rest = spread.rem_euclid(WINDOW_FRAMES);

@@ -1,4 +1,4 @@
-//! These types are the board's report of itself: status, source and one counter for each kind of event.
+//! These types report the state of the board: status, source and one counter for each kind of event.
 
 use crate::sample::Validity;
 
@@ -6,29 +6,29 @@ use crate::sample::Validity;
 #[doc(hidden)]
 pub mod supervisor;
 
-/// State of the corrected yaw rate: one state machine. No state needs a restart to leave it, but
-/// damaged weights, which leave `Degraded` at best.
+/// The state of the corrected yaw rate, as one state machine. No state needs a restart to leave it, except that with
+/// damaged weights the state is `Degraded` at best.
 ///
-/// In a fault there is no yaw rate: our own messages say not available, Bosch's set failed, VDC2 error, each with
-/// the fault bit.
+/// In a fault state there is no yaw rate: our own messages report "not available", Bosch's set "failed" and VDC2
+/// "error", each with the fault bit.
 ///
 /// | state | status | entered when | yaw rate on CAN | left when | counter |
 /// |---|---|---|---|---|---|
 /// | init | `Init` | start; the clock jumped before the bias was known | raw gyro, marked initialising | 3 s at rest | `moving` |
 /// | degraded | `Degraded` | start, where earlier drives have shown the bias | gyro less the bias curve | 3 s at rest | `moving` |
-/// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is believed | `missing`, `late`, `implausible` |
-/// | ready | `Ready` | a believable window covers the recent samples | gyro less bias and correction | as above | `windows` |
-/// | fault | `Clipped` | the part says that it is saturated | none, `CLIPPED` | 50 ms after the last such sample | `invalid`, `held` |
+/// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is accepted | `missing`, `late`, `implausible` |
+/// | ready | `Ready` | an accepted window covers the recent samples | gyro less bias and correction | as above | `windows` |
+/// | fault | `Clipped` | the part reports saturation | none, `CLIPPED` | 50 ms after the last such sample | `invalid`, `held` |
 /// | fault | `Clipped` | a reading that no vehicle can have ([`crate::monitor`]) | none, `IMPLAUSIBLE` | a reading near the last good one, or the fourth in a row | `wrong` |
 /// | fault | `Stuck` | samples equal to the one before, as [`crate::monitor`] counts them | none, `STUCK` | a sample that differs | `stuck` |
 /// | fault | `Silent` | 29 ms without a sample, by the board's clock; 2 s after the start without the first | none, every 10 ms, `GAP` | the next sample | `silences` |
 ///
-/// From a fault it goes back to init where no bias is known, else to degraded.
+/// From a fault the state returns to init where no bias is known, otherwise to degraded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {
-    /// The bias is not known yet: the rate is shown but not good.
+    /// The bias is not known yet: the rate is sent but not good.
     #[default]
     Init,
     /// Corrected by the network.
@@ -37,9 +37,9 @@ pub enum Status {
     Degraded,
     /// The part is saturated, or was less than 50 ms ago: the rate is wrong.
     Clipped,
-    /// The part's readings stand still: the rate is wrong.
+    /// The part's readings repeat: the rate is wrong.
     Stuck,
-    /// The part says nothing: there is no rate.
+    /// The part sends nothing: there is no rate.
     Silent,
 }
 
@@ -50,8 +50,8 @@ impl core::fmt::Display for Status {
             Self::Ready => "ready, corrected by the network",
             Self::Degraded => "degraded, corrected by the static bias alone",
             Self::Clipped => "clipped, the sensor is saturated",
-            Self::Stuck => "stuck, the sensor's readings stand still",
-            Self::Silent => "silent, the sensor says nothing",
+            Self::Stuck => "stuck, the sensor's readings do not change",
+            Self::Silent => "silent, the sensor sends nothing",
         })
     }
 }
@@ -61,7 +61,7 @@ impl core::fmt::Display for Status {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Source {
-    /// The gyro as it is.
+    /// The gyro without a correction.
     #[default]
     Raw = 0,
     /// The gyro less its static bias.
@@ -79,11 +79,11 @@ pub enum Source {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Quality {
-    /// The rate is as good as it gets.
+    /// The rate is fully corrected, without restrictions.
     Good = 0,
     /// Usable, with reduced confidence.
     Degraded = 1,
-    /// Shown, not to be used yet.
+    /// The rate is sent, but must not be used yet.
     #[default]
     Initialising = 2,
     /// The rate is not available.
@@ -104,16 +104,16 @@ impl Faults {
     pub const CLIPPED: Self = Self(1 << 1);
     /// The part's readings repeat themselves.
     pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate was rejected, a reading of the part or its clock is implausible, the part was moved since
-    /// earlier drives, or the rates still lack more than a window's revision.
+    /// The network's estimate was rejected, a reading of the part or its clock is implausible, the part was moved
+    /// since earlier drives, or the rates have more left to carry than a window revises.
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
     /// Stored data are damaged: weights, configuration or calibration; diagnosis reports which.
     pub const STORED: Self = Self(1 << 5);
-    /// The wheels are silent, or say that the vehicle stands while the gyro says that it turns.
+    /// The wheels are silent, or show standstill while the gyro shows a turn.
     pub const WHEELS: Self = Self(1 << 6);
-    /// Frames were dropped because the bus did not take them, or received ones found no room.
+    /// Frames were dropped because the bus did not accept them, or because a receive queue was full.
     pub const BUS: Self = Self(1 << 7);
 
     /// Returns the fault that a reading of this validity stands for.
@@ -139,14 +139,14 @@ impl Faults {
         self.0 & other.0 == other.0
     }
 
-    /// Returns the faults of both.
+    /// Returns the union of both.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 }
 
-/// The faults that the board reports beside the sensor.
+/// The faults of the board other than those of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardFaults {
@@ -156,8 +156,7 @@ pub struct BoardFaults {
     pub clock: bool,
     /// Weights, configuration or calibration are damaged.
     pub stored: bool,
-    /// The configuration of this vehicle is lost: the built-in one stands in for it, so no rate is
-    /// better than degraded.
+    /// The configuration of this vehicle is lost: the built-in one is used, so no rate is better than degraded.
     pub configuration_lost: bool,
 }
 
@@ -192,7 +191,7 @@ pub const fn judge(status: Status) -> (Source, Quality) {
     }
 }
 
-/// The numbers of events since the start. They saturate, they do not wrap.
+/// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -203,7 +202,7 @@ pub struct Counters {
     pub missing: u32,
     /// Samples refused: duplicate, backwards or off the grid.
     pub misplaced: u32,
-    /// The clock jumped by more than a second.
+    /// Clock jumps of more than a second.
     pub clock_jumps: u32,
     /// Samples that could not be used: saturated, recovering, stuck or implausible.
     pub invalid: u32,
@@ -213,22 +212,22 @@ pub struct Counters {
     pub windows: u32,
     /// Network inputs clamped to its range.
     pub clamped_inputs: u32,
-    /// Windows not believed.
+    /// Windows rejected as implausible.
     pub implausible: u32,
     /// Windows whose estimate came too late or not at all.
     pub late: u32,
-    /// Seconds of standing still that the bias was updated with.
+    /// Seconds at standstill that updated the bias.
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
-    /// Times that the model's mounting was found to be another unit's, and taken out of the correction.
+    /// Times that the model's mounting was found to be another unit's, and removed from the correction.
     pub foreign_mountings: u32,
-    /// Times that the sensor was found to be mounted otherwise than in earlier drives.
+    /// Times that the sensor was found to be mounted differently than in earlier drives.
     pub moved_mounts: u32,
 }
 
 impl Counters {
-    /// Starts without an event.
+    /// All counters at zero.
     pub const NONE: Self = Self {
         samples: 0,
         missing: 0,
@@ -247,55 +246,55 @@ impl Counters {
     };
 }
 
-/// The numbers of faults of the sensor ([`crate::monitor`]).
+/// Fault counters of the sensor ([`crate::monitor`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MonitorCounters {
-    /// Times that it fell silent.
+    /// Times that the sensor became silent.
     pub silences: u32,
-    /// Times that its readings stood still.
+    /// Times that the sensor was stuck.
     pub stuck: u32,
-    /// Samples not trusted because it had just been saturated.
+    /// Samples not used because the sensor had just been saturated.
     pub held: u32,
-    /// Readings further from the last one than a vehicle goes in 10 ms.
+    /// Readings further from the last good one than a vehicle moves in 10 ms.
     pub wrong: u32,
-    /// Times that its clock was found too far off the board's ([`crate::align::clock_ratio`]).
+    /// Times that the sensor's clock was found to be too far off the board's ([`crate::align::clock_ratio`]).
     pub clock_off: u32,
 }
 
 impl MonitorCounters {
-    /// No fault is present.
+    /// All counters at zero.
     pub const NONE: Self = Self { silences: 0, stuck: 0, held: 0, wrong: 0, clock_off: 0 };
 }
 
-/// The numbers of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
+/// Counters of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct InputCounters {
-    /// Messages of the inertial sensor that were no sample.
+    /// Messages of the inertial sensor that were not valid samples.
     pub imu_errors: u32,
-    /// Messages of the fibre-optic gyro that were no sample.
+    /// Messages of the fibre-optic gyro that were not valid samples.
     pub fog_errors: u32,
-    /// Wheel frames that were damaged, or said that a speed is not valid.
+    /// Wheel frames that were corrupt or marked a speed as invalid.
     pub wheel_errors: u32,
-    /// Frames whose latitude was not valid, not possible, or not where the vehicle was.
+    /// Frames whose latitude was marked invalid, was impossible, or was too far from the one in use.
     pub latitude_errors: u32,
     /// Inputs with a time before the newest one.
     pub clock_back: u32,
     /// Estimates that no window waited for.
     pub unclaimed_estimates: u32,
-    /// Windows that nobody had taken when the next one was due.
+    /// Windows that had not been taken when the next one was due.
     pub replaced_windows: u32,
-    /// Frames that nobody had taken when their place was needed.
+    /// Frames dropped because the output queue was full.
     pub replaced_frames: u32,
     /// Messages that reported "failed" because a value does not fit its signal.
     pub out_of_range: u32,
 }
 
 impl InputCounters {
-    /// Starts without an event.
+    /// All counters at zero.
     pub const NONE: Self = Self {
         imu_errors: 0,
         fog_errors: 0,

@@ -1,26 +1,26 @@
 //! Learned yaw-rate correction in real time: sensor bytes in, corrected yaw rate on CAN out.
 //!
-//! The library under the firmware, for a board of your own: `no_std`, no heap, no hardware in it
-//! but the traits of `embedded-hal`, `embedded-io` and `embedded-can`. Time is an argument, weights
-//! are bytes in flash that are checked once, state is a value that the caller owns. What runs here
-//! gives the same bits on a Cortex-M and on a desk; the README of the repository has the numbers.
+//! This is the library that the firmware is built on, for use on your own board. It is `no_std`, uses no heap, and
+//! reaches hardware only through the traits of `embedded-hal`, `embedded-io` and `embedded-can`. Time is an argument,
+//! weights are bytes in flash that are checked once, and state is a value that the caller owns. A Cortex-M and a
+//! desktop compute the same bits; the README of the repository has the numbers.
 //!
 //! | part | what it does |
 //! |---|---|
 //! | [`Coprocessor`] | takes samples, CAN frames and time; returns frames, windows and observations ([`coprocessor`]) |
 //! | [`Config`] | configures it ([`config`]) |
-//! | [`sensor`] | makes samples of bytes: Xsens MTi, KVH DSP-1760 and DSP-3000, ICM-42688, ADIS16465 |
+//! | [`sensor`] | decodes bytes into samples: Xsens MTi, KVH DSP-1760 and DSP-3000, ICM-42688, ADIS16465 |
 //! | [`sample`], [`units`] | hold samples in fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds |
 //! | [`model`] | runs the networks: ten samples in, the gyro's error out |
 //! | [`can`] | encodes Bosch MM5.10, our own messages, J1939, E2E, SLCAN; decodes wheel speeds |
 //! | [`estimate`], [`health`] | describe a corrected rate, its state and the counters |
-//! | [`odometry`] | reckons the vehicle's way from wheel speeds and rate |
+//! | [`odometry`] | computes the vehicle's path from wheel speeds and yaw rate |
 //! | [`store`], [`service`] | keep configuration and weights in flash, and change them on request |
 //!
 //! # On a board of your own
 //!
-//! Everything but the board itself (`examples/own_board.rs`); `examples/cortex_m.rs` is the
-//! same as an image for a Cortex-M.
+//! This is everything except the board itself (`examples/own_board.rs`). `examples/cortex_m.rs` builds the same code
+//! as an image for a Cortex-M.
 //!
 //! ```
 #![doc = include_str!("../examples/own_board.rs")]
@@ -62,7 +62,7 @@
 //! let mut coprocessor = Coprocessor::new(Config::DEFAULT);
 //! let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
 //! let mut imu = Serial::new(uart, Mti::new()); // an Xsens MTi on your serial port
-//! let mut queue = TransmitQueue::new(); // a CAN controller has fewer places than a sample has frames
+//! let mut queue = TransmitQueue::new(); // a CAN controller has fewer mailboxes than a sample has frames
 //! # for _ in 0..400 {
 //! poll(&mut coprocessor, &mut network, &mut imu, &mut queue, &mut can, Micros(0));
 //! # }
@@ -78,7 +78,7 @@
 //!
 //! # Features, unsafe code, panics
 //!
-//! No feature is on by default, and without one the library goes from sensor bytes to CAN frames.
+//! No feature is on by default. Without any, the library converts sensor bytes to CAN frames.
 //!
 //! | feature | adds |
 //! |---|---|
@@ -88,13 +88,13 @@
 //! | `defmt` | `defmt::Format` for the public types |
 //!
 //! `stm32f405`, `netduino-plus-2`, `olimex-stm32-h405`, `rtt`, `small-core`, `microbit` and `lm3s6965evb` build the
-//! images of the repository; a user of the library needs none of them.
+//! images of the repository; users of the library need none of them.
 //!
-//! Unsafe code is denied but for one kernel file for Cortex-M with the DSP extension
+//! Unsafe code is denied except in one kernel file for Cortex-M with the DSP extension
 //! (`src/nn/simd`), whose results equal those of portable code to the last bit.
 //!
-//! Nothing that comes from outside can make the library panic: bad bytes, times and weights are typed
-//! errors or counted, and what is wrong is said on the bus. Errors implement [`core::error::Error`].
+//! No external input can make the library panic: bad bytes, times and weights are typed
+//! errors or counted, and faults are reported on the bus. Errors implement [`core::error::Error`].
 //!
 #![doc = include_str!("GLOSSARY.md")]
 #![cfg_attr(not(test), no_std)]
@@ -117,8 +117,8 @@ pub mod store;
 pub mod uds;
 pub mod units;
 
-// The stages behind `Coprocessor`. They are public for the repository's tools and tests, which look at each
-// alone; no promise is made for them.
+// The stages behind `Coprocessor`. They are public only for the repository's tools and tests, which run each alone;
+// their API is not stable.
 #[doc(hidden)]
 pub mod align;
 #[doc(hidden)]
@@ -135,7 +135,8 @@ pub mod mounting;
 pub mod nn;
 #[doc(hidden)]
 pub mod pipeline;
-mod root;
+mod sqrt;
+mod vector;
 
 pub use can::{DataFrame, queue::TransmitQueue};
 pub use coprocessor::{Clock, Config, Coprocessor, InputError, Observation, TimedFrame};

@@ -17,6 +17,7 @@ pub mod gyronet;
 #[doc(hidden)]
 pub mod gyronet_f32;
 mod input;
+pub(crate) mod ring;
 #[doc(hidden)]
 pub mod seconds;
 pub mod weights;
@@ -37,7 +38,7 @@ pub type Corrections = [AngularRate; WINDOW];
 
 /// The smallest [`Estimate::scale`]: 2^-20 rad/s (0.2 deg/h), far below what a window can resolve.
 pub const SCALE_MIN: AngularRate = AngularRate(1 << 7);
-/// The largest [`Estimate::scale`]: 1 rad/s, which says that the estimate is worth nothing.
+/// The largest [`Estimate::scale`]: 1 rad/s, which means that the estimate is useless.
 pub const SCALE_MAX: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
 
 /// Turns a window into corrections; the integer network and the f32 reference implement it.
@@ -62,7 +63,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// This estimate makes no correction and claims nothing about its error.
+    /// An estimate without a correction, with the largest scale.
     pub const NONE: Self = Self {
         corrections: [AngularRate::ZERO; window::WINDOW],
         scale: SCALE_MAX,
@@ -71,26 +72,26 @@ impl Estimate {
     };
 }
 
-/// Gives the correction of a constant angular rate, by its components about x, y and z: a linear part models the unit's
-/// mounting and gain this way. Q24, from rate codes to a rate code.
+/// The factors that turn a constant angular rate about x, y and z into its correction: a linear part models the
+/// unit's mounting and gain with them. Q24, from rate codes to a rate code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SteadyGain(pub [i32; 3]);
 
 impl SteadyGain {
-    /// A model without a linear part has this gain: zero.
+    /// The gain of a model without a linear part: zero.
     pub const NONE: Self = Self([0; 3]);
 
-    /// Returns its part in the roll and pitch rates, which models the mounting.
+    /// Returns the factors of the roll and pitch rates, which model the mounting.
     #[must_use]
     pub const fn mounting(self) -> Self {
         let Self([roll, pitch, _]) = self;
         Self([roll, pitch, 0])
     }
 
-    /// Returns what is left of it without a part.
+    /// Returns the gain less `part`.
     #[must_use]
-    pub fn less(self, part: Self) -> Self {
+    pub fn minus(self, part: Self) -> Self {
         Self(core::array::from_fn(|axis| self.0[axis].saturating_sub(part.0[axis])))
     }
 

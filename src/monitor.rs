@@ -1,15 +1,15 @@
-//! The monitor of the inertial sensor: it judges readings one by one and notices silence.
+//! The monitor judges each reading of the inertial sensor and detects silence.
 //!
-//! A part can go wrong in ways that no single sample shows: it falls silent, it repeats itself, it has just been
-//! saturated. Time comes in as an argument by an outside clock, because the part's own clock stops with the part.
+//! A part can fail in ways that no single sample shows: it becomes silent, repeats its readings, or has just been
+//! saturated. Time is an argument, by an outside clock, because the part's own clock stops with the part.
 //!
 //! | fault | found when | then | over when |
 //! |---|---|---|---|
 //! | silent | no sample for [`TIMEOUT_US`], or for [`START_US`] since the start | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
 //! | saturated | the part reports it | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
 //! | stuck | [`STUCK_AFTER`] samples equal to the one before in gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
-//! | clock off | the sensor's clock departs from the outside one by more than [`ClockRatioConfig::limit_ppm`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | it does no longer |
-//! | implausible | a reading is further from the last one than a vehicle goes in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
+//! | clock off | the sensor's clock departs from the outside one by more than [`ClockRatioConfig::limit_ppm`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | the departure is within the limit again |
+//! | implausible | a reading is further from the last one than a vehicle moves in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
 //!
 //! [`Status::Silent`]: crate::health::Status::Silent
 //! [`Status::Clipped`]: crate::health::Status::Clipped
@@ -53,7 +53,7 @@ pub struct SensorMonitor {
 }
 
 impl SensorMonitor {
-    /// Begins before the first sample. With `clock`, the sensor's clock is compared with the outside one.
+    /// Creates a monitor before its first sample. With `clock`, the sensor's clock is compared with the outside one.
     #[must_use]
     pub const fn new(clock: Option<ClockRatioConfig>) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl SensorMonitor {
         }
     }
 
-    /// Returns the numbers of faults found.
+    /// Returns the fault counters.
     #[must_use]
     pub fn counters(&self) -> &MonitorCounters {
         &self.counters
@@ -79,15 +79,15 @@ impl SensorMonitor {
 
     /// Judges a sample. Call it once for each sample, in order of arrival.
     pub fn judge(&mut self, sample: &ImuSample) -> Validity {
-        let stuck = self.repeats.are_stuck(sample);
+        let stuck = self.repeats.observe(sample);
         let began = !core::mem::replace(&mut self.stuck, stuck) && stuck;
         count(&mut self.counters.stuck, u32::from(began));
         let saturated = !sample.validity.is_good();
         self.recovering = if saturated { HOLD + 1 } else { self.recovering.saturating_sub(1) };
         let recovering = !saturated && self.recovering > 0;
         count(&mut self.counters.held, u32::from(recovering));
-        // A reading beyond the range is no reference for others.
-        let implausible = !saturated && !recovering && self.jump.is_implausible(sample);
+        // A saturated reading, or one soon after it, is no reference for others.
+        let implausible = !saturated && !recovering && self.jump.check(sample);
         count(&mut self.counters.wrong, u32::from(implausible));
         match (saturated, stuck, recovering, implausible) {
             (true, ..) => sample.validity,
@@ -126,8 +126,8 @@ impl SensorMonitor {
         self.heard = self.heard.and(Some(now));
     }
 
-    /// Returns the grid steps that have passed since the newest message set, when a set without a sample
-    /// is due at `now`. Call it every millisecond or so.
+    /// Returns the grid steps that have passed since the newest message set, when a set without a sample is due at
+    /// `now`. Call it about every millisecond.
     pub fn poll(&mut self, now: Micros) -> Option<u32> {
         let due = match (self.due, self.heard) {
             (Some(due), _) => due,
@@ -139,7 +139,7 @@ impl SensorMonitor {
         }
         let first = self.due.is_none();
         count(&mut self.counters.silences, u32::from(first));
-        // Missed message sets are not made up for: late, they are of no use.
+        // Missed message sets are not sent later, because late ones are useless.
         self.due = Some(now.0.saturating_add(PERIOD_US));
         Some(if first { TIMEOUT_US.div_ceil(PERIOD_US) as u32 } else { 1 })
     }

@@ -1,5 +1,6 @@
-//! A rotation turns the sensor's axes into the vehicle's: a configured one, and levelling at standstill. A gyro map
-//! then corrects the remaining mounting and gain errors of the rates, as a calibration of the unit found them.
+//! Rotations turn the sensor's axes into the vehicle's: a configured one, and one from levelling at standstill. A
+//! gyro map then corrects the remaining mounting and gain errors of the rates, which a calibration of the unit has
+//! found.
 //!
 //! Both are 3 x 3 matrices of Q30 numbers, applied in integers, so that every machine computes the same bits.
 //!
@@ -13,7 +14,9 @@ mod forward;
 pub use forward::{Forward, ForwardEstimator};
 
 use crate::sample::ImuSample;
+use crate::sqrt::sqrt;
 use crate::units::{AngularRate, STANDARD_GRAVITY, SpecificForce};
+use crate::vector::dot;
 
 /// Fraction bits of a matrix element.
 const Q: u32 = 30;
@@ -36,7 +39,7 @@ pub enum Levelling {
 }
 
 impl Levelling {
-    /// The tilt counts beyond 15 degrees (27 %), since no street is so steep.
+    /// The tilt counts beyond 15 degrees (27 %), since no street is that steep.
     pub const DEFAULT: Self = Self::Beyond(15.0);
 
     /// Returns the rotation that levels a sensor with this mean specific force at rest.
@@ -54,17 +57,20 @@ impl Levelling {
     }
 }
 
-/// Cosine of the angle from which on a sensor counts as moved: 25 degrees, since streets are no steeper than 15, and the
-/// mean of several is less.
+/// Cosine of the angle beyond which a sensor counts as moved: 25 degrees. Streets are no steeper than 15 degrees, and
+/// the mean of several is less.
 const MOVED: f32 = 0.906;
 
 /// Returns whether two mean specific forces at standstill are so far apart that the sensor was moved between them.
 #[must_use]
 pub(crate) fn is_moved(before: &[SpecificForce; 3], now: &[SpecificForce; 3]) -> bool {
-    let float = |axis: &SpecificForce| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2;
-    let (before, now) = (before.each_ref().map(float), now.each_ref().map(float));
-    let dot = |a: &[f32; 3], b: &[f32; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
-    dot(&before, &now) < MOVED * crate::root::sqrt(dot(&before, &before) * dot(&now, &now))
+    let (before, now) = (metre_per_sec2(before), metre_per_sec2(now));
+    dot(&before, &now) < MOVED * sqrt(dot(&before, &before) * dot(&now, &now))
+}
+
+/// Converts a specific force to m/s^2.
+fn metre_per_sec2(force: &[SpecificForce; 3]) -> [f32; 3] {
+    force.each_ref().map(|axis| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2)
 }
 
 /// The reason why the accelerometer shows no vertical.
@@ -86,10 +92,10 @@ pub enum LevelError {
 pub struct Rotation([[i32; 3]; 3]);
 
 impl Rotation {
-    /// This rotation leaves every bit as it is.
+    /// This rotation changes no bit.
     pub const IDENTITY: Self = Self([[1 << Q, 0, 0], [0, 1 << Q, 0], [0, 0, 1 << Q]]);
 
-    /// Makes the rotation of a board that is turned from the vehicle's axes by `yaw` about z, then by `pitch` about
+    /// Creates the rotation of a board that is turned from the vehicle's axes by `yaw` about z, then by `pitch` about
     /// its own y, then by `roll` about its own x, degrees. `None` when one is not finite.
     #[must_use]
     pub fn from_mounting(roll: f32, pitch: f32, yaw: f32) -> Option<Self> {
@@ -111,13 +117,13 @@ impl Rotation {
     /// [`LevelError`].
     #[doc(hidden)]
     pub fn levelling(rest: [SpecificForce; 3]) -> Result<(Self, f32), LevelError> {
-        let [x, y, z] = rest.map(|force| force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2);
-        let norm = crate::root::sqrt(x * x + y * y + z * z);
+        let [x, y, z] = metre_per_sec2(&rest);
+        let norm = sqrt(x * x + y * y + z * z);
         if libm::fabsf(norm - STANDARD_GRAVITY) > GRAVITY_TOLERANCE {
             return Err(LevelError::NotGravity(norm));
         }
         let [x, y, cos] = [x / norm, y / norm, z / norm];
-        let tilt = libm::atan2f(crate::root::sqrt(x * x + y * y), cos).to_degrees();
+        let tilt = libm::atan2f(sqrt(x * x + y * y), cos).to_degrees();
         if cos < UPSIDE_DOWN {
             return Err(LevelError::UpsideDown(tilt));
         }
@@ -195,14 +201,14 @@ fn product(rows: &[[i32; 3]; 3], vector: [i32; 3]) -> [i32; 3] {
 pub struct GyroMap([[i32; 3]; 3]);
 
 impl GyroMap {
-    /// This map leaves every bit as it is.
+    /// This map changes no bit.
     pub const IDENTITY: Self = Self(Rotation::IDENTITY.0);
     /// The largest plausible gain error of a unit.
     pub const MAX_GAIN: f32 = 0.05;
     /// The largest plausible share of another axis: the sine of 8.6 degrees.
     pub const MAX_CROSS: f32 = 0.15;
 
-    /// Makes a map from a matrix, row by row; `None` if an element is not finite or too far from the identity.
+    /// Creates a map from a matrix, row by row; `None` if an element is not finite or too far from the identity.
     #[must_use]
     pub fn from_elements(elements: [[f32; 3]; 3]) -> Option<Self> {
         let map = Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)));

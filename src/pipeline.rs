@@ -4,8 +4,8 @@
 //! updates, report) and nothing else. The stages do not import each other; they share the types of samples,
 //! windows and units. No clock is read: the samples' own time stamps drive everything.
 //!
-//! The network runs beside the samples, not inside their turn: [`Output::window`] is a window that is due, the caller
-//! runs it when it has time, and [`Pipeline::deliver`] takes its estimate. The estimate is used exactly
+//! The network does not run inside the processing of a sample: [`Output::window`] is a window that is due, the caller
+//! runs it when it has time, and [`Pipeline::deliver`] accepts its estimate. The estimate is used exactly
 //! [`crate::compensate::Mode::delay`] samples after the window's newest one, so fast and slow machines send the same
 //! frames.
 
@@ -28,7 +28,6 @@ use crate::bias::{StandstillSource, StaticInit, ZeroPoint, ZeroRate, ZeroRateOut
 use crate::compensate::{Compensated, Compensator, Implausible, Settled};
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
-use crate::mounting::Rotation;
 use crate::sample::{Frame, ImuSample, Standstill, WheelSample};
 
 use crate::model::window::{self, Features, WINDOW};
@@ -58,18 +57,18 @@ struct State {
     wheels: Wheels,
     /// Samples for which the vehicle has stood; zero while it moves.
     stood: u32,
-    /// The sums of the rates that went out.
+    /// The sums of the rates that were sent.
     prompt_yaw: Yaw,
     navigation_yaw: Yaw,
     /// True length of a sensor clock step, by which both rates are summed.
     clock_ratio: ClockRatio,
     /// Grid step of the newest message set.
     tick: u32,
-    /// Samples until the last gap is a whole window back.
+    /// Samples until the last gap is a whole window in the past.
     gap_within: u32,
     /// The newest sample as the networks see it.
     inertial: Option<Features>,
-    /// The sensor is mounted otherwise than in earlier drives.
+    /// The sensor is mounted differently than in earlier drives.
     moved: bool,
     board: BoardFaults,
     counters: Counters,
@@ -86,7 +85,7 @@ struct Rates {
 }
 
 impl Pipeline {
-    /// Begins before the first sample.
+    /// Creates a pipeline before its first sample.
     #[must_use]
     pub const fn new(config: PipelineConfig) -> Self {
         let state = State {
@@ -121,11 +120,11 @@ impl Pipeline {
         self.config = config;
     }
 
-    /// Corrects one sample of the inertial sensor; its validity must have been judged ([`crate::monitor`]).
+    /// Corrects one sample of the inertial sensor; its validity must have been set ([`crate::monitor`]).
     ///
     /// # Errors
-    /// [`AlignError`] when its time stamp has no place on the grid; it is counted and not used. Unless it was
-    /// a duplicate, the samples after it report [`Faults::GAP`] for as long as after a missing one.
+    /// [`AlignError`] when its time stamp has no place on the grid; the sample is counted and not used. Unless it was
+    /// a duplicate, the samples that follow report [`Faults::GAP`] for as long as after a missing one.
     pub fn correct(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
         let mut frame = self.state.aligner.align(sample).inspect_err(|error| self.refuse(*error))?;
         let mut sample = sample;
@@ -165,13 +164,13 @@ impl Pipeline {
         Ok(Output { vehicle, settled: rates.settled, window, refused, implausible })
     }
 
-    /// Takes the newest wheel report of [`crate::can::wheel::WheelReceiver`]. Call it before each sample where wheel
-    /// speeds are configured, since the wheels' silence is found here too.
+    /// Sets the newest wheel report of [`crate::can::wheel::WheelReceiver`]. Call it before each sample where wheel
+    /// speeds are configured, since the report also shows that the wheels are silent.
     pub fn wheels(&mut self, wheels: WheelSample) {
         self.state.wheels.update(wheels);
     }
 
-    /// Takes the faults of the board beside the sensor; they are reported with every message set from now on.
+    /// Sets the faults of the board other than the sensor's; they are reported with every message set from now on.
     pub fn board(&mut self, faults: BoardFaults) {
         self.state.board = faults;
     }
@@ -187,9 +186,8 @@ impl Pipeline {
         self.state.clock_ratio = ratio;
     }
 
-    /// Takes the estimate of a window that [`Output::window`] announced. Returns whether it will be used: it will not
-    /// if no window waits for it, or if it comes too late or twice. A window without an estimate is counted when its
-    /// turn has passed.
+    /// Accepts the estimate of a window that [`Output::window`] announced. Returns whether it will be used: not if no
+    /// window waits for it, or if it is late or a duplicate. A window without an estimate is counted at its deadline.
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
         self.state.windows.deliver(end, estimate)
     }
@@ -234,18 +232,6 @@ impl Pipeline {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
     }
 
-    /// Returns the sigma of the bias when driving, rad/s, once zero-rate updates have begun.
-    #[must_use]
-    pub fn bias_sigma(&self) -> Option<f32> {
-        self.zero_rate().map(ZeroRate::sigma)
-    }
-
-    /// Returns the rotation that levelling applies, once known.
-    #[must_use]
-    pub fn levelling(&self) -> Option<Rotation> {
-        self.state.initialised.as_ref().map(|known| known.levelling)
-    }
-
     fn zero_rate(&self) -> Option<&ZeroRate> {
         self.state.initialised.as_ref()?.zero_rate.as_ref()
     }
@@ -272,7 +258,7 @@ impl Pipeline {
         }
     }
 
-    /// Drops the window under way and static initialisation, because neither may reach across a gap.
+    /// Drops the current window and static initialisation, because neither may span a gap.
     fn break_window(&mut self) {
         self.state.windows.break_off();
         self.state.compensator.forget();
@@ -281,7 +267,7 @@ impl Pipeline {
         }
     }
 
-    /// Applies the estimate that is due at this tick; counts one that has not come in time.
+    /// Applies the estimate that is due at this tick; counts one that did not arrive in time.
     fn use_estimate(&mut self, tick: u32) -> Option<Implausible> {
         let State { windows, compensator, uncertainty, counters, .. } = &mut self.state;
         let Some(estimate) = windows.take_estimate(tick, self.config.compensate.mode.delay())? else {
@@ -314,8 +300,8 @@ impl Pipeline {
         let [.., rate] = rates;
         let good = sample.validity.is_good();
         let drives = self.state.wheels.standstill() == Some(Standstill::Moving);
-        let is_foreign = self.state.compensator.add(frame.tick, rates, sample.validity, drives);
-        count(&mut self.state.counters.foreign_mountings, u32::from(is_foreign));
+        let mounting_mismatch = self.state.compensator.add(frame.tick, rates, sample.validity, drives);
+        count(&mut self.state.counters.foreign_mountings, u32::from(mounting_mismatch));
         self.state.inertial = good.then_some(features);
         if good {
             self.state.windows.add(features);
@@ -332,7 +318,7 @@ impl Pipeline {
     fn update_bias(&mut self, settled: Option<&Settled>, rate: Option<AngularRate>, quiet: bool) {
         let source = match self.state.wheels.standstill() {
             Some(Standstill::Still) => StandstillSource::Wheels,
-            // Where there are wheels they decide.
+            // Where wheel speeds are available, they decide.
             Some(_) => StandstillSource::None,
             None if quiet => StandstillSource::Inertial,
             None => StandstillSource::None,

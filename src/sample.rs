@@ -16,7 +16,7 @@ pub struct ImuSample {
     pub specific_force: [SpecificForce; 3],
     /// Angular rate about x, y, z.
     pub angular_rate: [AngularRate; 3],
-    /// Temperature of the part, where it gives one.
+    /// Temperature of the part, where it reports one.
     pub temperature: Option<CentiCelsius>,
     /// The validity of the reading. A parser reports [`Validity::Saturated`] where the part does;
     /// [`crate::monitor`] finds the rest.
@@ -67,7 +67,7 @@ pub struct FogSample {
     pub lost: u32,
     /// Angle turned about x, y, z; `None` where the part marks it invalid or has no such axis.
     pub increment: [Option<Angle>; 3],
-    /// Temperature of the part, where it gives one.
+    /// Temperature of the part, where it reports one.
     pub temperature: Option<CentiCelsius>,
 }
 
@@ -112,7 +112,7 @@ pub struct WheelSample {
 }
 
 impl WheelSample {
-    /// Makes a report without speeds.
+    /// Creates a report without speeds.
     #[must_use]
     pub const fn without_speeds(standstill: Standstill) -> Self {
         Self { time: Micros(0), speeds: [None; WHEELS], standstill }

@@ -1,8 +1,8 @@
 //! These types are the fixed-point physical quantities of the integer pipeline.
 //!
-//! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a host and a microcontroller
-//! agree to the last bit. Each quantity is a type of its own around its integer code; conversions from and to physical
-//! units are explicit.
+//! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a host and a
+//! microcontroller agree to the last bit. Each quantity is a separate type around its integer code; conversions from
+//! and to physical units are explicit.
 
 /// Rate of the common grid that the networks see, Hz.
 pub const RATE_HZ: u32 = 100;
@@ -199,7 +199,7 @@ impl Micros {
 pub struct Duration(pub u64);
 
 impl Duration {
-    /// Makes a duration of milliseconds.
+    /// Creates a duration of milliseconds.
     #[must_use]
     pub const fn from_millis(millis: u32) -> Self {
         Self(millis as u64 * 1_000)

@@ -1,26 +1,26 @@
 //! This module translates the time stamps of a part's clock to the board's clock.
 //!
-//! A time stamp says when a reading was taken, by a clock that started at another time and
-//! runs at another speed than the board's. Its arrival is by the board's clock, but late by a
-//! time that varies. The least late arrival is the best one, so:
+//! A time stamp is the time of a reading by a clock that started at another time and runs at another speed than the
+//! board's. The arrival is timed by the board's clock, but with a varying delay. The arrival with the least delay is
+//! the best one, so:
 //!
 //! | event | rule |
 //! |---|---|
 //! | first sample | offset = arrival - time stamp |
-//! | earlier than the offset says | the offset goes down to it at once |
+//! | earlier than the offset predicts | the offset is lowered to it at once |
 //! | later, within [`JUMP_US`] (jitter) | the offset creeps up, [`CREEP_PPM`] of the time passed; counted above [`JITTER_US`] |
-//! | never less late than [`JITTER_US`] for [`PATIENCE_US`] (a small jump) | as a clock jump |
+//! | later than [`JITTER_US`] throughout [`PATIENCE_US`] (a small jump) | as a clock jump |
 //! | time stamp equal to the last (duplicate) | refused, counted |
 //! | before the last, within [`JUMP_US`] (out of order) | refused, counted |
-//! | off by more than [`JUMP_US`] (clock jump, restart, lost messages that nothing counted) | new offset, counted, and the caller connects nothing across it |
+//! | off by more than [`JUMP_US`] (clock jump, restart, lost messages that nothing counted) | new offset, counted; the caller must not connect samples across it |
 //!
-//! The board's time never goes back: where the offset has gone down, it stands still for a
-//! microsecond a sample until it is right again.
+//! The board's time never goes back: after the offset was lowered it advances by one microsecond a sample until it is
+//! correct again.
 
 use crate::health::count;
 use crate::units::Micros;
 
-/// A time stamp that is off by more than this is another clock's.
+/// A time stamp that is off by more than this counts as a clock jump.
 pub const JUMP_US: u64 = 100_000;
 /// The rate at which the offset may grow: that of two poor crystals.
 pub const CREEP_PPM: u64 = 200;
@@ -29,67 +29,55 @@ pub const PATIENCE_US: u64 = 1_000_000;
 /// Arrivals later than this are counted.
 pub const JITTER_US: u64 = 2_000;
 
-/// The reason why a time stamp has no place.
+/// The reason why a time stamp is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ClockError {
-    /// Time stamp equal to the last one.
+    /// The time stamp equals the last one.
     #[error("two samples carry the time stamp {} us", .at.0)]
     Duplicate {
         /// The time stamp.
         at: Micros,
     },
-    /// Time stamp before the last one.
-    #[error("a sample of {} us comes after one of {} us", .at.0, .last.0)]
+    /// The time stamp is before the last one.
+    #[error("a sample of {} us arrived after one of {} us", .at.0, .last.0)]
     OutOfOrder {
         /// The last time stamp.
         last: Micros,
-        /// This one.
+        /// The refused time stamp.
         at: Micros,
     },
 }
 
-/// The numbers of events. They saturate.
+/// Event counters. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockCounters {
-    /// Samples taken.
+    /// Samples accepted.
     pub samples: u32,
-    /// Samples that came later than [`JITTER_US`] after the least late one.
+    /// Samples that arrived more than [`JITTER_US`] later than the least late one.
     pub late: u32,
-    /// Time stamps that came twice.
+    /// Duplicate time stamps.
     pub duplicates: u32,
-    /// Samples that came after a later one.
+    /// Samples that arrived after a later one.
     pub out_of_order: u32,
     /// Clock jumps.
     pub jumps: u32,
 }
 
 impl ClockCounters {
-    /// Starts without an event.
+    /// All counters at zero.
     pub const NONE: Self = Self { samples: 0, late: 0, duplicates: 0, out_of_order: 0, jumps: 0 };
-
-    /// Returns the events since `before`.
-    #[must_use]
-    pub const fn since(&self, before: &Self) -> Self {
-        Self {
-            samples: self.samples.wrapping_sub(before.samples),
-            late: self.late.wrapping_sub(before.late),
-            duplicates: self.duplicates.wrapping_sub(before.duplicates),
-            out_of_order: self.out_of_order.wrapping_sub(before.out_of_order),
-            jumps: self.jumps.wrapping_sub(before.jumps),
-        }
-    }
 }
 
-/// Gives a sample's time by the board's clock.
+/// Holds a sample's time by the board's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardTime {
     /// The time at which the sample was taken, plus the shortest delay of the line.
     pub time: Micros,
-    /// The part's clock has jumped: what came before is not connected to this sample.
+    /// The part's clock has jumped: earlier samples are not connected to this one.
     pub jumped: bool,
 }
 
@@ -98,19 +86,19 @@ pub struct BoardTime {
 pub struct PartClock {
     /// Last time stamp, its board time, and board minus part time, all microseconds.
     last: Option<(Micros, Micros, i64)>,
-    /// The first of the arrivals that have all been late.
+    /// The first arrival of the current run of late ones.
     late_since: Option<Micros>,
     counters: ClockCounters,
 }
 
 impl PartClock {
-    /// Starts before the first sample.
+    /// The state before the first sample.
     pub const START: Self = Self { last: None, late_since: None, counters: ClockCounters::NONE };
 
-    /// Takes a sample's time stamp and when it arrived.
+    /// Converts a sample's time stamp to the board's time, given its arrival.
     ///
     /// # Errors
-    /// [`ClockError`]: the sample is not to be used.
+    /// [`ClockError`]: the sample must not be used.
     pub fn translate(&mut self, stamp: Micros, arrival: Micros) -> Result<BoardTime, ClockError> {
         let measured = (arrival.0 as i64).wrapping_sub(stamp.0 as i64);
         let Some((last, board, offset)) = self.last else {

@@ -1,11 +1,11 @@
 //! This module measures how fast an inertial sensor's clock runs against the board's.
 //!
-//! A sensor paces its samples by its own oscillator: that of an ICM-42688-P is up to 1.5 % off at
-//! 25 deg C and 2 % more over temperature (DS-000347, table 4). Its rate is right in rad/s of true
-//! time, and so is the rate that goes out. What is wrong is the time between two samples: a step that
-//! the part calls 10 ms lasts 10.1 ms, and the vehicle turns by the rate times 10.1 ms in it. The
-//! accumulated yaw therefore takes [`ClockRatio::turned`] of each rate, true time over the sensor's. A
-//! receiver that multiplies the rate by the time between two messages gets the same angle.
+//! A sensor paces its samples by its own oscillator: that of an ICM-42688-P is up to 1.5 % off at 25 deg C and 2 %
+//! more over temperature (DS-000347, table 4). Its rate is correct in rad/s of true time, and so is the rate that is
+//! sent. Only the time between two samples is wrong: a step that the part calls 10 ms lasts 10.1 ms, and the vehicle
+//! turns by the rate times 10.1 ms in it. The accumulated yaw therefore sums [`ClockRatio::turned`] of each rate,
+//! which applies the ratio of true time to the sensor's. A receiver that multiplies the rate by the time between two
+//! messages gets the same angle.
 //!
 //! # The ratio
 //!
@@ -18,33 +18,32 @@
 //! | event | what is done |
 //! |---|---|
 //! | late arrivals, a burst after a stall of less than two seconds | the least late sample is taken |
-//! | the two clocks differ by less than [`JITTER_US`] over the points | one: two crystals agree, and nothing is changed by a bit |
-//! | the point in the middle is off the line by more than [`JITTER_US`] (a stamp that jumped, a block that was late as a whole) | the points begin again with the newest; the ratio stays in force |
-//! | the sensor's clock goes back, [`GAP_US`] pass on either clock between two samples (restart, silence), or a block lasts twice its time by the board's | the points begin again; the ratio stays in force |
-//! | the ratio departs from one by more than [`ClockRatioConfig::limit_ppm`] | one of the clocks is at fault, and nobody knows which: the ratio is one, and [`RatioEstimator::fault`] says so |
+//! | the two clocks differ by less than [`JITTER_US`] over the points | one: two crystals agree, and no bit of the results changes |
+//! | the point in the middle is off the line by more than [`JITTER_US`] (a stamp that jumped, a block that was late as a whole) | the points restart with the newest; the ratio is kept |
+//! | the sensor's clock goes back, [`GAP_US`] pass on either clock between two samples (restart, silence), or a block lasts twice its time by the board's | the points restart; the ratio is kept |
+//! | the ratio departs from one by more than [`ClockRatioConfig::limit_ppm`] | one of the clocks is at fault, and it is unknown which: the ratio is one, and [`RatioEstimator::fault`] reports it |
 //!
-//! A step of J in either clock, wherever it falls among the points, and a late point at either end
-//! bend the line by at least J / 2 in its middle; so what passes is below 2 [`JITTER_US`], 188 ppm of
-//! 32 s.
+//! A step of J in either clock, wherever it falls among the points, and a late point at either end bend the line by
+//! at least J / 2 in its middle; so an undetected step is below 2 [`JITTER_US`], 188 ppm of 32 s.
 //!
-//! Where no time but the sensor's own exists (a recording, the emulator, whose bytes come at the
-//! host's pace) there is no estimator, and [`ClockRatio::ONE`] stands.
+//! Where the sensor's own time is the only one (a recording, the emulator, whose bytes arrive at the host's pace)
+//! there is no estimator, and [`ClockRatio::ONE`] is used.
 
 use crate::units::{AngularRate, Micros};
 use heapless::Deque;
 
 /// One sample is taken from each block of this length, by the sensor's clock.
 pub const BLOCK_US: u64 = 2_000_000;
-/// A slope goes over at most so many points: 32 s.
+/// A slope spans at most this many points: 32 s.
 pub const POINTS: usize = 17;
-/// A slope goes over at least so many points: 8 s.
+/// A slope spans at least this many points: 8 s.
 const ENOUGH: usize = 5;
-/// The least late samples of two blocks may differ by so much in their lateness.
+/// The least late samples of two blocks may differ by this much in their lateness.
 pub const JITTER_US: u64 = 3_000;
-/// The points begin again after so long without a sample.
+/// The points restart after this time without a sample.
 pub const GAP_US: u64 = BLOCK_US;
 
-/// True time over the sensor's time: 2^-30 a code, one is 2^30.
+/// True time over the sensor's time: LSB 2^-30, so one is 2^30.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockRatio(pub u32);
@@ -54,7 +53,7 @@ impl ClockRatio {
     pub const FRACTION_BITS: u32 = 30;
     /// Both clocks run alike, or there is only one.
     pub const ONE: Self = Self(1 << Self::FRACTION_BITS);
-    /// Codes of a millionth, rounded down.
+    /// Codes per millionth, rounded down.
     const PPM: u32 = Self::ONE.0 / 1_000_000;
 
     /// Divides two spans of less than 4.7 h, to the nearest code; `None` from 4 on.
@@ -83,11 +82,11 @@ impl ClockRatio {
     }
 }
 
-/// The configuration says when the two clocks contradict each other.
+/// Configures when the two clocks contradict each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockRatioConfig {
-    /// An oscillator in order departs from one by at most so much, millionths.
+    /// Largest departure from one of a working oscillator, millionths.
     pub limit_ppm: u32,
 }
 
@@ -96,7 +95,7 @@ impl ClockRatioConfig {
     pub const DEFAULT: Self = Self { limit_ppm: 40_000 };
 }
 
-/// A sample was taken at `sensor` by the sensor's clock and arrived at `board` by the board's.
+/// The time of a sample by the sensor's clock, and of its arrival by the board's.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     sensor: u64,
@@ -116,24 +115,24 @@ impl Point {
 struct Block {
     first: Point,
     last: Point,
-    /// The least late one, and by how much it is above a line through the first.
+    /// The least late sample, and its lateness against a line through the first one.
     best: (Point, i64),
 }
 
-/// The estimator holds a sensor's clock against the board's.
+/// Measures a sensor's clock against the board's.
 #[derive(Debug, Clone)]
 pub struct RatioEstimator {
     config: ClockRatioConfig,
     block: Option<Block>,
     points: Deque<Point, POINTS>,
-    /// The slope of the points compares arrivals with each other, whether it is believed or not.
+    /// The slope of the points, which compares arrivals with each other even where it is not accepted as the ratio.
     slope: ClockRatio,
     ratio: ClockRatio,
     fault: bool,
 }
 
 impl RatioEstimator {
-    /// Starts before the first sample.
+    /// Creates an estimator before its first sample.
     #[must_use]
     pub const fn new(config: ClockRatioConfig) -> Self {
         Self {
@@ -146,7 +145,7 @@ impl RatioEstimator {
         }
     }
 
-    /// Takes the time stamp of a sample and when it arrived.
+    /// Adds a sample: its time stamp and its arrival.
     pub fn observe(&mut self, sensor: Micros, board: Micros) {
         let point = Point { sensor: sensor.0, board: board.0 };
         let Some(block) = &mut self.block else {
@@ -173,7 +172,7 @@ impl RatioEstimator {
         }
     }
 
-    /// Returns the ratio in force: one before it is known, and while the clocks contradict each other.
+    /// Returns the ratio in use: one before it is known, and while the clocks contradict each other.
     #[must_use]
     pub fn ratio(&self) -> ClockRatio {
         self.ratio

@@ -1,14 +1,14 @@
 //! This module sums the increments of a fibre-optic gyro from one grid step to the next.
 //!
 //! The rules:
-//! - An increment belongs to the time since the one before it. One that straddles a grid step
-//!   is split there in proportion; what the first part rounds away the second one gets, so the
-//!   sum over all steps is the sum of all increments, to the last bit.
-//! - After lost messages, or where the one before ended more than one and a half spans ago, an
-//!   increment belongs to its own span only. What was turned meanwhile
-//!   is not known and not guessed: the step says how much of its time is covered.
-//! - What comes after its step has gone out is not used, and counted.
-//! - An axis that was not good in any part of the step has no sum in it.
+//! - An increment belongs to the time since the one before it. One that straddles a grid step is split there in
+//!   proportion; the second part gets the rounding error of the first, so the sum over all steps is the sum of all
+//!   increments, to the last bit.
+//! - After lost messages, or where the one before ended more than one and a half spans ago, an increment belongs to
+//!   its own span only. The turn in the gap is unknown and not guessed: the step reports how much of its time is
+//!   covered.
+//! - The part of an increment whose step has already been emitted is counted and not used.
+//! - An axis that was invalid in some part of the step has no sum.
 //! - A span longer than a grid step is refused: set the part to 100 Hz or more.
 
 use crate::health::count;
@@ -16,15 +16,15 @@ use crate::sample::{FogSample, PERIOD_US, RATE_HZ};
 use crate::units::{Angle, AngularRate, Micros};
 use heapless::Deque;
 
-/// At most this many increments are kept: those that a 1 kHz part sends in the 20 ms that a step can be waited for, and
-/// half as many again.
+/// The number of increments kept: those that a 1 kHz part sends in the 20 ms that a step can wait, and half as many
+/// again.
 pub const KEPT: usize = 32;
 
 /// The turn between two grid steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Turn {
-    /// About x, y, z; `None` where an axis was not good throughout, or nothing came.
+    /// About x, y, z; `None` where an axis was not good throughout, or no increment arrived.
     pub angle: [Option<Angle>; 3],
     /// The part of the step that the increments cover, microseconds; less than [`PERIOD_US`] marks a gap.
     pub covered: u32,
@@ -32,7 +32,7 @@ pub struct Turn {
 
 impl Turn {
     /// Returns the mean rate about an axis over the step, rounded to nearest; `None` where the axis was not good
-    /// throughout, or a part of the step is not covered: nothing is guessed.
+    /// throughout, or a part of the step is not covered.
     #[must_use]
     pub fn rate(&self, axis: usize) -> Option<AngularRate> {
         let Angle(angle) = self.angle.get(axis).copied().flatten()?;
@@ -45,34 +45,23 @@ impl Turn {
     }
 }
 
-/// The numbers of events. They saturate.
+/// Event counters. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct IncrementCounters {
     /// Times that messages were missing between two increments.
     pub gaps: u32,
-    /// Increments that came after their step had gone out.
+    /// Increments that arrived after their step had been emitted.
     pub late: u32,
     /// Increments refused because their span is longer than a grid step.
     pub too_long: u32,
-    /// Increments that had to go before a step asked for them.
+    /// Increments that were dropped before a step used them.
     pub dropped: u32,
 }
 
 impl IncrementCounters {
-    /// Starts without an event.
+    /// All counters at zero.
     pub const NONE: Self = Self { gaps: 0, late: 0, too_long: 0, dropped: 0 };
-
-    /// Returns the events since `before`.
-    #[must_use]
-    pub const fn since(&self, before: &Self) -> Self {
-        Self {
-            gaps: self.gaps.wrapping_sub(before.gaps),
-            late: self.late.wrapping_sub(before.late),
-            too_long: self.too_long.wrapping_sub(before.too_long),
-            dropped: self.dropped.wrapping_sub(before.dropped),
-        }
-    }
 }
 
 /// An increment and the time that it belongs to.
@@ -92,16 +81,16 @@ pub struct Increments {
 }
 
 impl Increments {
-    /// Starts without an increment.
+    /// The state without an increment.
     pub const EMPTY: Self = Self { pieces: Deque::new(), last_end: None, counters: IncrementCounters::NONE };
 
-    /// Takes a sample that ended at `time` by the board's clock, later than the last one.
+    /// Adds a sample that ended at `time` by the board's clock, later than the last one.
     pub fn add(&mut self, time: Micros, sample: &FogSample) {
         let (end, span) = (time.0, u64::from(sample.span));
         let own = end.saturating_sub(span);
         let begin = match self.last_end {
-            // Jitter moves the ends about by less than half the span; a part without a sequence
-            // number shows one lost message by nothing but a distance of two spans.
+            // Jitter moves the ends by less than half the span. A part without a sequence number shows one lost
+            // message only by a distance of two spans.
             Some(last) if sample.lost == 0 && 2 * end.saturating_sub(last) <= 3 * span => last,
             Some(last) => {
                 count(&mut self.counters.gaps, 1);
@@ -127,7 +116,7 @@ impl Increments {
         self.last_end = None;
     }
 
-    /// Forgets all increments.
+    /// Drops all increments.
     pub fn clear(&mut self) {
         self.pieces.clear();
         self.last_end = None;
@@ -139,7 +128,7 @@ impl Increments {
         self.last_end.is_some_and(|end| end >= time.0)
     }
 
-    /// Returns the turn of the step that ends at `time`; steps are asked for in ascending order.
+    /// Returns the turn of the step that ends at `time`; call it for the steps in ascending order.
     #[inline(never)]
     pub fn take(&mut self, time: Micros) -> Turn {
         let begin = time.0.saturating_sub(PERIOD_US);
@@ -147,7 +136,7 @@ impl Increments {
         let mut covered = 0;
         while let Some(mut piece) = self.pieces.pop_front() {
             if piece.begin >= time.0 {
-                // It is the next step's: there was room for it a moment ago.
+                // It belongs to the next step. There is room, because it has just been removed.
                 let _ = self.pieces.push_front(piece);
                 break;
             }
@@ -157,7 +146,7 @@ impl Increments {
                 (piece, rest) = (first, Some(second));
             }
             if piece.begin < begin {
-                // Its step has gone out, and whoever took it may have filled the gap.
+                // Its step has been emitted, and the receiver may have filled the gap.
                 count(&mut self.counters.late, 1);
                 piece = piece.split(begin.min(piece.end)).1;
             }
@@ -188,10 +177,10 @@ impl Increments {
 impl Piece {
     /// Returns the parts before and after `time`, which lies in the piece.
     fn split(self, time: u64) -> (Self, Self) {
-        // One and a half grid steps at most, as `push` has seen to: products of the two fit 64 bits.
+        // One and a half grid steps at most, as `add` ensures: products of the two fit 64 bits.
         let whole = ((self.end - self.begin) as i64).max(1);
         let part = (time.saturating_sub(self.begin) as i64).min(whole);
-        // The same as angle * part / whole, which wants 128 bits and thousands of cycles on a Cortex-M.
+        // The same as angle * part / whole, which needs 128 bits and thousands of cycles on a Cortex-M.
         let share = |angle: i64| angle / whole * part + angle % whole * part / whole;
         let first = self.angle.map(|angle| angle.map(|a| Angle(share(a.0))));
         let pairs = self.angle.iter().zip(first);

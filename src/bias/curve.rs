@@ -1,15 +1,18 @@
 //! The bias curve is the gyro's bias by temperature, as standstills of earlier drives have shown it.
 //!
-//! The bias of a MEMS gyro changes with its temperature, mostly in the same way at each start. So what standstills have
-//! shown is subtracted from each reading, in the sensor's own axes, and everything behind it sees a sensor with less
-//! bias: static initialisation and the zero-rate updates find the rest. It helps where they cannot: before the first
-//! standstill, and while the vehicle drives without one and the sensor warms up.
+//! The bias of a MEMS gyro changes with its temperature, mostly in the same way at each start. So the bias that
+//! standstills have shown is subtracted from each reading, in the sensor's own axes, and later stages see a sensor
+//! with less bias: static initialisation and the zero-rate updates find the rest. The curve helps where they cannot:
+//! before the first standstill, and while the sensor warms up on a drive without a standstill.
 //!
-//! The curve is a polynomial of third degree. A Kalman filter learns its coefficients, and with them an offset that each
-//! start has at all temperatures; the offset is forgotten with the start. The three axes have the same covariance, because
-//! they are always measured together. It gives the sigma at every temperature, also where no standstill was.
+//! The curve is a polynomial of third degree. A Kalman filter learns its coefficients together with an offset that
+//! one start has at all temperatures; the offset is not kept for the next start. The three axes share a covariance,
+//! because they are always measured together. The covariance gives the sigma at every temperature, even where there
+//! was no standstill.
 
+use crate::sqrt::sqrt;
 use crate::units::{AngularRate, CentiCelsius};
+use crate::vector::dot;
 
 /// Coefficients of an axis, and its states: the coefficients and the offset of this start.
 const COEFFICIENTS: usize = 4;
@@ -18,18 +21,19 @@ const STATES: usize = COEFFICIENTS + 1;
 const MIDDLE: f32 = 25.0;
 const SPAN: f32 = 25.0;
 /// Sigma of the coefficients of an unknown part, rad/s: a bias of 0.5 deg/s; a slope of 0.005 deg/s per kelvin
-/// (ICM-42688-P, data sheet DS-000347, table 1); for the bends, which no data sheet has, a fifth and a tenth of the slope.
+/// (ICM-42688-P, data sheet DS-000347, table 1); for the curvature, which no data sheet states, a fifth and a tenth
+/// of the slope.
 const UNKNOWN: [f32; COEFFICIENTS] = [8.7e-3, 8.7e-5 * SPAN, 4.4e-4, 2.2e-4];
-/// Sigma of what each start adds to the coefficients, because parts age, rad/s.
+/// Sigma of the change of the coefficients from one start to the next, because parts age, rad/s.
 const AGEING: [f32; COEFFICIENTS] = [5e-5, 2e-5, 1e-5, 1e-5];
-/// Offset of a start before any was compared, sigma, rad/s: 0.03 deg/s.
+/// Sigma of a start's offset before starts have been compared, rad/s: 0.03 deg/s.
 const FIRST_OFFSET: f32 = 5e-4;
-/// Error of three seconds at rest, sigma, rad/s: four of one standstill are as good as one with the offset that a
-/// standstill has ([`super::ZeroRateConfig::DEFAULT`]).
+/// Sigma of a mean over three seconds at rest, rad/s: four of one standstill are as good as one with the offset of a
+/// standstill ([`super::ZeroRateConfig::DEFAULT`]).
 const REST: f32 = 4e-4;
 /// The number of starts after which the offsets of old ones are forgotten.
 const MEMORY: u8 = 8;
-/// Largest believable coefficient, rad/s.
+/// Largest plausible coefficient, rad/s.
 const LARGEST: f32 = 1.0;
 /// Parts are made for these temperatures, deg C; the curve ends there.
 const TEMPERATURES: [f32; 2] = [-45.0, 110.0];
@@ -48,18 +52,18 @@ pub struct CurveBias {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BiasCurve {
-    /// Of x, y and z, rad/s: by rising power of (temperature - 25 deg C) / 25 K.
+    /// Coefficients of x, y and z, rad/s, by rising power of (temperature - 25 deg C) / 25 K.
     coefficients: [[f32; COEFFICIENTS]; 3],
     /// Covariance of the coefficients of each axis, (rad/s)^2.
     covariance: [[f32; COEFFICIENTS]; COEFFICIENTS],
     /// Mean square of the offsets of starts, (rad/s)^2.
     offset_square: f32,
-    /// The number of starts that have shown something, 8 at most.
+    /// The number of starts with a standstill, 8 at most.
     starts: u8,
 }
 
 impl BiasCurve {
-    /// This curve is that of an unknown part: no bias, and the sigma of such parts.
+    /// The curve of an unknown part: no bias, and the sigma of such parts.
     pub const UNKNOWN: Self = {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
         let mut k = 0;
@@ -71,7 +75,7 @@ impl BiasCurve {
         Self { coefficients: [[0.0; COEFFICIENTS]; 3], covariance, offset_square, starts: 0 }
     };
 
-    /// Returns the bias at a temperature, deg C; `None` while no standstill has shown anything.
+    /// Returns the bias at a temperature, deg C; `None` before the first standstill.
     #[must_use]
     pub fn at(&self, celsius: f32) -> Option<CurveBias> {
         if self.starts == 0 {
@@ -80,19 +84,19 @@ impl BiasCurve {
         let powers = powers(celsius);
         let gyro_bias = self.coefficients.map(|axis| code(dot(&axis, &powers)));
         let variance = quadratic(&self.covariance, &powers) + self.offset_square;
-        Some(CurveBias { gyro_bias, sigma: crate::root::sqrt(variance) })
+        Some(CurveBias { gyro_bias, sigma: sqrt(variance) })
     }
 
-    /// Returns the sigma of the change of the bias from one temperature to another, deg C, once the curve's own change is
-    /// subtracted, rad/s.
+    /// Returns the sigma of the change of the bias from one temperature to another (deg C) after the curve's own
+    /// change is subtracted, rad/s.
     #[must_use]
     pub fn change_sigma(&self, from: f32, to: f32) -> f32 {
         let (from, to) = (powers(from), powers(to));
         let change = core::array::from_fn(|power| to[power] - from[power]);
-        crate::root::sqrt(quadratic(&self.covariance, &change))
+        sqrt(quadratic(&self.covariance, &change))
     }
 
-    /// Returns whether all values are ones that a sensor can have.
+    /// Returns whether all values are plausible for a sensor.
     #[must_use]
     pub fn is_plausible(&self) -> bool {
         let small = |value: &f32| libm::fabsf(*value) <= LARGEST;
@@ -105,18 +109,18 @@ impl BiasCurve {
     }
 }
 
-/// Learns the curve from the rests of one start.
+/// Learns the curve from the standstills of one start.
 #[derive(Debug, Clone)]
 pub struct CurveFilter {
     before: BiasCurve,
     states: [[f32; STATES]; 3],
     covariance: [[f32; STATES]; STATES],
-    /// Square of the offset as the first rest shows it, (rad/s)^2.
+    /// Square of the offset as the first standstill shows it, (rad/s)^2.
     first: Option<f32>,
 }
 
 impl CurveFilter {
-    /// Begins a start with the curve of those before.
+    /// Creates the filter of a start from the curve of earlier starts.
     #[must_use]
     pub fn new(curve: &BiasCurve) -> Self {
         let mut covariance = [[0.0; STATES]; STATES];
@@ -131,7 +135,7 @@ impl CurveFilter {
         Self { before: *curve, states, covariance, first: None }
     }
 
-    /// Takes the mean reading of three seconds at rest.
+    /// Adds the mean reading of three seconds at rest.
     pub fn add(&mut self, temperature: CentiCelsius, angular_rate: [AngularRate; 3]) {
         let [a, b, c, d] = powers(f32::from(temperature.0) / 100.0);
         let by = [a, b, c, d, 1.0];
@@ -145,7 +149,8 @@ impl CurveFilter {
                 *state += spread / variance * off;
             }
         }
-        // The expected square of the offset, given the difference: the curve and the rest have their part of it.
+        // The expected square of the offset, given the difference, to which the curve and the mean at rest
+        // contribute, too.
         let of_offset = self.covariance[COEFFICIENTS][COEFFICIENTS];
         let gain = of_offset / variance;
         self.first.get_or_insert(gain * gain * square + of_offset * (1.0 - gain));
@@ -159,7 +164,7 @@ impl CurveFilter {
         }
     }
 
-    /// Returns the curve with what this start has shown.
+    /// Returns the curve, updated with this start.
     #[must_use]
     pub fn curve(&self) -> BiasCurve {
         let Self { before, states, covariance, first } = self;
@@ -182,10 +187,6 @@ fn powers(celsius: f32) -> [f32; COEFFICIENTS] {
     let [low, high] = TEMPERATURES;
     let x = (celsius.max(low).min(high) - MIDDLE) / SPAN;
     [1.0, x, x * x, x * x * x]
-}
-
-fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Returns by' C by, the variance of a linear combination.

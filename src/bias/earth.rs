@@ -1,10 +1,9 @@
 //! A gyro senses the rotation of the Earth, which must be subtracted from its rate once and not twice.
 //!
-//! About the vertical it is 15.041 deg/h times the sine of the latitude, 9 deg/h at 37 degrees:
-//! nothing to a MEMS part, nearly all of the error of a fibre-optic gyro. A mean over standing
-//! still contains it; a bias from elsewhere (a store, a data sheet, a filter) does not.
-//! [`ZeroPoint`] is made from either, together with [`EarthRate`], and gives out one reading to
-//! be taken off: whichever way it was made, the Earth is in it once or left alone.
+//! About the vertical it is 15.041 deg/h times the sine of the latitude, 9 deg/h at 37 degrees: negligible for a MEMS
+//! part, nearly all of the error of a fibre-optic gyro. A mean at standstill contains it; a bias from elsewhere (a
+//! store, a data sheet, a filter) does not. [`ZeroPoint`] is made from such a mean and [`EarthRate`], and holds the
+//! bias and the reading at rest separately: the reading contains the Earth's rate exactly once.
 
 use crate::units::{Angle, AngularRate, RATE_HZ};
 
@@ -21,7 +20,7 @@ pub struct Latitude {
 }
 
 impl Latitude {
-    /// Makes a latitude from degrees, north positive; `None` when it is not finite or beyond a pole.
+    /// Creates a latitude from degrees, north positive; `None` when it is not finite or beyond a pole.
     #[must_use]
     pub fn from_degrees(degrees: f32) -> Option<Self> {
         if !(-90.0..=90.0).contains(&degrees) {
@@ -52,11 +51,11 @@ impl Latitude {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EarthRate {
-    /// It is part of what is called bias. Right for a gyro that is initialised at rest on each
-    /// start, and whose bias nobody else needs.
+    /// The Earth's rate is part of the bias. This suits a gyro that is initialised at rest on each start, and whose
+    /// bias has no other use.
     #[default]
     LeftInBias,
-    /// It is known, and the bias is the part's own.
+    /// The Earth's rate is known, and the bias is the part's own.
     Subtracted(Latitude),
 }
 
@@ -78,14 +77,14 @@ pub struct ZeroPoint {
 }
 
 impl ZeroPoint {
-    /// Makes the zero point from the mean at rest, which contains the Earth's rate.
+    /// Creates the zero point from the mean at rest, which contains the Earth's rate.
     #[must_use]
     pub fn at_rest([x, y, z]: [AngularRate; 3], earth: EarthRate) -> Self {
         let earth = earth.vertical();
         Self { bias: [x, y, AngularRate(z.0.saturating_sub(earth.0))], earth }
     }
 
-    /// Returns the readings of the gyro at rest about x, y and z, which are subtracted from its readings.
+    /// Returns the gyro's readings at rest about x, y and z, to be subtracted from each of its readings.
     #[must_use]
     pub fn reading(&self) -> [AngularRate; 3] {
         let [x, y, z] = self.bias;

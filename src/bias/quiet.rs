@@ -1,13 +1,12 @@
-//! The inertial sensors judge whether the vehicle stands where there are no wheels, within tighter limits than at the
-//! start.
+//! This module detects standstill by the inertial sensors where no wheel speeds are available, within tighter limits
+//! than at the start.
 //!
-//! A steady turn looks like a bias, so an estimator that trusts a quiet gyro takes slow turns
-//! for bias and drifts worse than none. What counts as quiet here can therefore never be more
-//! than what static initialisation lets pass: each limit is the smaller of its own and of a
-//! margin above what this vehicle showed when it stood at the start. Quiet is asserted after
-//! some whole seconds whose means agree with the first one's, axis by axis, so that a turn that
-//! begins slowly ends it. And the mean itself must be one that the bias can have: that gate is
-//! [`super::zero_rate`]'s, and as narrow as the bias is well known.
+//! A steady turn looks like a bias, so an estimator that trusts a quiet gyro takes slow turns for bias and drifts
+//! more than without an update. The limits here are therefore never wider than those of static initialisation, and
+//! standard deviations must also stay within a multiple of what this vehicle showed at rest at the start. Quiet is
+//! asserted after several whole seconds whose means agree with the first one's, axis by axis, so that a turn that
+//! begins slowly ends it. The mean must also be plausible for the bias: [`super::zero_rate`] checks that, within a
+//! gate that narrows as the bias becomes known.
 
 use super::spread::Spread;
 use super::static_init::{Rest, StaticConfig};
@@ -36,7 +35,7 @@ impl QuietConfig {
 /// Six axes, gyro first: values in rad/s and m/s^2.
 type Axes = [f32; 6];
 
-/// Holds the judgement under way.
+/// Detects standstill by the inertial sensors.
 #[derive(Debug, Clone)]
 pub struct QuietDetector {
     std: Axes,
@@ -49,8 +48,8 @@ pub struct QuietDetector {
 }
 
 impl QuietDetector {
-    /// Sets limits for a vehicle that showed `rest` at the start; they are never above those of static
-    /// initialisation.
+    /// Creates a detector with limits for a vehicle that showed `rest` at the start; they are never above those of
+    /// static initialisation.
     #[must_use]
     pub fn new(config: QuietConfig, limits: &StaticConfig, rest: &Rest) -> Self {
         let gyro = |axis: usize| (config.std_ratio * rest.gyro_std[axis]).min(limits.gyro_std);
@@ -67,7 +66,7 @@ impl QuietDetector {
         }
     }
 
-    /// Takes a sample; says whether all is quiet, as far as the last whole second shows.
+    /// Adds a sample. Returns whether the vehicle has been quiet, up to the last whole second.
     pub fn observe(&mut self, sample: &ImuSample) -> bool {
         let [block_x, ..] = &self.block;
         let count = block_x.count() + 1;
@@ -86,7 +85,7 @@ impl QuietDetector {
         self.run >= self.seconds
     }
 
-    /// Begins again after a gap: readings before it say nothing about those after it.
+    /// Restarts after a gap, because readings before it say nothing about those after it.
     pub fn restart(&mut self) {
         self.block = [Spread::default(); 6];
         self.first = None;

@@ -1,6 +1,8 @@
 //! This module computes mean and spread of a run of readings in one pass, so that no reading is kept.
 
-/// Sum (exact) and squared deviations (Welford's way: B. P. Welford, Technometrics 4, 1962).
+use crate::sqrt::sqrt;
+
+/// The exact sum and the squared deviations of readings (Welford's method: B. P. Welford, Technometrics 4, 1962).
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Spread {
     count: u32,
@@ -10,10 +12,10 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// Starts without a reading.
+    /// The state without a reading.
     pub const EMPTY: Self = Self { count: 0, sum: 0, mean: 0.0, squares: 0.0 };
 
-    /// Takes a reading as code and as value.
+    /// Adds a reading, as code and as value.
     pub fn add(&mut self, code: i32, value: f32) {
         self.count += 1;
         self.sum += i64::from(code);
@@ -40,6 +42,6 @@ impl Spread {
 
     /// Returns the standard deviation of the values.
     pub fn std(&self) -> f32 {
-        crate::root::sqrt(self.variance())
+        sqrt(self.variance())
     }
 }

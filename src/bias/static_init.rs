@@ -11,7 +11,7 @@ use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
-/// Counts the samples of the static initialisation: 3 s.
+/// The number of samples of static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
@@ -29,30 +29,30 @@ pub struct StaticConfig {
     pub gyro_drift: f32,
     /// Spread of the one-second means of each accelerometer axis, m/s^2.
     pub accel_drift: f32,
-    /// Largest believable bias of a gyro axis, rad/s.
+    /// Largest plausible bias of a gyro axis, rad/s.
     pub gyro_bias: f32,
 }
 
 impl StaticConfig {
-    /// Sets the limits for a MEMS part on a car.
+    /// The limits for a MEMS part on a car.
     pub const DEFAULT: Self =
         Self { gyro_std: 0.05, accel_std: 1.5, gyro_drift: 0.004, accel_drift: 0.12, gyro_bias: 0.0873 };
 }
 
-/// The sign of motion that was found; `axis` is 0, 1, 2 for x, y, z.
+/// The sign of motion that was detected; `axis` is 0, 1, 2 for x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StaticError {
-    /// Gyro too restless, rad/s.
+    /// The spread of a gyro axis is too large, rad/s.
     #[error("the vehicle moves during static initialisation: gyro {} has a spread of {std:.4} rad/s", name(*.axis))]
     GyroNoise {
         /// The axis.
         axis: u8,
-        /// Its standard deviation.
+        /// Standard deviation of the axis.
         std: f32,
     },
-    /// Accelerometer too restless, m/s^2.
+    /// The spread of an accelerometer axis is too large, m/s^2.
     #[error(
         "the vehicle moves during static initialisation: accelerometer {} has a spread of {std:.3} m/s^2",
         name(*.axis)
@@ -60,7 +60,7 @@ pub enum StaticError {
     AccelNoise {
         /// The axis.
         axis: u8,
-        /// Its standard deviation.
+        /// Standard deviation of the axis.
         std: f32,
     },
     /// The gyro's mean changed from one second to another, rad/s.
@@ -82,12 +82,12 @@ pub enum StaticError {
         /// Largest less smallest one-second mean.
         spread: f32,
     },
-    /// The mean is more than any bias: a steady turn, rad/s.
+    /// The mean is larger than any bias: a steady turn, rad/s.
     #[error("the vehicle moves during static initialisation: gyro {} shows a steady {mean:.4} rad/s", name(*.axis))]
     GyroBias {
         /// The axis.
         axis: u8,
-        /// Its mean.
+        /// Mean of the axis.
         mean: f32,
     },
     /// The wheels turn.
@@ -103,7 +103,7 @@ fn name(axis: u8) -> &'static str {
     ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?")
 }
 
-/// One axis.
+/// The collected readings of one axis.
 #[derive(Debug, Clone, Copy, Default)]
 struct Axis {
     all: Spread,
@@ -133,7 +133,7 @@ impl Axis {
 pub struct Rest {
     /// Mean angular rate: bias and Earth rate.
     pub angular_rate: [AngularRate; 3],
-    /// Mean specific force: where up is.
+    /// Mean specific force, which shows the vertical.
     pub specific_force: [SpecificForce; 3],
     /// Standard deviation of each gyro axis, rad/s.
     pub gyro_std: [f32; 3],
@@ -152,14 +152,14 @@ pub struct StaticInit {
 }
 
 impl StaticInit {
-    /// Starts collecting.
+    /// Creates a collection without samples.
     #[must_use]
     pub const fn new(config: StaticConfig) -> Self {
         Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
     }
 
-    /// Takes a sample; after [`STATIC_SAMPLES`] of them returns the readings at rest, or the reason why there are none,
-    /// and begins again.
+    /// Adds a sample. After [`STATIC_SAMPLES`] of them it returns the readings at rest, or the reason for refusing
+    /// them, and restarts.
     pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {
@@ -186,7 +186,7 @@ impl StaticInit {
         (!refused).then_some(StaticError::Wheels)
     }
 
-    /// Forgets what was collected.
+    /// Drops the collected samples.
     pub fn restart(&mut self) {
         for axis in self.gyro.iter_mut().chain(&mut self.accel) {
             *axis = Axis::default();

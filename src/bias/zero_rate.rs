@@ -10,12 +10,13 @@
 //!   too certain of a bias that does not hold on the road.
 //!
 //! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread of the ten means of
-//! [`BATCH`] samples in it: an engine's vibration averages out faster than white noise, and a correction that is a low
-//! pass makes samples alike, neither of which the spread of single samples would show. A second counts only if the vehicle also stands in the next one, because wheel sensors show late
-//! that a car pulls away.
+//! [`BATCH`] samples in it: the spread of single samples would not show that an engine's vibration averages out
+//! faster than white noise, nor that a low-pass correction makes samples alike. A second counts only if the vehicle
+//! also stands in the next one, because wheel sensors show late that a car pulls away.
 
 use super::spread::Spread;
 use crate::sample::RATE_HZ;
+use crate::sqrt::sqrt;
 use crate::units::AngularRate;
 
 /// Describes the noise of part and vehicle. All values are 1 sigma.
@@ -27,27 +28,26 @@ pub struct ZeroRateConfig {
     pub walk: f32,
     /// Offset of a standstill, rad/s.
     pub standstill: f32,
-    /// Least noise of a one-second mean, rad/s: no spread is believed to be less.
+    /// Least noise of a one-second mean, rad/s: a smaller spread is raised to it.
     pub noise: f32,
-    /// A second that is further off than this, and than ten sigma of the bias, is no standing
-    /// still whatever the wheels say, rad/s.
+    /// A second whose mean is off by more than this, and by more than ten sigma of the bias, is not a standstill,
+    /// whatever the wheels report, rad/s.
     pub max_step: f32,
     /// Largest bias, and largest uncertainty of it, rad/s.
     pub max_bias: f32,
 }
 
 impl ZeroRateConfig {
-    /// Holds the noise of a MEMS part on a car. The walk is the one published for an Xsens MTi-100 (OpenVINS,
-    /// `config/kaist`); the noise is that part's 1.7e-4 rad/s/sqrt(Hz) over a second, less than
-    /// half of it to let a better part show. The
-    /// offset is measured: between standing and driving the mean error of the corrected rate
-    /// changes by 1.3e-4 rad/s RMS over the five training drives and the validation drive, 0.9e-4
-    /// on the latter alone.
+    /// The noise of a MEMS part on a car. The walk is the one published for an Xsens MTi-100 (OpenVINS,
+    /// `config/kaist`); the noise is less than half of that part's 1.7e-4 rad/s/sqrt(Hz) over a second, so that a
+    /// better part benefits. The offset is measured: between standing and driving the mean error of the corrected
+    /// rate changes by 1.3e-4 rad/s RMS over the five training drives and the validation drive, 0.9e-4 on the latter
+    /// alone.
     pub const DEFAULT: Self =
         Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, max_step: 5e-3, max_bias: 0.02 };
 }
 
-/// Samples of a mean whose spread is taken.
+/// Samples in each of the means whose spread is taken.
 const BATCH: u32 = 10;
 
 /// Low-order bits that are dropped when the turn at standstill is summed.
@@ -60,9 +60,9 @@ pub enum StandstillSource {
     /// There is no evidence.
     #[default]
     None,
-    /// All wheels stand. That is enough by itself: a gate on the gyro would lock a true bias out.
+    /// All wheels stand. That is enough by itself: a gate on the gyro would exclude a true bias.
     Wheels,
-    /// The inertial sensors are quiet. The mean must also be one that the bias can have.
+    /// The inertial sensors are quiet. The mean must also be plausible for the bias.
     Inertial,
 }
 
@@ -70,7 +70,7 @@ pub enum StandstillSource {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroRateOutcome {
-    /// The second before it was used.
+    /// The second before this one was used.
     Used,
     /// The second waits for the next one, because there was none before it.
     Waits,
@@ -93,7 +93,7 @@ struct Covariance {
     offset: f32,
 }
 
-/// The bias that is left behind static initialisation and network.
+/// Estimates the bias that remains after static initialisation and network.
 #[derive(Debug, Clone)]
 pub struct ZeroRate {
     config: ZeroRateConfig,
@@ -106,8 +106,8 @@ pub struct ZeroRate {
     batch: (i64, u32),
     waiting: Option<Measurement>,
     refused: bool,
-    /// 2^-20 rad/s x samples turned while standing, by the newest samples: in this quarter of a second
-    /// and the four before it; and how many more are in it.
+    /// Turn at standstill by the newest samples, 2^-20 rad/s x samples: in the current quarter of a second and in the
+    /// four before it. Then the samples left in the current quarter.
     turned: [i32; 5],
     turning_for: u8,
     since_walk: u32,
@@ -116,7 +116,7 @@ pub struct ZeroRate {
 }
 
 impl ZeroRate {
-    /// Begins after static initialisation.
+    /// Creates a filter after static initialisation.
     #[must_use]
     pub fn new(config: ZeroRateConfig) -> Self {
         let square = |sigma: f32| sigma * sigma;
@@ -139,9 +139,10 @@ impl ZeroRate {
         }
     }
 
-    /// Takes the remaining rate of a settled sample (gyro less static bias less the network's estimate; `None` where
-    /// that is not good), the source that says that the vehicle stands, and the sigma of the change of the bias with
-    /// temperature since the last outcome [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a second of standing when one is over.
+    /// Adds the remaining rate of a settled sample (gyro less static bias less the network's estimate; `None` where
+    /// that is not good). `source` is the evidence that the vehicle stands, and `thermal` the sigma of the change of
+    /// the bias with temperature since the last outcome [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a
+    /// second at standstill when one is complete.
     pub fn observe(
         &mut self,
         left: Option<AngularRate>,
@@ -180,23 +181,23 @@ impl ZeroRate {
         Some(self.second(&block))
     }
 
-    /// Takes the newest sample's rate, less static bias, before it is settled. Returns true once when the
-    /// rate contradicts the wheels.
+    /// Checks the newest sample's rate, less static bias, before it is settled. Returns true once when the rate
+    /// contradicts the wheels.
     ///
-    /// A vehicle may slide with its wheels locked. What a second of standing may turn at most must
-    /// not be exceeded by a part of it either: the navigation rate, which is zero while the
-    /// vehicle stands, has not gone out yet for the sample that tells.
+    /// A vehicle may slide with its wheels locked. The limit on the turn of a second at standstill therefore also
+    /// applies to parts of a second: when a sample exceeds it, that sample's navigation rate, which is zero at
+    /// standstill, has not been sent yet.
     pub fn contradicts_wheels(&mut self, rate: AngularRate) -> bool {
         if self.source != StandstillSource::Wheels {
             self.turned = [0; 5];
             return false;
         }
         if self.turning_for == 0 {
-            // Whatever second ends now lies within the five.
+            // Any second that ends now lies within the five quarters.
             self.turned.rotate_right(1);
             (self.turned[0], self.turning_for) = (0, RATE_HZ as u8 / 4);
         }
-        // 125 of them fit.
+        // A sum of 125 of them fits.
         self.turned[0] += rate.0.saturating_sub(self.bias().0) >> TURNED_SHIFT;
         self.turning_for -= 1;
         let per_rad = (AngularRate::PER_RAD_PER_SEC / (1 << TURNED_SHIFT) as f32) * RATE_HZ as f32;
@@ -208,7 +209,7 @@ impl ZeroRate {
         if core::mem::replace(&mut self.refused, true) {
             return false;
         }
-        // The next whole second says whether that goes on.
+        // The next whole second shows whether the turn goes on.
         self.restart();
         true
     }
@@ -224,7 +225,7 @@ impl ZeroRate {
         self.config.max_step.max(10.0 * self.sigma())
     }
 
-    /// Drops the second under way, which a gap has cut short.
+    /// Drops the current second, which a gap has cut short.
     pub fn restart(&mut self) {
         self.block = Spread::EMPTY;
         self.batch = (0, 0);
@@ -243,7 +244,7 @@ impl ZeroRate {
     /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s.
     #[must_use]
     pub fn sigma(&self) -> f32 {
-        crate::root::sqrt(self.bias_variance())
+        sqrt(self.bias_variance())
     }
 
     /// Returns the variance of the bias when driving: that of the filter, and that of the change with temperature since
@@ -285,9 +286,7 @@ impl ZeroRate {
         let bias = self.bias_variance();
         let gate = match self.source {
             StandstillSource::Wheels => self.wheels_gate(),
-            StandstillSource::Inertial => {
-                3.0 * crate::root::sqrt(bias + 2.0 * both + offset + measured.variance)
-            }
+            StandstillSource::Inertial => 3.0 * sqrt(bias + 2.0 * both + offset + measured.variance),
             StandstillSource::None => 0.0,
         };
         if libm::fabsf(step) > gate {

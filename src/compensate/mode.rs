@@ -1,11 +1,11 @@
-//! The mode chooses the outputs of a window that are used, the samples between windows, and the lag of the rate.
+//! This module defines which outputs of a window are used, the samples between windows, and the lag of the rate.
 
 use crate::model::window::WINDOW;
 use core::ops::Range;
 
-/// An estimate is used this many samples after its window's newest one, whatever the time the
-/// network took: the board's frames then do not depend on its speed. A window every sample has
-/// to be ready with the next one.
+/// An estimate is used this many samples after its window's newest one, however long the network took, so that the
+/// board's frames do not depend on its speed. With a window every sample, the estimate has to be ready with the next
+/// sample.
 pub const DELAY: u32 = 2;
 
 /// Samples between two windows: 1 to [`WINDOW`].
@@ -16,10 +16,10 @@ pub const DELAY: u32 = 2;
 pub struct Hop(u8);
 
 impl Hop {
-    /// Half a window: every sample is seen by two.
+    /// Half a window: every sample is covered by two windows.
     pub const HALF: Self = Self(WINDOW as u8 / 2);
 
-    /// Returns `None` outside the range, where samples would be left without an estimate.
+    /// Creates a hop; `None` outside the range, where samples would be left without an estimate.
     #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples >= 1 && samples as usize <= WINDOW { Some(Self(samples)) } else { None }
@@ -46,7 +46,7 @@ impl From<Hop> for u8 {
     }
 }
 
-/// Samples between one that was taken and the frame with its rate: 0 to [`Lag::MAX`].
+/// Samples from one sample to the frame with its rate: 0 to [`Lag::MAX`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
@@ -54,12 +54,12 @@ impl From<Hop> for u8 {
 pub struct Lag(u8);
 
 impl Lag {
-    /// The rate goes out at once.
+    /// The rate is sent at once.
     pub const NONE: Self = Self(0);
     /// The lag from which on no window changes a sample's estimate.
     pub const MAX: Self = Self((WINDOW + DELAY as usize - 1) as u8);
 
-    /// Returns `None` beyond [`Lag::MAX`], where waiting longer gains nothing.
+    /// Creates a lag; `None` beyond [`Lag::MAX`], where waiting longer gains nothing.
     #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples <= Self::MAX.0 { Some(Self(samples)) } else { None }
@@ -86,7 +86,7 @@ impl From<Lag> for u8 {
     }
 }
 
-/// A number of samples that makes no sense.
+/// A number of samples outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("{} samples are not within {} to {}", .samples, .low, .high)]
@@ -98,8 +98,8 @@ pub struct OutOfRange {
 
 /// The rule that chooses the estimate of a sample from the windows that cover it.
 ///
-/// The newest output of a window knows only the past and is the worst, those in the middle know
-/// both sides. `cargo gyronet evaluate --ablation` compares the modes.
+/// The newest output of a window depends only on the past and is the worst; those in the middle depend on both sides.
+/// `cargo gyronet evaluate --ablation` compares the modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -138,8 +138,8 @@ impl Mode {
     pub const fn used(self) -> Range<usize> {
         match self {
             Self::Newest => WINDOW - 1..WINDOW,
-            // One each for every sample, and as many behind the newest used one as before the
-            // oldest, where the number allows.
+            // One output for every sample, and as many unused ones after the newest as before the oldest, where the
+            // number allows.
             Self::Middle => 3..8,
             Self::Overlap { .. } => 0..WINDOW,
         }

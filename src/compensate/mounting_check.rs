@@ -1,14 +1,16 @@
-//! The mounting check finds out whether a model's mounting is that of the unit that it runs on.
+//! The mounting check determines whether a model's mounting is that of the unit that it runs on.
 //!
 //! A linear part subtracts some of the roll and pitch rates from the yaw rate: the mounting of the unit that it was
-//! trained with. On another unit that adds an error. While a vehicle drives, its yaw rate changes slowly, and its roll and
-//! pitch rates fast: over a few tenths of a second, what the yaw gyro shows together with them is the unit's own coupling.
-//! So changes of the yaw rate are fitted by those of the mounting's correction, by least squares. The factor is 1 where
-//! they agree at all frequencies; where it is below one half, the correction does more harm than good.
+//! trained with. On another unit that adds an error. While a vehicle drives, its yaw rate changes slowly, and its
+//! roll and pitch rates fast: over a few tenths of a second, the part of the yaw rate that changes with them is the
+//! unit's own coupling. So changes of the yaw rate are fitted by those of the mounting's correction, by least
+//! squares. The factor is 1 where they agree at all frequencies; where it is below one half, the correction does more
+//! harm than good.
 //!
-//! The factor tells whose unit it is, not how large the unit's coupling is at the frequencies of a turn: `gyronet
-//! calibrate` measures that.
+//! The factor shows whether the unit is the model's, not how large its coupling is at the frequencies of a turn:
+//! `gyronet calibrate` measures that.
 
+use crate::sqrt::sqrt;
 use crate::units::AngularRate;
 
 /// Samples of a mean: 0.2 s.
@@ -17,11 +19,11 @@ const BLOCK: u32 = 20;
 const FEWEST: f32 = 60.0;
 /// Changes after which old ones are forgotten: ten minutes of driving.
 const MOST: f32 = 3_000.0;
-/// The correction is worth something from this factor on.
+/// The correction is useful from this factor on.
 const HALF: f32 = 0.5;
-/// The factor must be this many of its standard deviations away from it.
+/// The factor must be this many of its standard deviations away from [`HALF`].
 const SIGMAS: f32 = 2.0;
-/// Neighbouring changes share two of their three means, so they are worth half their number.
+/// Neighbouring changes share two of their three means, so they count as half their number.
 const INDEPENDENT: f32 = 0.5;
 
 /// The means of yaw rate and correction over a block, rad/s.
@@ -30,7 +32,7 @@ type Means = [f32; 2];
 /// Fits the changes of the yaw rate by those of the correction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MountingCheck {
-    /// Sums of the block under way, codes, and its samples.
+    /// Sums of the current block, codes, and its number of samples.
     sums: [i64; 2],
     samples: u32,
     /// The two blocks before, the older one first, if the vehicle drove through them.
@@ -38,7 +40,7 @@ pub(super) struct MountingCheck {
     /// Number of changes, and the sums of their products: correction squared, with the yaw rate, yaw rate squared.
     count: f32,
     products: [f32; 3],
-    is_foreign: bool,
+    is_mismatched: bool,
 }
 
 impl MountingCheck {
@@ -49,16 +51,16 @@ impl MountingCheck {
         before: [None; 2],
         count: 0.0,
         products: [0.0; 3],
-        is_foreign: false,
+        is_mismatched: false,
     };
 
     /// Returns whether the mounting is another unit's.
-    pub(super) fn is_foreign(&self) -> bool {
-        self.is_foreign
+    pub(super) fn is_mismatched(&self) -> bool {
+        self.is_mismatched
     }
 
-    /// Takes a sample's yaw rate and the correction of the mounting. Returns whether the mounting has just been found to
-    /// be another unit's.
+    /// Adds a sample's yaw rate and the correction of the mounting. Returns whether the mounting has just been found
+    /// to be another unit's.
     pub(super) fn observe(&mut self, yaw_rate: AngularRate, correction: AngularRate) -> bool {
         self.sums[0] += i64::from(yaw_rate.0);
         self.sums[1] += i64::from(correction.0);
@@ -82,7 +84,7 @@ impl MountingCheck {
         self.judge()
     }
 
-    /// Drops the block under way, because the vehicle does not drive, or samples are missing.
+    /// Drops the current block, because the vehicle does not drive, or samples are missing.
     pub(super) fn interrupt(&mut self) {
         (self.sums, self.samples, self.before) = ([0; 2], 0, [None; 2]);
     }
@@ -94,13 +96,13 @@ impl MountingCheck {
         }
         let factor = with_yaw / squared;
         let unexplained = (yaw_squared - factor * with_yaw).max(0.0);
-        let sigma = libm::sqrtf(unexplained / squared / (INDEPENDENT * self.count));
-        let was_foreign = self.is_foreign;
+        let sigma = sqrt(unexplained / squared / (INDEPENDENT * self.count));
+        let was_mismatched = self.is_mismatched;
         if factor + SIGMAS * sigma < HALF {
-            self.is_foreign = true;
+            self.is_mismatched = true;
         } else if factor - SIGMAS * sigma > HALF {
-            self.is_foreign = false;
+            self.is_mismatched = false;
         }
-        self.is_foreign && !was_foreign
+        self.is_mismatched && !was_mismatched
     }
 }

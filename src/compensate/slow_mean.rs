@@ -1,6 +1,6 @@
-//! The slow mean follows the constant part of the corrections, so that it can be taken out of them.
+//! The slow mean follows the constant part of the corrections, so that it can be subtracted from them.
 
-/// Samples over which the mean goes back.
+/// The number of samples that the mean covers.
 const MEMORY: i64 = 1_280;
 /// Fraction bits of the mean.
 const Q: u32 = 16;
@@ -16,7 +16,7 @@ impl SlowMean {
     /// The mean before the first value is zero.
     pub(super) const NONE: Self = Self { mean: 0, count: 0 };
 
-    /// Takes in a value, within 2^32; there is one every `hop` samples.
+    /// Adds a value, within 2^32; values arrive every `hop` samples.
     pub(super) fn observe(&mut self, value: i64, hop: u32) {
         let most = MEMORY.checked_div(hop.into()).unwrap_or(MEMORY);
         self.count = (self.count + 1).min(most);

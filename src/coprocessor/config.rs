@@ -1,4 +1,4 @@
-//! These types are everything that can be set about a coprocessor, and every error of its use.
+//! These types are the configuration of a coprocessor, and the errors of its inputs.
 
 use crate::align::AlignError;
 use crate::align::clock::ClockError;
@@ -15,12 +15,12 @@ use crate::units::Duration;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Clock {
-    /// `now` is a clock of its own, and inputs come when they are measured: a board in a vehicle.
+    /// `now` is an independent clock, and inputs arrive when they are measured: a board in a vehicle.
     #[default]
     Outside,
-    /// Inputs come at another pace than they were measured at (an emulator, a recorded drive), so the time stamps of
-    /// the inertial sensor are the only time that means something. Wheels and fibre-optic gyro are judged by them;
-    /// `now` still serves to find a silent sensor and a late window.
+    /// Inputs arrive at another pace than they were measured at (an emulator, a recorded drive), so only the time
+    /// stamps of the inertial sensor are meaningful. They are used for the wheels, the latitude and the fibre-optic
+    /// gyro; `now` is still used to detect a silent sensor and a late window.
     Sensor,
 }
 
@@ -30,18 +30,18 @@ pub enum Clock {
 pub struct StorageFaults {
     /// Weights, configuration or calibration are damaged; the messages report it.
     pub damaged: bool,
-    /// The configuration is lost, and the built-in one stands in for it: no rate is better than degraded.
+    /// The configuration is lost and the built-in one is used: no rate is better than degraded.
     pub configuration_lost: bool,
 }
 
-/// Configures a coprocessor, from its start on.
+/// Configures a coprocessor.
 #[derive(Debug, Clone, Copy)]
 pub struct Config {
     /// Settings of the pipeline that turns inertial samples into rates.
     pub pipeline: PipelineConfig,
     /// The messages that are sent for each sample.
     pub can: can::config::Config,
-    /// The receiver of the vehicle's wheel speeds; `None` where there are none.
+    /// The receiver of the vehicle's wheel speeds; `None` where none are sent.
     pub wheels: Option<WheelReceiver>,
     /// Settings of the pipeline that turns the fibre-optic gyro's samples into rates.
     pub fog: FogConfig,
@@ -54,12 +54,13 @@ pub struct Config {
     pub fog_expected: bool,
     /// The caller runs GyroNet. Without it no window is due, and the messages report damaged data.
     pub has_gyronet: bool,
-    /// The caller runs FoGNet, should [`FogConfig::fognet`] ask for it; without it, likewise.
+    /// The caller runs FoGNet where [`FogConfig::fognet`] selects it. Without it none of its windows is due, and the
+    /// gyro's messages report damaged data.
     pub has_fognet: bool,
     /// The clock that `now` comes from.
     pub clock: Clock,
-    /// The limit of the sensor's clock against an outside one; `None` where the outside one is no better. Without
-    /// an outside clock it is not used.
+    /// The limit on the departure of the sensor's clock from an outside clock; `None` where the outside clock is no
+    /// better. It is not used with [`Clock::Sensor`].
     pub clock_ratio: Option<ClockRatioConfig>,
     /// Stored data that was found damaged.
     pub storage: StorageFaults,
@@ -94,10 +95,10 @@ impl Default for Config {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum InputError {
-    /// `now` is before the newest time; the following times are taken as going on from there.
-    #[error("the clock goes back by {} us", .by.0)]
+    /// `now` is before the newest time; later times continue from the newest time.
+    #[error("the clock went back by {} us", .by.0)]
     ClockWentBack {
-        /// The time by which it went back.
+        /// The time by which the clock went back.
         by: Duration,
     },
     /// The time stamp of an inertial sample has no place on the grid.
@@ -106,10 +107,10 @@ pub enum InputError {
     /// The time stamp of a fibre-optic gyro's sample is a duplicate or out of order.
     #[error("fibre-optic gyro: {0}")]
     Fog(#[source] ClockError),
-    /// A wheel frame is damaged, or says that a speed is not valid.
+    /// A wheel frame is corrupt or marks a speed as invalid.
     #[error("wheel speeds: {0}")]
     Wheels(#[source] WheelError),
-    /// A latitude is damaged, not possible or not where the vehicle was.
+    /// A latitude is marked invalid, is impossible, or is too far from the one in use.
     #[error("{0}")]
     Latitude(#[source] LatitudeError),
     /// No window waits for this estimate.

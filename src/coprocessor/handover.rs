@@ -1,26 +1,26 @@
-//! GyroNet's window waits here on its way to the network and back; a late estimate is not used.
+//! The handover holds GyroNet's window until the network takes it, and the deadline of the estimate.
 //!
-//! From when a window is due, its estimate has as many sample periods by the outside clock as the pipeline uses it
-//! later. Until then the sample that wants the estimate stays where it waits, should samples come faster
-//! than 100 times a second; after that the estimate is late, which the pipeline counts and reports.
+//! The pipeline uses an estimate a fixed number of samples after its window was due, so the deadline is that number
+//! of sample periods by the outside clock. If samples arrive faster than 100 times a second, the sample that needs
+//! the estimate waits until the deadline. After it the estimate is late, which the pipeline counts and reports.
 
 use crate::pipeline::DueWindow;
 use crate::sample::PERIOD_US;
 use crate::units::Micros;
 
-/// The window that is due, and the one whose estimate is under way.
+/// The window that is due, and the one whose estimate is being computed.
 #[derive(Debug, Clone)]
 pub(super) struct Handover {
     has_network: bool,
-    /// Samples from a window's newest one to the one that its estimate is used with.
+    /// Samples from a window's newest one to the sample that uses its estimate.
     delay: u32,
     due: Option<DueWindow>,
-    /// The newest window's tick, and until when its estimate is in time.
+    /// Tick of the newest window, and the deadline of its estimate, microseconds.
     out: Option<(u32, u64)>,
 }
 
 impl Handover {
-    /// Begins before the first window; without a network none is ever due.
+    /// Creates a handover before the first window; without a network no window is ever due.
     pub const fn new(has_network: bool, delay: u32) -> Self {
         Self { has_network, delay, due: None, out: None }
     }
@@ -30,7 +30,7 @@ impl Handover {
         self.has_network
     }
 
-    /// Takes a window that is due; true where it replaces one that nobody has taken: that one is late.
+    /// Stores a window that is due. Returns true if it replaces a window that was not taken, which is then late.
     pub fn offer(&mut self, window: DueWindow, now: Micros) -> bool {
         if !self.has_network {
             return false;
@@ -44,13 +44,13 @@ impl Handover {
         self.due.take()
     }
 
-    /// Notes that the estimate of a window has come; false where there is no network whose estimates count.
+    /// Notes that the estimate of a window has arrived. Returns false if no network is in use.
     pub fn close(&mut self, end: u32) -> bool {
         self.out.take_if(|(out, _)| *out == end);
         self.has_network
     }
 
-    /// Returns whether the sample after `tick` needs the estimate, which is not late yet.
+    /// Returns whether the sample after `tick` must wait for an estimate that is not late yet.
     pub fn must_wait(&self, tick: u32, now: Micros) -> bool {
         self.out.is_some_and(|(end, until)| tick.wrapping_sub(end) + 1 >= self.delay && now.0 < until)
     }

@@ -1,7 +1,8 @@
-//! The timeline makes an outside clock into a time that never goes back.
+//! The timeline turns an outside clock into a time that never goes back.
 //!
-//! All limits (silence, late windows, old wheel speeds) are differences to the newest time. A clock that is set back
-//! must neither turn them negative nor stop them until it has caught up: its times are shifted from there on.
+//! All limits (silence, late windows, old wheel speeds) are measured against the newest time. A clock that is set
+//! back must neither make these differences negative nor stall them until it has caught up, so its times are shifted
+//! from then on.
 
 use crate::units::{Duration, Micros};
 
@@ -16,13 +17,13 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Starts at time 0.
+    /// The timeline at time 0.
     pub const START: Self = Self { now: Micros(0), shift_us: 0 };
 
-    /// Takes the clock's time and returns the shifted one.
+    /// Advances to the clock's time and returns the shifted time.
     ///
     /// # Errors
-    /// The time by which the clock went back. The next call goes on from the newest time.
+    /// The time by which the clock went back. The next call continues from the newest time.
     pub fn advance(&mut self, clock: Micros) -> Result<Micros, Duration> {
         let shifted = clock.0.saturating_add(self.shift_us).min(END.0);
         if let Some(by_us @ 1..) = self.now.0.checked_sub(shifted) {

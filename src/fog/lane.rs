@@ -17,14 +17,14 @@ const TILT_FRACTION_BITS: u32 = 30;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tilt {
     /// One over the cosine, less one.
-    excess: i32,
+    secant_minus_one: i32,
 }
 
 impl Tilt {
     /// The axis is vertical.
-    pub const NONE: Self = Self { excess: 0 };
+    pub const NONE: Self = Self { secant_minus_one: 0 };
 
-    /// Makes a tilt of 0 to 45 degrees; `None` for anything else.
+    /// Creates a tilt of 0 to 45 degrees; `None` for anything else.
     #[must_use]
     pub fn from_degrees(degrees: f32) -> Option<Self> {
         if !(0.0..=45.0).contains(&degrees) {
@@ -32,30 +32,32 @@ impl Tilt {
         }
         // 1 / cos a - 1, by a half-angle that keeps small tilts exact.
         let half = libm::sinf(degrees.to_radians() / 2.0);
-        let excess = 2.0 * half * half / (1.0 - 2.0 * half * half);
-        Some(Self { excess: libm::roundf(excess * (1u32 << TILT_FRACTION_BITS) as f32) as i32 })
+        let secant_minus_one = 2.0 * half * half / (1.0 - 2.0 * half * half);
+        Some(Self {
+            secant_minus_one: libm::roundf(secant_minus_one * (1u32 << TILT_FRACTION_BITS) as f32) as i32,
+        })
     }
 }
 
-/// Holds the state of the correction.
+/// Corrects a gyro's turns without a network.
 #[derive(Debug, Clone)]
 pub struct Lane {
     tilt: Tilt,
     tilt_rest: i128,
     latitude: Option<Latitude>,
     rest: RestReading,
-    /// The angle that is taken off each step.
+    /// The angle that is subtracted from each step.
     reading: Angle,
 }
 
 impl Lane {
-    /// Begins before the first step, without a latitude.
+    /// Creates a lane before its first step, without a latitude.
     #[must_use]
     pub const fn new(errors: FogErrors, tilt: Tilt) -> Self {
         Self { tilt, tilt_rest: 0, latitude: None, rest: RestReading::new(errors), reading: Angle::ZERO }
     }
 
-    /// Takes the latitude. A vehicle that has `moved` there takes the gyro's bias along.
+    /// Sets the latitude. If the vehicle has `moved` there, the gyro's bias is kept.
     pub fn set_latitude(&mut self, latitude: Option<Latitude>, moved: bool) {
         let earth = |latitude: Latitude| latitude.step_turn().0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
         self.latitude = latitude;
@@ -69,8 +71,8 @@ impl Lane {
         self.latitude
     }
 
-    /// Takes the gyro's turn in a step and what the wheels say. Returns the vehicle's turn about the vertical, less
-    /// what the gyro reads at rest.
+    /// Corrects the gyro's turn in a step, given the standstill that the wheels show. Returns the vehicle's turn
+    /// about the vertical, less the gyro's reading at rest.
     pub fn correct(
         &mut self,
         turn: Option<Angle>,
@@ -99,10 +101,10 @@ impl Lane {
     }
 
     fn about_vertical(&mut self, turn: Angle) -> Angle {
-        let excess = self.tilt_rest + i128::from(turn.0) * i128::from(self.tilt.excess);
-        self.tilt_rest = excess & ((1 << TILT_FRACTION_BITS) - 1);
+        let added = self.tilt_rest + i128::from(turn.0) * i128::from(self.tilt.secant_minus_one);
+        self.tilt_rest = added & ((1 << TILT_FRACTION_BITS) - 1);
         // At most 0.42 times an int64.
-        Angle(turn.0.saturating_add((excess >> TILT_FRACTION_BITS) as i64))
+        Angle(turn.0.saturating_add((added >> TILT_FRACTION_BITS) as i64))
     }
 
     fn renew(&mut self) {

@@ -1,6 +1,6 @@
-//! The errors that a fibre-optic gyro has by its data sheet.
+//! This module holds the errors of fibre-optic gyros, from their data sheets.
 
-/// Earth-independent errors of a part, 1 sigma.
+/// The errors of a part, without the Earth's rate, 1 sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogErrors {
@@ -10,11 +10,11 @@ pub struct FogErrors {
     pub bias: f32,
     /// Random walk of the bias, rad/s per square root of a second.
     pub bias_walk: f32,
-    /// Error of the scale.
+    /// Relative error of the gain.
     pub scale: f32,
 }
 
-/// 1 deg/h is this in rad/s.
+/// 1 deg/h in rad/s.
 const DEG_PER_HOUR: f32 = core::f32::consts::PI / 180.0 / 3600.0;
 /// Square root of an hour, in square roots of a second.
 const ROOT_HOUR: f32 = 60.0;

@@ -1,6 +1,6 @@
 //! The pipeline computes the rate that is sent every 10 ms from a fibre-optic gyro's samples.
 //!
-//! The gyro's increments are summed over steps of the caller's time ([`Streams`]). Each step uses the newest
+//! The gyro's increments are summed over steps of the caller's time ([`FogGrid`]). Each step uses the newest
 //! readings of inertial sensor and wheels. They are a step or two old, which hardly changes their means over a
 //! second. If FoGNet is configured, it runs outside the pipeline, as GyroNet does: [`FogPipeline::window`] returns
 //! the window that is due, the caller runs the network on it, and [`FogPipeline::deliver`] takes the estimate.
@@ -11,44 +11,44 @@
 //! | wheels are silent, or stand while the gyro turns | the same | Earth rate | degraded | WHEELS |
 //! | the latitude on the bus contradicts the one in use | the same | Earth rate | degraded | IMPLAUSIBLE |
 //! | no latitude is known, the vehicle has stood still | less the reading at standstill | static | degraded | |
-//! | no latitude is known, and no standstill yet | as it is | raw | degraded | |
-//! | FoGNet is configured, the latitude is known, and an estimate is in use | less the correction, too | FoGNet | as without; degraded by weights of simulated drives | |
-//! | standstills show that FoGNet does harm: it is dropped until the next start | as without FoGNet | | | |
+//! | no latitude is known, and no standstill yet | uncorrected | raw | degraded | |
+//! | FoGNet is configured, the latitude is known, and an estimate is in use | also less the correction | FoGNet | as without; degraded with weights from simulated drives | |
+//! | standstills show that FoGNet makes the rate worse: it is dropped until the next start | as without FoGNet | | | |
 //! | FoGNet's estimate is late, rejected, or there are no weights for this gyro | as without FoGNet | | degraded | LATE, IMPLAUSIBLE, STORED |
-//! | increments are missing in the step, or none have come yet ([`FogPipeline::expect`]) | not available | raw | unusable | GAP |
+//! | increments are missing in the step, or none have come yet ([`FogPipeline::start_without_sample`]) | not available | raw | unusable | GAP |
 //! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
 //!
-//! Increments are compared as the gyro sends them, not as they are summed: on the grid one that straddles two
-//! steps is split, and the rounding of that makes sums differ that come from equal increments.
+//! Increments are compared as the gyro sends them, not as they are summed. An increment that straddles two steps of
+//! the grid is split, and its rounding makes sums of equal increments differ.
 
-use super::trial::Trial;
+use super::fognet_watch::FogNetWatch;
 use super::{FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, Lane, RestOutcome};
 use crate::align::clock::ClockError;
-use crate::align::streams::{Fitted, Streams};
+use crate::align::fog_grid::FogGrid;
 use crate::bias::Latitude;
 use crate::estimate::YawEstimate;
 use crate::health::{Faults, Quality, Source, Status, count};
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::{FogFrame, SecondsWindow};
 use crate::model::window::Features;
-use crate::root::sqrt;
 use crate::sample::{FogSample, PERIOD_US, RATE_HZ, Standstill, WheelSample};
+use crate::sqrt::sqrt;
 use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};
 
-/// Increments in a row, equal to the one before, after which the gyro is stuck, if they last [`STUCK_US`]. A
-/// DSP-3000's noise in 10 ms is a hundred of its units, which repeats an increment once in four hundred, and four
-/// times in a row once in years.
+/// The gyro counts as stuck after this many increments in a row that equal the one before, if they last [`STUCK_US`].
+/// A DSP-3000's noise in 10 ms is a hundred of its units: one increment in four hundred repeats, and four in a row do
+/// so once in years.
 pub const STUCK_AFTER: u8 = 4;
-/// The time of these increments, microseconds: ten of a DSP-1760, whose noise in 1 ms is hundreds of thousands of its
-/// units and never repeats itself.
+/// Duration of these increments, microseconds: ten increments of a DSP-1760, whose noise in 1 ms is hundreds of
+/// thousands of its units and never repeats.
 pub const STUCK_US: u32 = 10_000;
 
-/// The numbers of events since the start. They saturate.
+/// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogCounters {
-    /// Samples taken.
+    /// Samples accepted.
     pub samples: u32,
     /// Samples refused: duplicate or out of order.
     pub misplaced: u32,
@@ -56,26 +56,27 @@ pub struct FogCounters {
     pub gaps: u32,
     /// Times that the gyro was stuck.
     pub stuck: u32,
-    /// Windows whose estimate came in time.
+    /// Windows whose estimate arrived in time.
     pub windows: u32,
-    /// Windows whose estimate did not.
+    /// Windows whose estimate did not arrive in time.
     pub late: u32,
-    /// Estimates rejected.
+    /// Estimates rejected as implausible.
     pub implausible: u32,
-    /// Windows that ended before their time: a gap, or too little of the other sensors.
+    /// Windows that ended early: a gap, or too few readings of the other sensors.
     pub broken: u32,
-    /// Steps without a known latitude: the Earth's rate is not taken off.
+    /// Steps without a known latitude: the Earth's rate is not subtracted.
     pub no_latitude: u32,
-    /// Seconds of standing still that the bias was updated with.
+    /// Seconds at standstill that updated the bias.
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
-    /// Times that FoGNet was dropped, because standstills showed that it does harm: once a start at most.
+    /// Times that FoGNet was dropped, because standstills showed that it makes the rate worse: at most once per
+    /// start.
     pub dropped: u32,
 }
 
 impl FogCounters {
-    /// Starts without an event.
+    /// All counters at zero.
     pub const NONE: Self = Self {
         samples: 0,
         misplaced: 0,
@@ -92,17 +93,17 @@ impl FogCounters {
     };
 }
 
-/// The way from a fibre-optic gyro's samples to its corrected rate.
+/// Computes corrected rates from a fibre-optic gyro's samples.
 #[derive(Debug, Clone)]
 pub struct FogPipeline {
-    streams: Streams,
+    grid: FogGrid,
     lane: Lane,
     /// The latitude on the bus contradicts the one in use.
     latitude_contested: bool,
     shake: [f32; 2],
     corrector: FogCorrector,
-    trial: Trial,
-    /// Off, too, once FoGNet has been dropped.
+    fognet_watch: FogNetWatch,
+    /// The configured use; [`FogNetUse::Off`] once FoGNet has been dropped.
     fognet: FogNetUse,
     has_network: bool,
     rate: IncrementRate,
@@ -112,7 +113,7 @@ pub struct FogPipeline {
     /// An increment of the next step was stuck.
     stuck_in_step: bool,
     due: Option<u32>,
-    /// An estimate is to come with the end of the second.
+    /// An estimate is due at the end of the second.
     awaited: bool,
     /// The fault of the newest estimate.
     estimate_faults: Faults,
@@ -120,16 +121,16 @@ pub struct FogPipeline {
 }
 
 impl FogPipeline {
-    /// Begins before the first sample. Without a network no window is due, and the messages report that.
+    /// Creates a pipeline before its first sample. Without a network no window is due, and the messages report that.
     #[must_use]
     pub const fn new(config: FogConfig, has_network: bool) -> Self {
         Self {
-            streams: Streams::new(Fitted { imu: false, fog: true }),
+            grid: FogGrid::START,
             lane: Lane::new(config.errors, config.tilt),
             latitude_contested: false,
             shake: config.shake,
             corrector: FogCorrector::new(config),
-            trial: Trial::START,
+            fognet_watch: FogNetWatch::START,
             fognet: config.fognet,
             has_network,
             rate: IncrementRate::START,
@@ -154,8 +155,8 @@ impl FogPipeline {
         self.has_network = has_network;
     }
 
-    /// Takes the latitude. A vehicle that has `moved` there takes the gyro's bias along; else the one before was wrong,
-    /// or there was none.
+    /// Sets the latitude. If the vehicle has `moved` there, the gyro's bias is kept; otherwise the latitude before
+    /// was wrong, or there was none.
     pub fn set_latitude(&mut self, latitude: Latitude, moved: bool) {
         self.lane.set_latitude(Some(latitude), moved);
     }
@@ -165,12 +166,13 @@ impl FogPipeline {
         self.latitude_contested = contested;
     }
 
-    /// Expects a gyro whether it is heard or not: messages are sent from `now` on, and its silence is reported.
-    pub fn expect(&mut self, now: Micros) {
-        self.streams.begin(now);
+    /// Starts before the first sample of a gyro that is fitted: messages are sent from `now` on, and its silence is
+    /// reported.
+    pub fn start_without_sample(&mut self, now: Micros) {
+        self.grid.begin(now);
     }
 
-    /// Takes a sample that has arrived at `now`. Call [`FogPipeline::next_step`] until `None` after it.
+    /// Adds a sample that arrived at `now`. Call [`FogPipeline::next_step`] until `None` after it.
     ///
     /// # Errors
     /// [`ClockError`]: the sample is a duplicate or out of order. It is counted and not used.
@@ -181,7 +183,7 @@ impl FogPipeline {
             let [.., up] = &mut sample.increment;
             *up = None;
         }
-        self.streams.add_fog(now, sample).inspect_err(|_| count(&mut self.counters.misplaced, 1))?;
+        self.grid.add(now, sample).inspect_err(|_| count(&mut self.counters.misplaced, 1))?;
         count(&mut self.counters.samples, 1);
         count(&mut self.counters.stuck, u32::from(stuck && !self.repeats.are_stuck()));
         self.repeats = repeats;
@@ -189,8 +191,8 @@ impl FogPipeline {
         Ok(())
     }
 
-    /// Returns the rate of the next 10 ms, if they are complete or due; nothing before the first sample of a
-    /// gyro that is not expected. Call it every few milliseconds too, because silence is found here.
+    /// Returns the rate of the next 10 ms, if they are complete or due; `None` before the first sample,
+    /// unless [`FogPipeline::start_without_sample`] was called. Also call it every few milliseconds, because it detects silence.
     #[inline(never)]
     pub fn next_step(
         &mut self,
@@ -198,9 +200,9 @@ impl FogPipeline {
         inertial: Option<Features>,
         wheels: Option<&WheelSample>,
     ) -> Option<YawEstimate> {
-        let step = self.streams.next_step(now)?;
-        let [.., turn] = step.fog.angle;
-        let turn = turn.filter(|_| u64::from(step.fog.covered) == PERIOD_US);
+        let step = self.grid.next_step(now)?;
+        let [.., turn] = step.turn.angle;
+        let turn = turn.filter(|_| u64::from(step.turn.covered) == PERIOD_US);
         let stuck = turn.is_none() && self.stuck_in_step;
         self.stuck_in_step = self.repeats.are_stuck();
         let standstill = wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill);
@@ -216,7 +218,7 @@ impl FogPipeline {
         });
         let by_network = by_network.flatten();
         let both = kept.zip(by_network).map(|(kept, by_network)| [kept, by_network]);
-        if self.trial.observe(both, standstill) {
+        if self.fognet_watch.observe(both, standstill) {
             self.drop_fognet();
         }
         count(&mut self.counters.gaps, u32::from(turn.is_none()));
@@ -253,7 +255,7 @@ impl FogPipeline {
         let (tick, yaw) = ((step.time.0 / PERIOD_US) as u32, self.yaw);
         let [standing, moving] = self.shake;
         let shake = if standstill == Standstill::Still { standing } else { moving };
-        // FoGNet does not say how good it is: all that it changes may be an error.
+        // FoGNet reports no uncertainty, so everything that it changes counts as a possible error.
         let changed =
             kept.zip(by_network).map_or(0, |(kept, by_network)| kept.0.saturating_sub(by_network.0));
         let changed = changed as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
@@ -262,13 +264,13 @@ impl FogPipeline {
         Some(YawEstimate { tick, rate, correction, yaw, sigma, status, source, quality, faults, latency_us })
     }
 
-    /// Notes that FoGNet's weights are gone: the rates that follow are without it and report that.
-    pub fn network_gone(&mut self) {
+    /// Notes that FoGNet's weights are unavailable: later rates are computed without FoGNet and report that.
+    pub fn fognet_unavailable(&mut self) {
         (self.has_network, self.due, self.awaited) = (false, None, false);
         self.estimate_faults = Faults::NONE;
     }
 
-    /// Stops FoGNet until the next start. Its estimate still is in this step's rate.
+    /// Stops FoGNet until the next start. This step's rate still contains its estimate.
     fn drop_fognet(&mut self) {
         count(&mut self.counters.dropped, 1);
         self.fognet = FogNetUse::Off;
@@ -296,8 +298,8 @@ impl FogPipeline {
         Some((number, self.corrector.window()?))
     }
 
-    /// Takes the estimate of a window. Returns whether it will be used: an estimate for no window, or one
-    /// that comes too late or twice, is not.
+    /// Accepts the estimate of a window. Returns whether it will be used: not if no window waits for it, or if it is
+    /// late or a duplicate.
     pub fn deliver(&mut self, number: u32, estimate: FogEstimate) -> bool {
         self.corrector.deliver(number, estimate)
     }
@@ -317,7 +319,7 @@ impl FogPipeline {
             self.awaited = true;
         }
         count(&mut self.counters.broken, u32::from(broken.is_some()));
-        // A window ends with its second; its estimate is judged with the end of the next one.
+        // A window ends with its second; its estimate is checked at the end of the next one.
         if implausible.is_some() {
             count(&mut self.counters.implausible, 1);
             self.estimate_faults = Faults::IMPLAUSIBLE;
@@ -344,7 +346,7 @@ struct Repeats {
 }
 
 impl Repeats {
-    /// Starts without an increment.
+    /// The state before the first increment.
     const NONE: Self = Self { newest: None, equal: 0, equal_us: 0 };
 
     /// Returns the state after a further sample.

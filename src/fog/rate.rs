@@ -1,4 +1,4 @@
-//! These types convert increments to rates and back without losing anything in the sum.
+//! This module converts increments to rates without an error in the sum.
 
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, AngularRate};
@@ -15,30 +15,14 @@ pub struct IncrementRate {
 }
 
 impl IncrementRate {
-    /// Starts without a frame and without a remainder.
+    /// The state before the first frame, without a remainder.
     pub const START: Self = Self { rest: 0 };
 
-    /// Returns the rate of a frame that turned by this much, saturated at the limits of [`AngularRate`].
+    /// Returns the rate of a frame with this turn, saturated at the limits of [`AngularRate`].
     pub fn rate(&mut self, turn: Angle) -> AngularRate {
         let codes = turn.0.saturating_mul(FRAMES).saturating_add(self.rest);
         let rate = codes.div_euclid(CODES).clamp(i32::MIN.into(), i32::MAX.into());
         self.rest = codes.rem_euclid(CODES);
         AngularRate(rate as i32)
-    }
-}
-
-/// A rate in the place of a fibre-optic gyro, the paper's future work: GyroNet's corrected rate
-/// becomes increments for FoGNet.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct PseudoFog {
-    rest: i64,
-}
-
-impl PseudoFog {
-    /// Returns the turn of one frame at this rate; the sum of the turns is exact.
-    pub fn turn(&mut self, rate: AngularRate) -> Angle {
-        let codes = i64::from(rate.0) * CODES + self.rest;
-        self.rest = codes.rem_euclid(FRAMES);
-        Angle(codes.div_euclid(FRAMES))
     }
 }

@@ -1,24 +1,24 @@
 //! This filter finds the bias of a fibre-optic gyro from its readings while the wheels stand.
 //!
-//! Two sources say what the gyro reads at rest:
+//! Two sources give the gyro's reading at rest:
 //!
-//! - **Standstills.** A Kalman filter of one state is fed with means over two seconds, whose weights rise and fall as a
-//!   triangle: what an idling engine shakes leaves nearly nothing in them. Each second is in two of them, so the noise of
-//!   one counts as that of a plain second: the part's angle random walk, or what successive means show if that is more.
-//!   The state walks as the part's bias does.
-//! - **Latitude and data sheet.** The gyro reads the Earth's rate and a bias of the size that the data sheet says.
-//!   Without a latitude that is worth 9 deg/h.
+//! - **Standstills.** A Kalman filter of one state is fed with means over two seconds with triangular weights, in
+//!   which an idling engine's vibration leaves nearly nothing. Each second is part of two means, so the noise of a
+//!   mean counts as that of a plain second: the part's angle random walk, or the noise that successive means show if
+//!   that is larger. The state has the random walk of the part's bias.
+//! - **Latitude and data sheet.** The gyro reads the Earth's rate and a bias of the size that the data sheet states.
+//!   Without a latitude the sigma of this source is 9 deg/h.
 //!
-//! Their weighted mean is subtracted, and its variance is reported. A latitude that becomes known, or is found to have
-//! been wrong, leaves the first source as it is.
+//! The weighted mean of both is subtracted, and its variance is reported. A latitude that becomes known, or is found
+//! to have been wrong, does not change the first source.
 //!
-//! A mean counts when the second after it was still, too, for wheel sensors show a car that pulls away late. One that is
-//! further off than ten sigma was no standstill, whatever the wheels say.
+//! A mean counts only if the vehicle also stands in the next second, because wheel sensors show late that a car pulls
+//! away. A mean that is off by more than ten sigma was not a standstill, whatever the wheels report.
 
 use super::part::FogErrors;
 use crate::bias::earth::EARTH_RATE;
-use crate::root::sqrt;
 use crate::sample::{RATE_HZ, Standstill};
+use crate::sqrt::sqrt;
 use crate::units::Angle;
 
 /// A second has this many steps.
@@ -27,11 +27,11 @@ const STEPS: i64 = RATE_HZ as i64;
 const LARGEST_CODE: i64 = 1 << 43;
 /// Uncertainty of the gyro's reading before it has stood still, rad/s: more than any latitude and bias.
 const UNKNOWN: f32 = 1e-2;
-/// Sigmas by which a standing gyro may differ from what is expected.
+/// A standing gyro may differ from the expected reading by this many sigmas.
 const GATE: f32 = 10.0;
-/// Differences of successive means that the noise is the mean of, at most.
+/// The noise is averaged over at most this many differences of successive means.
 const MEMORY: u8 = 64;
-/// The largest square of a difference that is believed, in variances: a turn that begins is not noise.
+/// The square of a difference is limited to this many variances, because a beginning turn is not noise.
 const LARGEST: f32 = 9.0;
 
 /// Says how a second at standstill was used.
@@ -40,13 +40,13 @@ const LARGEST: f32 = 9.0;
 pub enum RestOutcome {
     /// The mean that ended a second before was used.
     Used,
-    /// There is none, or it waits for the next second.
+    /// No mean is complete yet, or the newest one waits for the next second.
     Waits,
     /// The gyro turns: nothing was used.
     Refused,
 }
 
-/// Mean and its variance.
+/// A mean and its variance.
 #[derive(Debug, Clone, Copy)]
 struct Estimate {
     mean: f32,
@@ -62,11 +62,11 @@ pub(super) struct Second {
 }
 
 impl Second {
-    /// The second has no step.
+    /// A second without a step.
     pub const EMPTY: Self = Self { steps: 0, sum: 0, rising: 0 };
 
-    /// Adds a step. It saturates far above any gyro's range: an engine shakes a standing vehicle by half a degree a second,
-    /// and a limit that cuts its peaks cuts the same share of the Earth's rate.
+    /// Adds a step, saturated far above any gyro's range. An engine shakes a standing vehicle by half a degree a
+    /// second, and a limit that clips its peaks would remove the same share of the Earth's rate.
     pub fn add(&mut self, turn: Angle) {
         let code = turn.0.clamp(-LARGEST_CODE, LARGEST_CODE);
         self.sum += code;
@@ -79,20 +79,20 @@ impl Second {
         self.steps
     }
 
-    /// Returns the mean rate over this second and the next one, rad/s, with weights that rise and fall.
+    /// Returns the mean rate over this second and the next one, rad/s, with triangular weights.
     pub fn triangle(&self, next: &Self) -> f32 {
         let codes = self.rising + 2 * STEPS * next.sum - next.rising;
         codes as f32 / (2 * STEPS) as f32 / Angle::PER_RAD
     }
 }
 
-/// The gyro's reading at rest, and what it is made of.
+/// Estimates the gyro's reading at rest: the Earth's rate and the bias.
 #[derive(Debug, Clone)]
 pub struct RestReading {
     errors: FogErrors,
     /// The Earth's rate about the vertical, rad/s; `None` while no latitude is known.
     earth: Option<f32>,
-    /// The bias by the standstills alone.
+    /// The reading at rest by the standstills alone.
     measured: Estimate,
     /// Variance of the bias by the data sheet.
     bias_variance: f32,
@@ -100,7 +100,7 @@ pub struct RestReading {
     before: Option<Second>,
     waiting: Option<Estimate>,
     last: Option<f32>,
-    /// Variance of a mean by the differences of successive ones, and how many it is of.
+    /// Variance of a mean, by the differences of successive means, and the number of these differences.
     noise: f32,
     differences: u8,
     refused: bool,
@@ -108,7 +108,7 @@ pub struct RestReading {
 }
 
 impl RestReading {
-    /// Begins before the first step, without a latitude.
+    /// Creates a filter before its first step, without a latitude.
     #[must_use]
     pub const fn new(errors: FogErrors) -> Self {
         Self {
@@ -127,8 +127,8 @@ impl RestReading {
         }
     }
 
-    /// Takes the Earth's rate at the vehicle's place, rad/s. A vehicle that has `moved` there takes its bias along; a
-    /// latitude that was wrong has not changed what the gyro reads.
+    /// Sets the Earth's rate at the vehicle's position, rad/s. If the vehicle has `moved` there, the bias is kept and
+    /// the reading at rest changes; if the latitude before was wrong, the reading is kept.
     pub fn set_earth(&mut self, earth: Option<f32>, moved: bool) {
         if let (Some(before), Some(now), true) = (self.earth, earth, moved) {
             self.measured.mean += now - before;
@@ -136,8 +136,8 @@ impl RestReading {
         self.earth = earth;
     }
 
-    /// Takes a step's turn about the vertical (`None` where it is not known), and what the wheels say. Returns what
-    /// a second of standing led to when one is over.
+    /// Adds a step's turn about the vertical (`None` where it is not known), and the standstill that the wheels show.
+    /// Returns the outcome of a second at standstill when one is complete.
     pub fn observe(&mut self, turn: Option<Angle>, standstill: Standstill) -> Option<RestOutcome> {
         self.since_walk += 1;
         if self.since_walk == RATE_HZ {
@@ -160,7 +160,7 @@ impl RestReading {
         (i64::from(self.second.steps) == STEPS).then(|| self.end_second())
     }
 
-    /// Returns the reading at rest that is taken off, rad/s.
+    /// Returns the reading at rest that is subtracted, rad/s.
     #[must_use]
     pub fn reading(&self) -> f32 {
         self.combined().mean
@@ -233,7 +233,7 @@ mod tests {
 
     const DEG_PER_HOUR: f32 = core::f32::consts::PI / 180.0 / 3600.0;
 
-    /// A gyro at rest that reads this, with the part's noise.
+    /// Feeds the filter with this reading and the part's noise.
     fn stand(rest: &mut RestReading, reading: f32, seconds: u32) -> Option<RestOutcome> {
         let noise = FogErrors::DSP1760.angle_walk * sqrt(RATE_HZ as f32);
         let mut last = None;
@@ -262,10 +262,10 @@ mod tests {
         assert!(rest.sigma(0.0, 0.0) > 8.0 * DEG_PER_HOUR && !rest.is_measured());
         stand(&mut rest, -12.0 * DEG_PER_HOUR, 60);
         assert!((rest.reading() / DEG_PER_HOUR + 12.0).abs() < 0.05, "{}", rest.reading() / DEG_PER_HOUR);
-        // A latitude that says the same but for 0.2 deg/h changes little of it.
+        // A latitude that differs by 0.2 deg/h changes the reading little.
         rest.set_earth(Some(-12.2 * DEG_PER_HOUR), false);
         assert!((rest.reading() / DEG_PER_HOUR + 12.0).abs() < 0.05 && rest.is_measured());
-        // Where the Earth's rate has become another, the bias stays.
+        // Where the Earth's rate has changed, the bias is kept.
         rest.set_earth(Some(-11.2 * DEG_PER_HOUR), true);
         assert!((rest.reading() / DEG_PER_HOUR + 11.0).abs() < 0.05, "{}", rest.reading() / DEG_PER_HOUR);
     }

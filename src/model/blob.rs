@@ -1,14 +1,15 @@
 //! This module checks GyroNet's weight file before use and reads it in place, without a copy.
 //!
-//! A file holds a linear part, two layers of Bi-LSTMs, or both ([`Shape`]). The header of `model::file`, then:
+//! A file holds a linear part, two layers of Bi-LSTMs, or both ([`Shape`]). It begins with the header of
+//! `model::file`, followed by:
 //!
 //! | offset | type | field |
 //! |---|---|---|
 //! | 80 | P bytes | provenance, UTF-8 JSON |
 //! | 80 + P | i32 x 60 x 10 | the linear part, if there is one: a row for each sample's output ([`Blob::linear`]) |
 //! | ... | | four directions, if there are units: layer 1 forward, backward, layer 2 forward, backward |
-//! | ... | i16 x 2H, i32, i32 | with them, gyro error: weights, bias, multiplier to a rate code |
-//! | ... | i16 x 2H, i32, i32 | with them, log2 of its scale: weights, bias, multiplier to Q16 |
+//! | ... | i16 x 2H, i32, i32 | if there are units, gyro error: weights, bias, multiplier to a rate code |
+//! | ... | i16 x 2H, i32, i32 | if there are units, log2 of its scale: weights, bias, multiplier to Q16 |
 //! | ... | u32 | [`Blob::scale_unit`] |
 
 pub use super::file::{BlobError, CRC, GYRONET, MAGIC, Normalisation, Topology, VERSION};
@@ -56,7 +57,7 @@ impl Shape {
         HEADER_LEN + provenance + linear + network + 4 + 4
     }
 
-    /// Reads a topology; `None` if its sizes are not supported or it has no part at all.
+    /// Reads a topology; `None` if its sizes are not supported or it has no part.
     fn read(found: Topology) -> Option<Self> {
         let [_, _, _, units, _, outputs] = found;
         let shape = Self { units, linear: outputs > 0 };
@@ -97,7 +98,7 @@ impl<'w> Blob<'w> {
     /// Checks everything about a weight file, then gives access to it in place.
     ///
     /// # Errors
-    /// [`BlobError`], which names the first thing that is wrong.
+    /// [`BlobError`] of the first check that fails.
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
         let smallest = Shape { units: 4, linear: false };
         let mut reader = Reader::new(bytes, smallest.file_len(0));
@@ -119,7 +120,7 @@ impl<'w> Blob<'w> {
             check_dense(&log_scale)?;
         }
         let scale_unit = reader.i32()? as u32;
-        // The header has been read: the checksum is there.
+        // The header has been checked, so the checksum is present.
         let content = bytes.get(..bytes.len().saturating_sub(4)).unwrap_or_default();
         Ok(Self {
             provenance,

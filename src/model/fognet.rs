@@ -36,7 +36,7 @@ pub const GAIN_FRACTION_BITS: u32 = 31;
 pub struct FogEstimate {
     /// The error of the gyro's turn in the window.
     pub correction: Angle,
-    /// The part of it that is linear in the gyro's increments.
+    /// The part of the correction that is linear in the gyro's increments.
     pub linear: Angle,
     /// Mean over the steps of the linear part's factor: the error of the gyro's scale, Q31.
     pub gain: i32,
@@ -50,8 +50,9 @@ pub trait MinuteNetwork {
     fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
 }
 
-/// Names the piece of the window that runs next. FC2 needs the last step alone, where the backward pass of LSTM2's
-/// second layer begins: that is [`Stage::Last`]. `Idle` is zero, so that an idle state needs no place in flash.
+/// Names the piece of the window that runs next. FC2 needs only the last step, where the backward pass of LSTM2's
+/// second layer begins: that is [`Stage::Last`]. `Idle` is zero, so that an idle state needs no initial value in
+/// flash.
 #[derive(Debug, Clone)]
 #[repr(u8)]
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; they share its place")]
@@ -77,7 +78,7 @@ pub struct FogNetState {
 }
 
 impl FogNetState {
-    /// A fresh state has no window under way; windows leave nothing in it for the next one.
+    /// A state without a window in progress. A window leaves nothing in the state for the next one.
     pub const ZERO: Self = Self {
         input: [0; _],
         between: [0; _],
@@ -89,8 +90,8 @@ impl FogNetState {
     };
 }
 
-/// Runs the integer network. It reads the weights in place and works in the caller's state, which is too large to be
-/// moved about on a small stack.
+/// Runs the integer network. It reads the weights in place and works in the caller's state, which is too large to
+/// move on a small stack.
 #[derive(Debug)]
 pub struct FogNet<'w, 's> {
     blob: FogBlob<'w>,
@@ -98,21 +99,20 @@ pub struct FogNet<'w, 's> {
 }
 
 impl<'w, 's> FogNet<'w, 's> {
-    /// Makes a network over checked weights. A window that the state was working on is dropped.
+    /// Creates a network over checked weights. A window in progress in that state is dropped.
     #[must_use]
     pub fn new(blob: FogBlob<'w>, state: &'s mut FogNetState) -> Self {
         state.stage = Stage::Idle;
         Self { blob, state }
     }
 
-    /// Returns the weights that it runs on.
+    /// Returns the network's weights.
     #[must_use]
     pub fn blob(&self) -> &FogBlob<'w> {
         &self.blob
     }
 
-    /// Loads a window; [`FogNet::advance`] then runs it piece by piece. One that was under way is
-    /// dropped.
+    /// Loads a window; [`FogNet::advance`] then runs it piece by piece. A window in progress is dropped.
     pub fn start(&mut self, window: &SecondsWindow<'_>) {
         let Self { blob, state } = self;
         let clamp = i32::from(blob.input_clamp);
@@ -133,18 +133,19 @@ impl<'w, 's> FogNet<'w, 's> {
     }
 
     /// Runs a bounded piece of the window (two steps of one direction of one layer); returns the estimate with the
-    /// last one, `None` before that and when none is under way.
+    /// last piece, `None` before that and when no window is in progress.
     pub fn advance(&mut self) -> Option<FogEstimate> {
         let Self { blob, state } = self;
         let FogNetState { input, between, f1, f2, stage, .. } = state;
         match stage {
             Stage::Idle => None,
             Stage::First(run, first) => {
-                let more = run.advance(&blob.lstm1, input, between, first, &mut [], |way, step, hidden| {
-                    if let Some(f1) = f1.get_mut(step) {
-                        *f1 = f1.wrapping_add(half(blob.fc1.weights, way, hidden));
-                    }
-                });
+                let more =
+                    run.advance(&blob.lstm1, input, between, first, &mut [], |direction, step, hidden| {
+                        if let Some(f1) = f1.get_mut(step) {
+                            *f1 = f1.wrapping_add(half(blob.fc1.weights, direction, hidden));
+                        }
+                    });
                 if !more {
                     state.load_second(blob);
                 }
@@ -153,9 +154,9 @@ impl<'w, 's> FogNet<'w, 's> {
             Stage::Second(run, second) => {
                 let mut last = false;
                 let (input, between) = (&input[..STEPS], &mut between[..STEPS * HIDDEN2]);
-                run.advance(&blob.lstm2, input, between, second, &mut [], |way, step, hidden| {
+                run.advance(&blob.lstm2, input, between, second, &mut [], |direction, step, hidden| {
                     if step == STEPS - 1 {
-                        *f2 = f2.wrapping_add(half(blob.fc2.weights, way, hidden));
+                        *f2 = f2.wrapping_add(half(blob.fc2.weights, direction, hidden));
                         last = true;
                     }
                 });
@@ -178,17 +179,17 @@ impl<'w, 's> FogNet<'w, 's> {
 }
 
 /// Returns one direction's part of a row's sum.
-fn half(weights: &[i16], way: Direction, hidden: &[u32]) -> i32 {
+fn half(weights: &[i16], direction: Direction, hidden: &[u32]) -> i32 {
     let (forward, backward) = weights.split_at_checked(weights.len() / 2).unwrap_or_default();
-    Dense::partial(if way == Direction::Forward { forward } else { backward }, hidden)
+    Dense::partial(if direction == Direction::Forward { forward } else { backward }, hidden)
 }
 
 impl FogNetState {
-    /// Writes LSTM2's input, f1 and the gyro, in place of LSTM1's.
+    /// Writes LSTM2's input, f1 and the gyro, over LSTM1's.
     fn load_second(&mut self, blob: &FogBlob<'_>) {
         let clamp = i32::from(blob.input_clamp);
         for step in 0..STEPS {
-            // Ahead of what is written: five words a step are read, one is written.
+            // Reading stays ahead of writing: five words a step are read, one is written.
             let (gyro, _) = unpack(self.input[bilstm::word_index(step, GYRO, COLUMNS)]);
             let f1 = blob.fc1.scale(self.f1[step]).min(clamp).max(-clamp);
             self.input[bilstm::word_index(step, 0, 2)] = pack(f1 as i16, gyro as i16);
@@ -211,7 +212,7 @@ impl MinuteNetwork for FogNet<'_, '_> {
     fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
         self.start(window);
         loop {
-            // A run takes a fixed number of pieces, whatever the window holds.
+            // A run takes a fixed number of pieces, whatever the window contains.
             if let Some(estimate) = self.advance() {
                 return estimate;
             }

@@ -1,14 +1,14 @@
 //! This module checks FoGNet's weight file before use and reads it in place, without a copy.
 //!
-//! The header of `model::file`, then:
+//! The file begins with the header of `model::file`, followed by:
 //!
 //! | offset | type | field |
 //! |---|---|---|
 //! | 104 | i32 x 60 | [`FogBlob::gains`] |
 //! | 344 | i32, i32 | lower and upper half of [`FogBlob::offset`] |
 //! | 352 | u16 | the gyro: 1 = KVH DSP-1760, 2 = KVH DSP-3000, 3 = the rate of GyroNet |
-//! | 354 | u16 | 1 where the drives of the training are simulated, else 0 |
-//! | 356 | u32 | number of the one gyro that it was trained for; 0 = any of that part |
+//! | 354 | u16 | 1 where the training drives are simulated, else 0 |
+//! | 356 | u32 | serial number of the gyro that it was trained for; 0 = any of that part |
 //! | 360 | P bytes | provenance, UTF-8 JSON |
 //! | 360 + P | | LSTM1's four directions, of 10 inputs: the tenth is not used |
 //! | ... | i16 x 180, i32, i32 | FC1: weights, bias, multiplier to a normalised Q10 |
@@ -72,7 +72,7 @@ impl core::fmt::Display for Gyro {
 pub struct Training {
     /// The source of the turns.
     pub gyro: Gyro,
-    /// The number of the one gyro that it was trained for; 0 stands for any of that part.
+    /// Serial number of the gyro that the network was trained for; 0 stands for any of that part.
     pub serial: u32,
     /// The drives were simulated.
     pub simulated: bool,
@@ -107,9 +107,9 @@ pub struct FogBlob<'w> {
     pub fc1: Dense<'w>,
     /// The two layers of LSTM2.
     pub lstm2: [Layer<'w>; 2],
-    /// The weights of FC2 times FC4's factor for it.
+    /// The weights of FC2 times FC4's factor for FC2.
     pub fc2: Dense<'w>,
-    /// The file's own checksum, which identifies this set of weights, and the bytes that it is of.
+    /// The file's own checksum, which identifies this set of weights, and the bytes that it covers.
     pub crc: u32,
     pub content: &'w [u8],
 }
@@ -130,7 +130,7 @@ impl<'w> FogBlob<'w> {
     /// Checks everything about a weight file, then gives access to it in place.
     ///
     /// # Errors
-    /// [`BlobError`], which names the first thing that is wrong.
+    /// [`BlobError`] of the first check that fails.
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
         let mut reader = Reader::new(bytes, file_len(0));
         let shape = |found| (found == TOPOLOGY).then_some(());
@@ -153,7 +153,7 @@ impl<'w> FogBlob<'w> {
         check_rows(&lstm2, input_clamp.into(), 2)?;
         check_dense(&fc1)?;
         check_dense(&fc2)?;
-        // The header has been read: the checksum is there.
+        // The header has been checked, so the checksum is present.
         let content = bytes.get(..bytes.len().saturating_sub(4)).unwrap_or_default();
         Ok(Self {
             provenance,
@@ -171,7 +171,7 @@ impl<'w> FogBlob<'w> {
         })
     }
 
-    /// Returns the correction for a whole sum of [`FogBlob::fc2`], without the linear part.
+    /// Returns the correction for a complete sum of [`FogBlob::fc2`], without the linear part.
     #[must_use]
     pub fn spread(&self, sum: i32) -> Angle {
         let product = i64::from(sum) * i64::from(self.fc2.multiplier) + (1 << (CORRECTION_SHIFT - 1));

@@ -56,11 +56,11 @@ fn two_layers<const I: usize, const H: usize, const W: usize>(
     let mut between = [[0.0; W]; STEPS];
     let mut output = [[0.0; W]; STEPS];
     let [first, second] = weights;
-    for (way, backward) in [false, true].into_iter().enumerate() {
-        lstm::<I, H, W>(&first[way], x, backward, &mut between, way * H);
+    for (direction, backward) in [false, true].into_iter().enumerate() {
+        lstm::<I, H, W>(&first[direction], x, backward, &mut between, direction * H);
     }
-    for (way, backward) in [false, true].into_iter().enumerate() {
-        lstm::<W, H, W>(&second[way], &between, backward, &mut output, way * H);
+    for (direction, backward) in [false, true].into_iter().enumerate() {
+        lstm::<W, H, W>(&second[direction], &between, backward, &mut output, direction * H);
     }
     output
 }
@@ -97,9 +97,9 @@ impl MinuteNetwork for FogNetF32<'_> {
             let [fx, fy, fz, rx, ry, rz, left, right] = second.features.map(|code| code as f32);
             let force = [fx, fy, fz].map(|code| code / SpecificForce::PER_METRE_PER_SEC2);
             let rate = [rx, ry, rz].map(|code| code / AngularRate::PER_RAD_PER_SEC);
-            let way = [left, right].map(|code| code / (1u32 << WheelSpeed::FRACTION_BITS) as f32);
+            let distance = [left, right].map(|code| code / (1u32 << WheelSpeed::FRACTION_BITS) as f32);
             let turn = second.turn.rad() as f32;
-            let all = force.into_iter().chain(rate).chain(way).chain([turn]);
+            let all = force.into_iter().chain(rate).chain(distance).chain([turn]);
             row.iter_mut().zip(all).for_each(|(to, value)| *to = value);
             linear += self.gain(step) * turn;
         }

@@ -1,8 +1,8 @@
 //! This module runs GyroNet in integers: from ten samples it estimates the yaw gyro's error at each of them, and the
-//! uncertainty of that.
+//! uncertainty of these estimates.
 //!
-//! The error is the sum of a linear part, computed from the features' codes without rounding them, and of the output of
-//! two layers of Bi-LSTMs; a weight file has either or both, the Bi-LSTMs in any size up to the paper's.
+//! The error is the sum of a linear part, computed from the features' codes without rounding them, and of the output
+//! of two layers of Bi-LSTMs. A weight file has one or both, with Bi-LSTMs of any size up to the paper's.
 
 use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
@@ -20,9 +20,9 @@ pub const fn recurrent_words(units: usize) -> usize {
     DirectionWeights::recurrent_words(units)
 }
 
-/// Holds the working memory of one window, for networks of up to `U` units a direction: `W` is half of them, `R` their
-/// [`recurrent_words`]. An image that runs no network of the paper's size can do with less than the default; one that
-/// runs a linear part alone with `GyroNetState<0, 0, 0>`.
+/// Holds the working memory of one window, for networks of up to `U` units a direction: `W` is half of them, `R`
+/// their [`recurrent_words`]. An image whose networks are smaller than the paper's can use a smaller state than the
+/// default; for a linear part alone `GyroNetState<0, 0, 0>` is enough.
 #[derive(Debug, Clone)]
 pub struct GyroNetState<
     const U: usize = HIDDEN,
@@ -33,21 +33,21 @@ pub struct GyroNetState<
     layer1: [[u32; U]; WINDOW],
     /// The projections of all steps of a direction, so that each weight of its input is read once a window.
     scratch: Scratch<U, W, { WINDOW / 2 }>,
-    /// The recurrent weights of the direction at work, which each step reads.
+    /// The recurrent weights of the current direction, which each step reads.
     recurrent: [u32; R],
     /// The outputs of the linear part.
     linear: [i32; WINDOW],
     /// Sums of the gyro error's row and of the log scale's row for each sample; they start from the biases.
     sums: [[i32; 2]; WINDOW],
     clamped_inputs: u16,
-    /// The position in the window that is under way.
+    /// The position in the window in progress.
     run: Run,
     under_way: bool,
 }
 
 impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
-    /// A fresh state has no window under way; windows leave nothing in it for the next one. It is all zeros, so that it
-    /// needs no place in flash.
+    /// A state without a window in progress. A window leaves nothing in the state for the next one. The state is all
+    /// zeros, so that it needs no initial value in flash.
     pub const ZERO: Self = {
         assert!(U.is_multiple_of(4) && U <= HIDDEN && R == recurrent_words(U), "no network has these sizes");
         Self {
@@ -64,8 +64,8 @@ impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
     };
 }
 
-/// Runs the integer network. It reads the weights in place; it owns its state, or borrows the caller's (`S` a
-/// reference) where a state is too large to be moved about on a small stack.
+/// Runs the integer network. It reads the weights in place. It owns its state, or borrows the caller's (`S` a
+/// reference) where a state is too large to move on a small stack.
 #[derive(Debug, Clone)]
 pub struct GyroNet<
     'w,
@@ -80,7 +80,7 @@ pub struct GyroNet<
 }
 
 impl<'w> GyroNet<'w> {
-    /// Makes a network over checked weights.
+    /// Creates a network over checked weights.
     #[must_use]
     pub fn new(blob: Blob<'w>) -> Self {
         // The state has room for the largest network.
@@ -92,7 +92,8 @@ impl<'w, S, const U: usize, const W: usize, const R: usize> GyroNet<'w, S, U, W,
 where
     S: BorrowMut<GyroNetState<U, W, R>>,
 {
-    /// Makes a network over checked weights, in a state of the caller's. A window under way in that state is dropped.
+    /// Creates a network over checked weights that works in the caller's state. A window in progress in that state is
+    /// dropped.
     ///
     /// # Errors
     /// [`BlobError::Units`]: the state is too small for this network.
@@ -105,14 +106,14 @@ where
         Ok(Self { blob, steady_gain: steady_gain(&blob), state })
     }
 
-    /// Returns the weights that it runs on.
+    /// Returns the network's weights.
     #[must_use]
     pub fn blob(&self) -> &Blob<'w> {
         &self.blob
     }
 
-    /// Loads a window and runs the linear part on it; [`GyroNet::advance`] then runs the Bi-LSTMs piece by piece. One
-    /// that was under way is dropped.
+    /// Loads a window and runs the linear part on it; [`GyroNet::advance`] then runs the Bi-LSTMs piece by piece. A
+    /// window in progress is dropped.
     pub fn start(&mut self, window: &[Features; WINDOW]) {
         let Self { blob, state, .. } = self;
         let state = state.borrow_mut();
@@ -127,7 +128,7 @@ where
     }
 
     /// Runs a bounded piece of the window (one direction of one layer, a third of it or less); returns the estimate
-    /// with the last one, `None` before that and when none is under way.
+    /// with the last piece, `None` before that and when no window is in progress.
     pub fn advance(&mut self) -> Option<Estimate> {
         let Self { blob, steady_gain, state } = self;
         let GyroNetState { input, layer1, scratch, recurrent, linear, sums, clamped_inputs, run, under_way } =
@@ -138,11 +139,11 @@ where
         if let Some(layers) = &blob.layers {
             let units = layers[0].forward.units();
             let layer1 = layer1.as_flattened_mut().get_mut(..WINDOW * units).unwrap_or_default();
-            let more = run.advance(layers, input, layer1, scratch, recurrent, |way, step, hidden| {
+            let more = run.advance(layers, input, layer1, scratch, recurrent, |direction, step, hidden| {
                 let Some(sums) = sums.get_mut(step) else { return };
                 for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
                     let (forward, backward) = row.weights.split_at_checked(units).unwrap_or_default();
-                    let weights = if way == Direction::Forward { forward } else { backward };
+                    let weights = if direction == Direction::Forward { forward } else { backward };
                     *sum = sum.wrapping_add(Dense::partial(weights, hidden));
                 }
             });
@@ -174,10 +175,10 @@ where
         if let Some([first, second]) = &blob.layers {
             let units = first.forward.units();
             let layer1 = layer1.as_flattened_mut().get_mut(..WINDOW * units).unwrap_or_default();
-            for (direction, way, offset) in
+            for (weights, direction, offset) in
                 [(&first.forward, Direction::Forward, 0), (&first.backward, Direction::Backward, units)]
             {
-                Pass::new(way).finish(direction, input, scratch, recurrent, |step, hidden| {
+                Pass::new(direction).finish(weights, input, scratch, recurrent, |step, hidden| {
                     bilstm::store(layer1, step, offset, 2 * units, units, hidden);
                 });
             }
@@ -238,7 +239,7 @@ where
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
         self.start(window);
         loop {
-            // A run takes four pieces at most, whatever the window holds.
+            // A run takes four pieces at most, whatever the window contains.
             if let Some(estimate) = self.advance() {
                 return estimate;
             }

@@ -35,7 +35,7 @@ pub struct NetworkF32<'w> {
     pub fc_bias: [f32; 2],
 }
 
-/// Holds every layer's output for one window; networks of fewer units than the paper's leave zeros behind them.
+/// Holds every layer's output for one window; the places of units that a smaller network lacks are zero.
 #[derive(Debug, Clone)]
 pub struct LayerOutputs {
     /// Features less mean, over standard deviation.
@@ -89,11 +89,17 @@ impl NetworkF32<'_> {
     fn run(&self, output_scale: f32, outputs: &mut LayerOutputs) {
         let LayerOutputs { normalised, layer1, layer2, gyro_error, log_scale, .. } = outputs;
         let units = self.lstm1[0].units();
-        for (way, backward) in [false, true].into_iter().enumerate() {
-            lstm::<FEATURES, HIDDEN, _>(&self.lstm1[way], normalised, backward, layer1, way * units);
+        for (direction, backward) in [false, true].into_iter().enumerate() {
+            lstm::<FEATURES, HIDDEN, _>(
+                &self.lstm1[direction],
+                normalised,
+                backward,
+                layer1,
+                direction * units,
+            );
         }
-        for (way, backward) in [false, true].into_iter().enumerate() {
-            lstm::<_, HIDDEN, _>(&self.lstm2[way], layer1, backward, layer2, way * units);
+        for (direction, backward) in [false, true].into_iter().enumerate() {
+            lstm::<_, HIDDEN, _>(&self.lstm2[direction], layer1, backward, layer2, direction * units);
         }
         let (error_weight, log_weight) = self.fc_weight.split_at(2 * units);
         let [error_bias, log_bias] = self.fc_bias;

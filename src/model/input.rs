@@ -3,8 +3,8 @@
 use super::file::Normalisation;
 use crate::nn::{bilstm, pack};
 
-/// Normalises the codes of a step into its place in a first layer's input; returns how many values had to be clamped. A
-/// row of that input has `COLUMNS`, two in a word: an odd number of inputs has a zero behind it.
+/// Normalises the codes of a step into its place in a first layer's input; returns the number of clamped values. A
+/// row of that input has `COLUMNS` values, two in a word: an odd number of inputs is padded with a zero.
 pub(super) fn load_step<const INPUTS: usize, const COLUMNS: usize>(
     input: &mut [u32],
     step: usize,

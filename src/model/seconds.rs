@@ -1,9 +1,10 @@
-//! This module makes FoGNet's input: the last minute in steps of a second.
+//! This module builds FoGNet's input: the last minute in steps of a second.
 //!
 //! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged, in integers, so that no bit
 //! of the gyro's angle is lost. A gap in the gyro ends the window, because the angle turned in it would be missing from
 //! the sum; so does a second that has inertial samples or wheel speeds in less than half of its frames.
 
+use super::ring::Ring;
 use crate::model::window;
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, WheelSpeed};
@@ -11,7 +12,7 @@ use crate::units::{Angle, WheelSpeed};
 /// A FoGNet window has this many steps: a minute (section III-C of the paper).
 pub const STEPS: usize = 60;
 /// A step has this many features besides the gyro's increment: specific force x, y, z; angular rate x, y, z less the
-/// static bias; way of the left and of the right wheel.
+/// static bias; distance of the left and of the right wheel.
 pub const FEATURES: usize = 8;
 /// A step has this many frames: a second.
 pub const FRAMES: u32 = RATE_HZ;
@@ -32,7 +33,7 @@ pub struct FogFrame {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Second {
-    /// Means in the codes of [`crate::units`]. A wheel's mean speed over a second is also its way.
+    /// Means in the codes of [`crate::units`]. A wheel's mean speed over a second is also its distance.
     pub features: [i32; FEATURES],
     /// Angle turned.
     pub turn: Angle,
@@ -51,7 +52,7 @@ pub enum Incomplete {
     Wheels,
 }
 
-/// Sums the frames of the second that is under way.
+/// Sums the frames of the current second.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondSums {
     frames: u32,
@@ -88,11 +89,10 @@ impl SecondSums {
     /// Starts with empty sums.
     pub const ZERO: Self = Self { frames: 0, turn: 0, inertial: Mean::ZERO, wheels: Mean::ZERO };
 
-    /// Takes a frame; returns the second that it completes.
+    /// Adds a frame; returns the second that it completes.
     ///
     /// # Errors
-    /// [`Incomplete`] when the frame, or the second that it ends, is of no use; the next frame
-    /// begins a new second.
+    /// [`Incomplete`] when the frame, or the second that it ends, cannot be used; the next frame begins a new second.
     pub fn add(&mut self, frame: &FogFrame) -> Result<Option<Second>, Incomplete> {
         let Some(turn) = frame.turn else {
             *self = Self::ZERO;
@@ -122,54 +122,21 @@ pub enum Padding {
     Repeat,
     /// The window repeats the oldest second.
     Edge,
-    /// The window is not padded: there is none before the first minute is over.
+    /// The window is not padded: no window exists before the first minute is over.
     None,
 }
 
-/// Keeps the last [`STEPS`] seconds without a gap, in a ring.
-#[derive(Debug, Clone)]
-pub struct Minute {
-    ring: [Second; STEPS],
-    next: usize,
-    filled: usize,
-}
+/// Keeps the last [`STEPS`] seconds without a gap.
+pub type Minute = Ring<Second, STEPS>;
 
 impl Minute {
-    /// Starts without a second.
-    pub const EMPTY: Self =
-        Self { ring: [Second { features: [0; FEATURES], turn: Angle::ZERO }; STEPS], next: 0, filled: 0 };
+    /// A minute without a second.
+    pub const EMPTY: Self = Self::without_elements(Second { features: [0; FEATURES], turn: Angle::ZERO });
 
-    /// Forgets everything: a gap breaks the window.
-    pub fn clear(&mut self) {
-        self.next = 0;
-        self.filled = 0;
-    }
-
-    /// Adds the newest second.
-    pub fn add(&mut self, second: Second) {
-        if let Some(place) = self.ring.get_mut(self.next) {
-            *place = second;
-        }
-        self.next = (self.next + 1) % STEPS;
-        self.filled = (self.filled + 1).min(STEPS);
-    }
-
-    /// Returns the number of seconds.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.filled
-    }
-
-    /// Returns whether there is no second.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.filled == 0
-    }
-
-    /// Returns the window, oldest second first, padded to [`STEPS`]; `None` where the padding gives none.
+    /// Returns the window, oldest second first, padded to [`STEPS`]; `None` where the padding cannot fill it.
     #[must_use]
     pub fn window(&self, padding: Padding) -> Option<SecondsWindow<'_>> {
-        let enough = self.filled == STEPS || self.filled > 0 && padding != Padding::None;
+        let enough = self.len() == STEPS || self.len() > 0 && padding != Padding::None;
         enough.then_some(SecondsWindow { minute: self, padding })
     }
 }
@@ -189,16 +156,16 @@ pub struct WindowCopy {
 }
 
 impl WindowCopy {
-    /// Starts without a window.
+    /// A copy without a window.
     pub const EMPTY: Self = Self { minute: Minute::EMPTY, padding: Padding::Repeat };
 
-    /// Takes a copy of a window.
+    /// Copies a window.
     pub fn take(&mut self, window: &SecondsWindow<'_>) {
         self.minute.clone_from(window.minute);
         self.padding = window.padding;
     }
 
-    /// Returns the window; `None` before one was taken.
+    /// Returns the window; `None` before one was copied.
     #[must_use]
     pub fn window(&self) -> Option<SecondsWindow<'_>> {
         self.minute.window(self.padding)
@@ -208,10 +175,11 @@ impl WindowCopy {
 impl<'m> SecondsWindow<'m> {
     /// Returns the seconds, oldest first: [`STEPS`] of them.
     pub fn iter(&self) -> impl Iterator<Item = &'m Second> + use<'m> {
-        let Self { minute: &Minute { ref ring, next, filled }, padding } = *self;
+        let Self { minute, padding } = *self;
+        let filled = minute.len();
         let missing = STEPS - filled;
         (0..STEPS).filter_map(move |step| {
-            let age = match (step.checked_sub(missing), padding) {
+            let number = match (step.checked_sub(missing), padding) {
                 (Some(row), _) => row,
                 (None, Padding::Repeat) => {
                     // Counted from the newest end, so that the repetition ends where the data begin.
@@ -220,8 +188,7 @@ impl<'m> SecondsWindow<'m> {
                 }
                 (None, Padding::Edge | Padding::None) => 0,
             };
-            // A ring that is not full begins at place 0.
-            ring.get(if filled == STEPS { (next + age) % STEPS } else { age })
+            minute.get(number)
         })
     }
 }

@@ -1,16 +1,16 @@
 //! These weights come with the library: the default model and the paper's GyroNet, trained on drives of one car, and
 //! FoGNet, trained on simulated drives.
 //!
-//! Their provenance names their training ([`super::Blob::provenance`]). Each is a static of its own, so that an image
-//! contains only those that it uses.
+//! Their provenance describes their training ([`super::Blob::provenance`]). Each set is a separate static, so that an
+//! image contains only those that it uses.
 
 use crate::nn::Aligned;
 
 const DEFAULT_BYTES: &[u8; include_bytes!("weights/default.blob").len()] =
     include_bytes!("weights/default.blob");
 
-/// The default weight file: a linear part corrects, and beside it a Bi-LSTM of four units states the expected error. On
-/// drives that no model was trained on it is as good as [`GYRONET`] with a 150th of the multiplications.
+/// The default weight file: a linear part computes the correction, and a Bi-LSTM of four units the expected error. On
+/// drives that no model was trained on it is as good as [`GYRONET`], with a 150th of the multiplications.
 pub static DEFAULT: Aligned<[u8; DEFAULT_BYTES.len()]> = Aligned(*DEFAULT_BYTES);
 
 const GYRONET_BYTES: &[u8; include_bytes!("weights/gyronet.blob").len()] =

@@ -1,5 +1,6 @@
 //! A window holds the last ten samples as the networks see them: integer codes, the angular rate less the static bias.
 
+use super::ring::Ring;
 use crate::sample::ImuSample;
 use crate::units::AngularRate;
 
@@ -19,48 +20,10 @@ pub fn features(sample: &ImuSample, gyro_bias: &[AngularRate; 3]) -> Features {
     [fx.0, fy.0, fz.0, rate(0), rate(1), rate(2)]
 }
 
-/// Keeps the last [`WINDOW`] samples without a gap, in a ring.
-#[derive(Debug, Clone)]
-pub struct Window {
-    ring: [Features; WINDOW],
-    next: usize,
-    filled: usize,
-}
-
-impl Default for Window {
-    fn default() -> Self {
-        Self::EMPTY
-    }
-}
+/// Keeps the last [`WINDOW`] samples without a gap.
+pub type Window = Ring<Features, WINDOW>;
 
 impl Window {
-    /// Starts without a sample.
-    pub const EMPTY: Self = Self { ring: [[0; FEATURES]; WINDOW], next: 0, filled: 0 };
-
-    /// Forgets everything: a gap breaks the window.
-    pub fn clear(&mut self) {
-        self.next = 0;
-        self.filled = 0;
-    }
-
-    /// Adds the newest sample; a full window drops its oldest.
-    pub fn add(&mut self, features: Features) {
-        if let Some(place) = self.ring.get_mut(self.next) {
-            *place = features;
-        }
-        self.next = (self.next + 1) % WINDOW;
-        self.filled = (self.filled + 1).min(WINDOW);
-    }
-
-    /// Returns whether the window is full.
-    #[must_use]
-    pub fn is_full(&self) -> bool {
-        self.filled == WINDOW
-    }
-
-    /// Returns the samples, oldest first; `None` until the window is full.
-    #[must_use]
-    pub fn snapshot(&self) -> Option<[Features; WINDOW]> {
-        self.is_full().then(|| core::array::from_fn(|k| self.ring[(self.next + k) % WINDOW]))
-    }
+    /// A window without a sample.
+    pub const EMPTY: Self = Self::without_elements([0; FEATURES]);
 }

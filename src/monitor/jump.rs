@@ -7,13 +7,13 @@
 use crate::sample::ImuSample;
 use crate::units::{AngularRate, SpecificForce};
 
-/// The largest believable step of a gyro axis in 10 ms is 1 rad/s.
+/// The largest plausible step of a gyro axis in 10 ms is 1 rad/s.
 pub const JUMP_RATE: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
-/// The largest believable step of an accelerometer axis in 10 ms is 30 m/s^2.
+/// The largest plausible step of an accelerometer axis in 10 ms is 30 m/s^2.
 pub const JUMP_FORCE: SpecificForce = SpecificForce(30 << 20);
 /// At most this many readings in a row are rejected; the next one is accepted whatever its value.
 pub const JUMP_PATIENCE: u8 = 3;
-/// A last good reading older than this is not compared with, microseconds.
+/// Readings are not compared with a last good reading older than this, microseconds.
 const OLD_US: u32 = 50_000;
 
 /// Compares each reading with the last accepted one.
@@ -29,14 +29,14 @@ pub(super) struct Jump {
 }
 
 impl Jump {
-    /// Begins before the first reading.
+    /// Creates the state before the first reading.
     pub const fn new() -> Self {
         let (angular_rate, specific_force) = ([AngularRate::ZERO; 3], [SpecificForce(0); 3]);
         Self { angular_rate, specific_force, at: 0, known: false, rejected: 0 }
     }
 
-    /// Takes a reading and decides whether it is too far from the last accepted one.
-    pub fn is_implausible(&mut self, sample: &ImuSample) -> bool {
+    /// Checks a reading and returns whether it is too far from the last accepted one; otherwise it is accepted.
+    pub fn check(&mut self, sample: &ImuSample) -> bool {
         if self.known && self.jumps(sample) && self.rejected < JUMP_PATIENCE {
             self.rejected += 1;
             return true;

@@ -1,15 +1,15 @@
-//! This module finds readings that repeat themselves: a working part has noise, a stuck one has none.
+//! This module detects repeated readings: a working part has noise, a stuck one has none.
 
 use crate::sample::ImuSample;
 
-/// The part counts as stuck after this many samples in a row that equal the one before: in all axes of the gyro, in all
-/// of the accelerometer, or in one axis that hardly ever repeats itself.
+/// The part counts as stuck after this many samples in a row that equal the one before: in all axes of the gyro, in
+/// all of the accelerometer, or in one axis that rarely repeats a reading.
 ///
-/// Noise of half a bit lets an axis repeat nearly every second reading at rest; that three axes
-/// do so seven times in a row takes two days even then, and months where an axis repeats one
-/// reading in thirty. No navigation rate of these samples has gone out yet.
+/// With noise of half a bit an axis at rest repeats nearly every second reading. Even then three axes repeat seven
+/// times in a row only once in two days, and once in months where an axis repeats one reading in thirty. No
+/// navigation rate of these samples has been sent yet.
 pub const STUCK_AFTER: u8 = 7;
-/// An axis that often repeats itself counts as stuck after this many equal samples in a row.
+/// An axis that often repeats a reading counts as stuck after this many equal samples in a row.
 pub const AXIS_STUCK_AFTER: u8 = 30;
 
 /// The axes are accelerometer x, y, z, then gyro x, y, z.
@@ -21,7 +21,7 @@ const ALWAYS: u16 = 1 << 15;
 /// [`STUCK_AFTER`] samples.
 const SELDOM: u16 = ALWAYS / 16;
 
-/// Counts how often each axis repeats itself.
+/// Counts how often each axis repeats a reading.
 #[derive(Debug, Clone)]
 pub(super) struct Repeats {
     last: Option<[i32; AXES]>,
@@ -33,13 +33,13 @@ pub(super) struct Repeats {
 }
 
 impl Repeats {
-    /// Begins with every axis taken for a coarse one that often repeats itself.
+    /// Creates the state in which every axis counts as a coarse one with frequent repetitions.
     pub const fn new() -> Self {
         Self { last: None, equal: [0; AXES], repeats: [ALWAYS; AXES], stuck: [false; AXES] }
     }
 
-    /// Takes a sample and decides whether the part is stuck.
-    pub fn are_stuck(&mut self, sample: &ImuSample) -> bool {
+    /// Adds a sample and returns whether the part is stuck.
+    pub fn observe(&mut self, sample: &ImuSample) -> bool {
         let ([fx, fy, fz], [wx, wy, wz]) = (sample.specific_force, sample.angular_rate);
         let axes = [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0];
         let last = self.last.replace(axes);

@@ -1,24 +1,27 @@
 //! The vehicle's forward direction shows in the specific force when the wheels change their speed.
 //!
 //! The mean specific force of a second is gravity, plus the change of speed along the forward axis, plus speed times
-//! yaw rate along the left one. Gravity hardly changes from one second to the next, so the differences of neighbouring
-//! seconds depend on the direction of the two axes alone, and least squares finds it. Slopes, bumps and slip are what
-//! is left of the differences; they give the sigma.
+//! yaw rate along the left one. Gravity hardly changes from one second to the next, so the differences of
+//! neighbouring seconds depend on the direction of the two axes alone, and least squares finds it. Slopes, bumps and
+//! slip remain in the differences and give the sigma.
 
-use super::Rotation;
+use super::{Rotation, metre_per_sec2};
 use crate::sample::{ImuSample, RATE_HZ, WheelSample};
+use crate::sqrt::sqrt;
 use crate::units::{AngularRate, SpecificForce, WheelSpeed};
+use crate::vector::dot;
 
-/// A slower vehicle may be reversing, which most wheels do not tell, m/s.
+/// Slower vehicles are ignored, m/s: they may be reversing, which most wheel sensors do not show.
 const SLOWEST: f32 = 3.0;
-/// Each second the older ones count this much less, so that some ten minutes are remembered.
+/// The weight of older seconds decays by this factor each second: a memory of about ten minutes.
 const MEMORY: f32 = 1.0 - 1.0 / 600.0;
 /// The spread of the estimates of five recorded drives (trials 02, 03, 04, 06 and 07) over the sigma that independent
 /// errors would have: roads are uneven for longer than a second.
 const SPREAD: f32 = 1.5;
-/// Fewer seconds show no sigma.
+/// The direction is not determined from fewer seconds.
 const FEWEST: f32 = 20.0;
-/// Plausible accelerations by the accelerometer over those by the wheels: others are slip, or another sensor's.
+/// Plausible ratios of the acceleration by the accelerometer to that by the wheels: others come from slip or from
+/// another sensor.
 const PLAUSIBLE: [f32; 2] = [0.5, 2.0];
 
 /// Holds the forward direction of the vehicle in the sensor's axes.
@@ -26,7 +29,7 @@ const PLAUSIBLE: [f32; 2] = [0.5, 2.0];
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Forward {
-    /// A unit vector.
+    /// The direction, a unit vector.
     pub direction: [f32; 3],
     /// Sigma of its angle about the vertical, rad.
     pub sigma: f32,
@@ -34,7 +37,7 @@ pub struct Forward {
 
 impl Forward {
     /// Returns the angle from the x axis of a mounting to this direction, to the left, rad: 0 where the mounting is
-    /// right. The specific force at rest is in the sensor's axes, too.
+    /// right. `rest` is the specific force at rest, in the sensor's axes.
     #[must_use]
     pub fn yaw(&self, mounting: &Rotation, rest: [SpecificForce; 3]) -> f32 {
         let level = Rotation::levelling(mounting.force(rest)).map_or(Rotation::IDENTITY, |(level, _)| level);
@@ -48,12 +51,11 @@ impl Forward {
     #[must_use]
     pub fn angle_to(&self, other: &Self) -> [f32; 2] {
         let sine = cross(&self.direction, &other.direction);
-        let angle =
-            libm::atan2f(crate::root::sqrt(dot(&sine, &sine)), dot(&self.direction, &other.direction));
-        [angle, crate::root::sqrt(self.sigma * self.sigma + other.sigma * other.sigma)]
+        let angle = libm::atan2f(sqrt(dot(&sine, &sine)), dot(&self.direction, &other.direction));
+        [angle, sqrt(self.sigma * self.sigma + other.sigma * other.sigma)]
     }
 
-    /// Returns whether this is a direction.
+    /// Returns whether the direction is a unit vector and the sigma is not negative.
     #[must_use]
     pub fn is_plausible(&self) -> bool {
         libm::fabsf(dot(&self.direction, &self.direction) - 1.0) < 0.01 && self.sigma >= 0.0
@@ -73,11 +75,11 @@ pub struct ForwardEstimator {
     count: f32,
 }
 
-/// Holds the sums of the second under way.
+/// Holds the sums of the current second.
 #[derive(Debug, Clone, Copy)]
 struct Second {
     samples: u32,
-    /// Speed at its begin, m/s.
+    /// Speed at the beginning of the second, m/s.
     begin: f32,
     /// Specific force, m/s^2.
     force: [f32; 3],
@@ -90,12 +92,12 @@ impl Second {
 }
 
 impl ForwardEstimator {
-    /// Starts with nothing shown.
+    /// The state before the first sample.
     pub const START: Self =
         Self { second: Second::EMPTY, before: None, turned: [0.0; 3], force: 0.0, motion: 0.0, count: 0.0 };
 
-    /// Takes a sample in the sensor's axes (`None` while it is silent), the wheels, and the mean specific force at rest,
-    /// which shows where up is. Returns whether it has learnt something.
+    /// Adds a sample in the sensor's axes (`None` while it is silent), the report of the wheels, and the mean
+    /// specific force at rest, which shows the vertical. Returns whether the estimate has changed.
     pub fn add(
         &mut self,
         sample: Option<&ImuSample>,
@@ -127,7 +129,7 @@ impl ForwardEstimator {
     fn end_second(&mut self, end: f32, rest: &[SpecificForce; 3]) -> bool {
         let Second { begin, force, turning, .. } = self.second;
         let rest = metre_per_sec2(rest);
-        let up = scaled(&rest, 1.0 / crate::root::sqrt(dot(&rest, &rest)).max(1.0));
+        let up = scaled(&rest, 1.0 / sqrt(dot(&rest, &rest)).max(1.0));
         let mean = |sums: &[f32; 3]| scaled(sums, 1.0 / RATE_HZ as f32);
         let (force, motion) = (mean(&force), [end - begin, dot(&mean(&turning), &up)]);
         let Some((force_before, [ahead, left])) = self.before.replace((force, motion)) else { return false };
@@ -146,18 +148,18 @@ impl ForwardEstimator {
         true
     }
 
-    /// Returns the direction; `None` before the vehicle has driven for long enough, and where the accelerations
-    /// of sensor and wheels do not belong together.
+    /// Returns the direction; `None` before the vehicle has driven for long enough, and where the accelerations of
+    /// sensor and wheels do not match.
     #[must_use]
     pub fn forward(&self) -> Option<Forward> {
-        let length = crate::root::sqrt(dot(&self.turned, &self.turned));
+        let length = sqrt(dot(&self.turned, &self.turned));
         let gain = length / self.motion;
-        // Not where the gain is not a number, either.
+        // A gain that is not a number is refused, too.
         if self.count < FEWEST || !(PLAUSIBLE[0]..=PLAUSIBLE[1]).contains(&gain) {
             return None;
         }
         let left = (self.force - length * gain).max(0.0) / (2.0 * self.count - 2.0);
-        let sigma = SPREAD * crate::root::sqrt(left / self.motion) / gain;
+        let sigma = SPREAD * sqrt(left / self.motion) / gain;
         Some(Forward { direction: scaled(&self.turned, 1.0 / length), sigma })
     }
 }
@@ -168,14 +170,6 @@ fn mean_speed(wheels: &WheelSample) -> Option<f32> {
     let sum: f32 = known().map(|speed| speed.0 as f32).sum();
     let codes = known().count() << WheelSpeed::FRACTION_BITS;
     (codes > 0).then(|| sum / codes as f32)
-}
-
-fn metre_per_sec2(force: &[SpecificForce; 3]) -> [f32; 3] {
-    force.each_ref().map(|axis| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2)
-}
-
-fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn scaled(vector: &[f32; 3], by: f32) -> [f32; 3] {
@@ -198,8 +192,8 @@ mod tests {
         force.map(|axis| SpecificForce::from_metre_per_sec2(axis).unwrap())
     }
 
-    /// Drives for seconds: speed and yaw rate change in waves. The sensor is turned by `yaw`, rad, to the left of the
-    /// vehicle's axes, or lies on its side. `bump` is added to its second axis.
+    /// Drives for `seconds` with sinusoidal speed and yaw rate. The sensor is turned by `yaw`, rad, to the left of
+    /// the vehicle's axes, or lies on its side. `bump` is added to its second axis.
     fn drive(
         estimator: &mut ForwardEstimator,
         seconds: u32,
@@ -246,7 +240,7 @@ mod tests {
             assert!(found.sigma < 2e-3, "{yaw}: {found:?}");
             let angle = found.yaw(&Rotation::IDENTITY, code(REST));
             assert!((angle + yaw).abs() < 2e-3, "{yaw}: {angle}");
-            // The mounting that is right says so.
+            // The correct mounting leaves no angle.
             let mounting = Rotation::from_mounting(0.0, 0.0, yaw.to_degrees()).unwrap();
             assert!(found.yaw(&mounting, code(REST)).abs() < 2e-3, "{yaw}");
         }

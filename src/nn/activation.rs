@@ -1,12 +1,10 @@
 //! Sigmoid and tanh are tables of straight lines, one word per segment.
 //!
-//! The input is a gate's Q14 value, saturated to 18 bits (+-8); the output is Q15 in the upper
-//! half of a word, as the halfword multiplies of the cell update take it. An entry holds the
-//! line's base in its upper half and the slope in its lower one, and the result is
-//! `entry + slope * fraction`: one load and one multiply-accumulate. (The slope in the lower
-//! half adds less than half an LSB to the base; the table is built knowing that.) Each line is
-//! the chord of its segment moved by half the sagitta, so the error is shared between both
-//! sides.
+//! The input is a gate's Q14 value, saturated to 18 bits (+-8); the output is Q15 in the upper half of a word, as the
+//! halfword multiplies of the cell update expect it. An entry holds the line's base in its upper half and the slope
+//! in its lower one, and the result is `entry + slope * fraction`: one load and one multiply-accumulate. (The slope
+//! in the lower half adds less than half an LSB to the base; the table allows for that.) Each line is the chord of
+//! its segment moved by half the sagitta, so the error is shared between both sides.
 //!
 //! | function | segments | table | largest error over all 262,144 inputs |
 //! |---|---|---|---|

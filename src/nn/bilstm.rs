@@ -1,8 +1,7 @@
 //! This module runs a bidirectional LSTM layer over a whole sequence in resumable pieces.
 //!
-//! Steps are taken in pairs: one input projection serves two of them. The backward direction
-//! takes the pairs, and the steps inside a pair, in reverse. Both start from a zero state, so
-//! the first step has no recurrent product.
+//! Steps run in pairs: one input projection serves two of them. The backward direction runs the pairs, and the steps
+//! inside a pair, in reverse. Both start from a zero state, so the first step has no recurrent product.
 //!
 //! A sequence of an even number of steps with K values each lies in `K / 2` words a step; the
 //! two steps of a pair alternate word by word.
@@ -18,116 +17,116 @@ pub struct Layer<'w> {
     pub backward: DirectionWeights<'w>,
 }
 
-/// Gives the order in which a direction takes its steps.
+/// The order in which a direction runs its steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
-    /// The first step is taken first.
+    /// The first step runs first.
     Forward,
-    /// The last step is taken first.
+    /// The last step runs first.
     Backward,
 }
 
-/// Tracks one direction's pass through a sequence; [`Pass::advance`] takes it some pairs of steps further.
+/// Tracks one direction's pass through a sequence; [`Pass::advance`] runs its next pairs of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pass {
-    way: Direction,
+    direction: Direction,
     done: usize,
 }
 
 impl Pass {
-    /// Begins before the first step.
+    /// Creates the state before the first step.
     #[must_use]
-    pub const fn new(way: Direction) -> Self {
-        Self { way, done: 0 }
+    pub const fn new(direction: Direction) -> Self {
+        Self { direction, done: 0 }
     }
 
-    /// Takes the next pairs of steps, as many as `scratch` has projections for, and hands each step's
-    /// number and hidden state (Q10) to `emit`; returns whether there are more.
+    /// Runs the next pairs of steps, as many as `scratch` has projections for, and passes each step's number and
+    /// hidden state (Q10) to `emit`; returns whether there are more.
     ///
-    /// `input` is the whole sequence. `room` takes the direction's recurrent records for the length of
-    /// the pass, if it has their size ([`DirectionWeights::through`]).
+    /// `input` is the whole sequence. `room` receives a copy of the direction's recurrent records for the pass, if it
+    /// is large enough ([`DirectionWeights::through`]).
     pub fn advance<const U: usize, const W: usize, const P: usize>(
         &mut self,
-        direction: &DirectionWeights<'_>,
+        weights: &DirectionWeights<'_>,
         input: &[u32],
         scratch: &mut Scratch<U, W, P>,
         room: &mut [u32],
         mut emit: impl FnMut(usize, &[u32; W]),
     ) -> bool {
-        let words = direction.inputs();
+        let words = weights.inputs();
         let pairs = input.len().checked_div(words).unwrap_or(0);
-        // Weights that the caller's arrays do not hold have no step; a checked blob has none.
-        if self.done >= pairs || !direction.fits(U) {
+        // Weights that do not fit the caller's arrays run no step; a checked blob has no such weights.
+        if self.done >= pairs || !weights.fits(U) {
             return false;
         }
-        let direction = &direction.through(room, self.done == 0);
+        let weights = &weights.through(room, self.done == 0);
         let Scratch { cell_state, hidden: [even, odd], projection } = scratch;
         let count = (pairs - self.done).min(P);
-        let from = match self.way {
+        let from = match self.direction {
             Direction::Forward => self.done,
             Direction::Backward => pairs - self.done - count,
         };
         let columns = input.get(from * words..(from + count) * words);
         let Some((columns, projection)) = columns.zip(projection.get_mut(..count)) else { return false };
-        lstm::project(direction, columns, projection);
+        lstm::project(weights, columns, projection);
         if self.done == 0 {
             *cell_state = [0; U];
         }
         for k in 0..count {
-            let (pair, [first, second]) = match self.way {
+            let (pair, [first, second]) = match self.direction {
                 Direction::Forward => (k, [0, 1]),
                 Direction::Backward => (count - 1 - k, [1, 0]),
             };
             let Some(projection) = projection.get(pair) else { break };
             let pair = from + pair;
             let previous = (self.done > 0).then_some(&*odd);
-            lstm::step(direction, &projection[first], previous, cell_state, even);
+            lstm::step(weights, &projection[first], previous, cell_state, even);
             emit(2 * pair + first, even);
-            lstm::step(direction, &projection[second], Some(even), cell_state, odd);
+            lstm::step(weights, &projection[second], Some(even), cell_state, odd);
             emit(2 * pair + second, odd);
             self.done += 1;
         }
         self.done < pairs
     }
 
-    /// Runs the first step of a pass alone, for callers that need no other: half a pair. Passes its number and
-    /// hidden state to `emit`.
+    /// Runs only the first step of a pass, half a pair, for callers that need no other. Passes its number and hidden
+    /// state to `emit`.
     pub fn first<const U: usize, const W: usize, const P: usize>(
-        way: Direction,
-        direction: &DirectionWeights<'_>,
+        direction: Direction,
+        weights: &DirectionWeights<'_>,
         input: &[u32],
         scratch: &mut Scratch<U, W, P>,
         emit: impl FnOnce(usize, &[u32; W]),
     ) {
-        let words = direction.inputs();
-        let (pair, first) = match way {
+        let words = weights.inputs();
+        let (pair, first) = match direction {
             Direction::Forward => (0, 0),
             Direction::Backward => (input.len().checked_div(words).unwrap_or(0).saturating_sub(1), 1),
         };
         let Scratch { cell_state, hidden: [hidden, _], projection } = scratch;
         let columns = input.get(pair * words..(pair + 1) * words);
         let Some((columns, projection)) = columns.zip(projection.first_mut()) else { return };
-        lstm::project(direction, columns, core::slice::from_mut(projection));
+        lstm::project(weights, columns, core::slice::from_mut(projection));
         *cell_state = [0; U];
-        lstm::step(direction, &projection[first], None, cell_state, hidden);
+        lstm::step(weights, &projection[first], None, cell_state, hidden);
         emit(2 * pair + first, hidden);
     }
 
-    /// Runs all steps that are left.
+    /// Runs all remaining steps.
     pub fn finish<const U: usize, const W: usize, const P: usize>(
         mut self,
-        direction: &DirectionWeights<'_>,
+        weights: &DirectionWeights<'_>,
         input: &[u32],
         scratch: &mut Scratch<U, W, P>,
         room: &mut [u32],
         mut emit: impl FnMut(usize, &[u32; W]),
     ) {
-        while self.advance(direction, input, scratch, room, &mut emit) {}
+        while self.advance(weights, input, scratch, room, &mut emit) {}
     }
 }
 
-/// Returns the place of word `column / 2` of `step` in a sequence of `columns` values a step.
+/// Returns the index of word `column / 2` of `step` in a sequence of `columns` values a step.
 #[inline]
 #[must_use]
 pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
@@ -137,7 +136,7 @@ pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
 /// Writes a step's hidden state (`units` of it) into a sequence of `columns` values a step,
 /// from column `offset` on: the next layer's input.
 pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, units: usize, hidden: &[u32]) {
-    // The first step of the pair, then the second one, of each word.
+    // Of each word, the value of the pair's first step, then that of the second.
     let pairs =
         sequence.get_mut(word_index(step & !1, offset, columns)..).unwrap_or_default().as_chunks_mut().0;
     let words = pairs.iter_mut().zip(hidden.iter().take(units / 2));
@@ -148,17 +147,17 @@ pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, u
     }
 }
 
-/// Runs a network of two bidirectional layers over one sequence; [`Run::advance`] takes it one bounded piece further:
-/// pairs of steps in one direction of one layer.
+/// Runs a network of two bidirectional layers over one sequence; [`Run::advance`] runs its next bounded piece: pairs
+/// of steps in one direction of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
-    /// Direction at work: 0 and 1 are layer 1 forward and backward, 2 and 3 layer 2.
+    /// Current direction: 0 and 1 are layer 1 forward and backward, 2 and 3 layer 2.
     stage: u8,
     pass: Pass,
 }
 
 impl Run {
-    /// Begins before the first step.
+    /// Creates the state before the first step.
     #[must_use]
     pub const fn new() -> Self {
         Self { stage: 0, pass: Pass::new(Direction::Forward) }
@@ -166,8 +165,8 @@ impl Run {
 
     /// Runs the next piece; returns whether there are more.
     ///
-    /// `input` is the first layer's sequence, `between` takes the second one's, of exactly its length; `room` is as in
-    /// [`Pass::advance`]. `emit` gets layer 2's hidden states: which way, step, state.
+    /// `input` is the first layer's sequence, `between` receives the second layer's and must have exactly its length;
+    /// `room` is as in [`Pass::advance`]. `emit` gets layer 2's hidden states: direction, step, state.
     pub fn advance<const U: usize, const W: usize, const P: usize>(
         &mut self,
         layers: &[Layer<'_>; 2],
@@ -178,9 +177,9 @@ impl Run {
         mut emit: impl FnMut(Direction, usize, &[u32; W]),
     ) -> bool {
         let units = layers[0].forward.units();
-        let (way, offset) =
+        let (direction, offset) =
             if self.stage.is_multiple_of(2) { (Direction::Forward, 0) } else { (Direction::Backward, units) };
-        let [first, second] = layers.each_ref().map(|layer| match way {
+        let [first, second] = layers.each_ref().map(|layer| match direction {
             Direction::Forward => &layer.forward,
             Direction::Backward => &layer.backward,
         });
@@ -188,9 +187,9 @@ impl Run {
             0 | 1 => self.pass.advance(first, input, scratch, room, |step, hidden| {
                 store(between, step, offset, 2 * units, units, hidden);
             }),
-            2 | 3 => {
-                self.pass.advance(second, between, scratch, room, |step, hidden| emit(way, step, hidden))
-            }
+            2 | 3 => self
+                .pass
+                .advance(second, between, scratch, room, |step, hidden| emit(direction, step, hidden)),
             _ => return false,
         };
         if !more {

@@ -1,6 +1,6 @@
 //! The fully-connected layer on top computes the outputs of a step from both directions' hidden states.
 
-/// Weights of one output over `2 H` hidden values, int16, and how its sum is scaled.
+/// The weights of one output over `2 H` hidden values, int16, and the scaling of its sum.
 #[derive(Debug, Clone, Copy)]
 pub struct Dense<'w> {
     /// Weights of the forward half, then of the backward half.
@@ -19,16 +19,16 @@ impl Dense<'_> {
 
     /// Returns the part of the sum that one direction's hidden state gives; add both and the bias.
     ///
-    /// `hidden` holds two units a word. The sum stays inside 32 bits: [`crate::model::Blob`]
-    /// proves it for the weights at hand.
+    /// `hidden` holds two units a word. The sum stays inside 32 bits: [`crate::model::Blob`] proves it for the
+    /// weights in use.
     #[must_use]
     pub fn partial(weights: &[i16], hidden: &[u32]) -> i32 {
-        // Halfwords, as a multiply-accumulate of the processor takes them: no unpacking.
+        // Halfwords, as the processor's multiply-accumulate reads them: no unpacking.
         let hidden: &[i16] = bytemuck::must_cast_slice(hidden);
         weights.iter().zip(hidden).fold(0, |sum: i32, (w, h)| sum.wrapping_add(i32::from(*w) * i32::from(*h)))
     }
 
-    /// Returns the scaled output of a whole sum (bias included), rounded to nearest, saturated.
+    /// Returns the scaled output of a complete sum (bias included), rounded to nearest, saturated.
     #[must_use]
     pub fn scale(&self, sum: i32) -> i32 {
         let product = i64::from(sum) * i64::from(self.multiplier) + (1 << (Self::SHIFT - 1));

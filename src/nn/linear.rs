@@ -14,7 +14,7 @@ impl<'w> Linear<'w> {
     /// The magnitudes of a row must not add up to more than this, so that no inputs can overflow a sum of 64 bits.
     pub const ROW_LIMIT: u64 = u32::MAX as u64;
 
-    /// Takes rows of `inputs` weights as they lie in a weight file.
+    /// Creates a layer over rows of `inputs` weights, in the layout of a weight file.
     ///
     /// # Errors
     /// The number of the first row that some inputs could overflow.

@@ -1,10 +1,9 @@
 //! This module computes one LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
 //!
-//! The portable code here is the definition of the result (formats and packing: [`crate::nn`]).
-//! Where the processor has a faster way (`nn/simd/`), [`project`] and [`step`] take it; the
-//! bits are the same.
+//! The portable code here is the definition of the result (formats and packing: [`crate::nn`]). Where the processor
+//! has a faster kernel (`nn/simd/`), [`project`] and [`step`] use it; the bits are the same.
 //!
-//! Weights lie in the order in which they are read. With K inputs and U units:
+//! Weights are stored in the order in which they are read. With K inputs and U units:
 //!
 //! - input record of a unit, 4 + K words: the accumulators that its bias starts from, then for
 //!   each pair of columns the packed words of gates (i, f) and (g, o);
@@ -52,7 +51,7 @@ impl<'w> DirectionWeights<'w> {
         units.next_multiple_of(4)
     }
 
-    /// Takes records as they lie in a weight file; `None` unless `units` and `inputs` are even
+    /// Creates a direction over records in the layout of a weight file; `None` unless `units` and `inputs` are even
     /// and not zero, `inputs` at most [`MAX_INPUTS`], and the lengths fit them.
     #[must_use]
     pub const fn new(units: usize, inputs: usize, input: &'w [u32], recurrent: &'w [u32]) -> Option<Self> {
@@ -74,8 +73,8 @@ impl<'w> DirectionWeights<'w> {
         self.units
     }
 
-    /// Returns whether arrays of `room` units hold the units: all of them, or fewer in whole groups of four, as the
-    /// hidden state is read.
+    /// Returns whether arrays for `room` units fit the direction: it has `room` units, or fewer in whole groups of
+    /// four, because the hidden state is read in such groups.
     #[must_use]
     pub const fn fits(&self, room: usize) -> bool {
         self.units == room || self.units < room && self.units.is_multiple_of(4)
@@ -99,8 +98,8 @@ impl<'w> DirectionWeights<'w> {
         self.recurrent
     }
 
-    /// Returns the same direction with its recurrent records in `room`; with `load` it copies them there, without it an
-    /// earlier call has. If they do not fit, they are read in place.
+    /// Returns the same direction with its recurrent records in `room`. `load` copies them there; without it, an
+    /// earlier call must have done so. Records that do not fit are read in place.
     ///
     /// A step reads every record once. In memory without wait states the copy pays for itself in two or three steps.
     #[must_use]
@@ -128,13 +127,13 @@ impl<'w> DirectionWeights<'w> {
 }
 
 /// Holds state and scratch of one direction with up to `U` units, in `W` words of hidden state, with room for the
-/// projections of `P` pairs of steps. A direction of fewer units, a multiple of four, takes the first places of each
+/// projections of `P` pairs of steps. A direction of fewer units, a multiple of four, uses the first elements of each
 /// array.
 #[derive(Debug, Clone)]
 pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     /// Cell state, Q20.
     pub cell_state: [i32; U],
-    /// Hidden state before and after a step, Q10, two units a word; the two take turns.
+    /// Hidden state before and after a step, Q10, two units a word; the two alternate.
     pub hidden: [[u32; W]; 2],
     /// Input projections of consecutive steps.
     pub projection: [Projection<U>; P],
@@ -156,17 +155,13 @@ impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
 /// `x` holds the inputs of all pairs; the two steps of a pair alternate word by word, and a pair has as many words as
 /// the direction has inputs.
 ///
-/// Does nothing when `x` does not fit the direction, or `U` does not hold its units: that is a defect of the caller, at
-/// which debug builds stop.
-pub fn project<const U: usize>(
-    direction: &DirectionWeights<'_>,
-    x: &[u32],
-    projection: &mut [Projection<U>],
-) {
-    let fits = x.len() == direction.inputs * projection.len() && direction.fits(U);
+/// Does nothing when `x` does not fit the direction, or `U` does not fit its units. That is a bug of the caller, at
+/// which debug builds panic.
+pub fn project<const U: usize>(weights: &DirectionWeights<'_>, x: &[u32], projection: &mut [Projection<U>]) {
+    let fits = x.len() == weights.inputs * projection.len() && weights.fits(U);
     debug_assert!(fits);
     if fits {
-        simd::project(direction, x, projection);
+        simd::project(weights, x, projection);
     }
 }
 
@@ -175,18 +170,18 @@ pub fn project<const U: usize>(
 /// `projection` belongs to this step. `previous` is the hidden state before it; `None` for the
 /// zero state that a sequence starts from.
 ///
-/// Does nothing when `U` or `W` does not hold the direction's units, as [`project`].
+/// Does nothing when `U` or `W` does not fit the direction's units, as [`project`].
 pub fn step<const U: usize, const W: usize>(
-    direction: &DirectionWeights<'_>,
+    weights: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
-    let fits = direction.fits(U) && 2 * W == DirectionWeights::padded(U);
+    let fits = weights.fits(U) && 2 * W == DirectionWeights::padded(U);
     debug_assert!(fits);
     if fits {
-        simd::step(direction, projection, previous, cell_state, hidden);
+        simd::step(weights, projection, previous, cell_state, hidden);
     }
 }
 
@@ -199,21 +194,21 @@ fn accumulate(acc: &mut Accumulators, rows: &[u32], x: impl Iterator<Item = u32>
             let (w0, w1) = unpack(*word);
             let low = i32::from(w0 as i8) * x0 + i32::from(w1 as i8) * x1;
             acc[2 * pair] = acc[2 * pair].wrapping_add(low);
-            // Sums may wrap on the way; the row bound makes the final difference exact.
+            // Intermediate sums may wrap; the row bound makes the final difference exact.
             acc[2 * pair + 1] = acc[2 * pair + 1].wrapping_add(w0 * x0).wrapping_add(w1 * x1);
         }
     }
 }
 
-/// Computes [`project`] as it is defined.
+/// Computes [`project`] in portable code, which defines the result.
 pub fn project_portable<const U: usize>(
-    direction: &DirectionWeights<'_>,
+    weights: &DirectionWeights<'_>,
     x: &[u32],
     projection: &mut [Projection<U>],
 ) {
-    for (x, projection) in x.chunks_exact(direction.inputs.max(1)).zip(projection) {
+    for (x, projection) in x.chunks_exact(weights.inputs.max(1)).zip(projection) {
         for (step, projection) in projection.iter_mut().enumerate() {
-            for ((bias, rows), acc) in direction.input_records().zip(projection) {
+            for ((bias, rows), acc) in weights.input_records().zip(projection) {
                 *acc = core::array::from_fn(|k| bias[k] as i32);
                 accumulate(acc, rows, x.iter().skip(step).step_by(2).copied());
             }
@@ -221,15 +216,15 @@ pub fn project_portable<const U: usize>(
     }
 }
 
-/// Computes [`step`] as it is defined.
+/// Computes [`step`] in portable code, which defines the result.
 pub fn step_portable<const U: usize, const W: usize>(
-    direction: &DirectionWeights<'_>,
+    weights: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
-    let units = direction.recurrent_records().zip(projection).zip(cell_state).enumerate();
+    let units = weights.recurrent_records().zip(projection).zip(cell_state).enumerate();
     for (unit, (((rows, multipliers), projection), cell_state)) in units {
         let mut acc = *projection;
         if let Some(previous) = previous {
@@ -241,7 +236,7 @@ pub fn step_portable<const U: usize, const W: usize>(
     }
 }
 
-/// Puts one unit's hidden state into its half of the word.
+/// Writes one unit's hidden state into its half of the word.
 #[inline]
 fn set_hidden(hidden: &mut [u32], unit: usize, h: i16) {
     let word = &mut hidden[unit / 2];
@@ -289,13 +284,13 @@ fn upper(word: i32) -> i32 {
 /// Returns the largest magnitude that the accumulators of one unit can reach, for inputs up to `input_max` and any
 /// hidden state: rows i, f, g, o.
 #[must_use]
-pub fn row_bound(direction: &DirectionWeights<'_>, unit: usize, input_max: i32) -> [i64; GATES] {
+pub fn row_bound(weights: &DirectionWeights<'_>, unit: usize, input_max: i32) -> [i64; GATES] {
     let mut bound = [0i64; GATES];
-    let records = direction.input_records().nth(unit).zip(direction.recurrent_records().nth(unit));
+    let records = weights.input_records().nth(unit).zip(weights.recurrent_records().nth(unit));
     let Some(((bias, input), (recurrent, _))) = records else { return bound };
     for (bound, [low, packed]) in bound.as_chunks_mut::<2>().0.iter_mut().zip(bias.as_chunks::<2>().0) {
         let (low, packed) = (*low as i32, *packed as i32);
-        // 256 times the high row's bias, modulo 2^32: all of it, where it is below 2^23.
+        // 256 times the high row's bias, modulo 2^32: exact where it is below 2^23.
         *bound = [i64::from(low).abs(), i64::from(packed.wrapping_sub(low) >> 8).abs()];
     }
     for (rows, max) in [(input, input_max), (recurrent, super::HIDDEN_MAX)] {

@@ -1,4 +1,4 @@
-//! The pipeline's configuration is a plain value apart from the pipeline's state; it holds everything that can be set.
+//! The pipeline's configuration is a plain value, separate from the pipeline's state.
 
 use crate::bias::{BiasCurve, EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
@@ -6,7 +6,7 @@ use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::uncertainty::UncertaintyConfig;
 use crate::units::SpecificForce;
 
-/// Holds all settings of the way from sample to rate.
+/// Holds all settings of the pipeline.
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineConfig {
     /// The rotation of the board in the vehicle.
@@ -15,7 +15,7 @@ pub struct PipelineConfig {
     pub bias_curve: BiasCurve,
     /// Mean specific force at standstill, in the sensor's axes, where earlier drives have shown it.
     pub rest_force: Option<[SpecificForce; 3]>,
-    /// The gain and the rest of the mounting of this unit's gyro.
+    /// The correction of the gain and of the remaining mounting error of this unit's gyro.
     pub gyro_map: GyroMap,
     /// The condition under which the accelerometer corrects the mounting.
     pub levelling: Levelling,

@@ -1,4 +1,4 @@
-//! These types hold what one sample gives: the rates to send, and the window to run.
+//! These types hold the results of one sample: the rates to send, and the window to run.
 
 use crate::bias::StaticError;
 use crate::compensate::{Implausible, Settled};
@@ -12,7 +12,8 @@ use crate::units::Yaw;
 pub struct Owed {
     /// Missing from the prompt yaw: revisions that have not been carried over yet.
     pub prompt: Yaw,
-    /// Missing from the navigation yaw: such revisions, and the samples whose rates are not sent yet.
+    /// Missing from the navigation yaw: revisions that have not been carried over yet, and the samples whose rates
+    /// are not sent yet.
     pub navigation: Yaw,
 }
 

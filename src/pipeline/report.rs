@@ -1,5 +1,4 @@
-//! This module makes the sent estimates from compensated rates: yaw, uncertainty, status, faults, the other
-//! axes.
+//! This module builds the sent estimates from compensated rates: yaw, uncertainty, status, faults, the other axes.
 
 use super::{Pipeline, Rates};
 use crate::bias::ZeroRate;
@@ -10,7 +9,7 @@ use crate::sample::{Frame, ImuSample, PERIOD_US, Validity};
 use crate::units::{AngularRate, Yaw};
 
 impl Pipeline {
-    /// Makes the message set of a sample.
+    /// Builds the message set of a sample.
     #[inline(never)]
     pub(super) fn report(&mut self, frame: &Frame, rates: &Rates) -> VehicleSample {
         self.state.tick = frame.tick;
@@ -42,8 +41,8 @@ impl Pipeline {
         }
     }
 
-    /// Makes the message set of a silent sensor, `steps` grid steps after the last one: no rate, no force, and the yaw
-    /// as it stands.
+    /// Builds the message set of a silent sensor, `steps` grid steps after the last one: no rate, no force, and the
+    /// yaw unchanged.
     #[must_use]
     pub fn silent(&mut self, steps: u32) -> VehicleSample {
         self.state.tick = self.state.tick.wrapping_add(steps);
@@ -80,8 +79,8 @@ impl Pipeline {
             .with(self.state.board.faults())
     }
 
-    /// Makes the estimate of one rate; until a rate exists it carries the gyro's own reading, with the sigma that its bias
-    /// has by the table, where there is one.
+    /// Builds the estimate of one rate. Until a rate exists the estimate carries the gyro's own reading, with the
+    /// sigma of the bias curve where there is one.
     fn estimate(
         &mut self,
         frame: &Frame,
@@ -119,7 +118,7 @@ impl Pipeline {
             source,
             quality: self.state.board.cap_quality(quality),
             faults: Faults::NONE,
-            // From sample to sample: the pipeline has no clock to add its own time by.
+            // From sample to sample: the pipeline has no clock to measure its own time.
             latency_us: Some(frame.tick.wrapping_sub(tick).saturating_mul(PERIOD_US as u32)),
         }
     }

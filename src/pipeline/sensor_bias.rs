@@ -1,5 +1,5 @@
-//! The pipeline subtracts the bias that earlier drives have shown at the sensor's temperature from each reading, before
-//! anything else sees it. With it the rate can be used before the vehicle has stood.
+//! This module subtracts from each reading the bias that earlier drives have shown at the sensor's temperature,
+//! before any other stage. So the rate can be used before the vehicle has stood.
 
 use super::PipelineConfig;
 use crate::bias::CurveBias;
@@ -7,9 +7,10 @@ use crate::mounting::{Rotation, is_moved};
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
-/// A sensor that has seemed to be moved for so many seconds was: no braking is so hard for so long.
+/// A sensor counts as moved after this many seconds that suggest it: no braking is so hard for so long.
 const MOVED_SECONDS: u32 = 4;
-/// Each second the temperature in use goes this part of the way to the measured one: a wrong reading moves the bias little.
+/// Each second the temperature in use changes by this part of its difference to the measured one, so that a wrong
+/// reading changes the bias little.
 const SMOOTHING: f32 = 0.125;
 
 /// Holds the sensor's temperature and its bias there.
@@ -20,7 +21,8 @@ pub(super) struct SensorBias {
     /// The samples until the next second.
     wait: u32,
     newest: Option<CurveBias>,
-    /// The part of it that static initialisation has found already, because the first temperature came after it.
+    /// The part of the bias that static initialisation has already found, if the first temperature was reported after
+    /// it.
     found: [AngularRate; 3],
     /// The temperature at which the zero-rate updates have found the rest of the bias, deg C, and the sigma of its change
     /// since then, rad/s.
@@ -31,7 +33,8 @@ pub(super) struct SensorBias {
     early: Option<(Rotation, [SpecificForce; 3])>,
     /// Specific force of this second, codes, and its good samples.
     force: ([i64; 3], i64),
-    /// The last seconds' mean has shown that the sensor was not moved since; the seconds since it last has.
+    /// Whether the last seconds show that the sensor was not moved since, and the seconds in a row that show that it
+    /// was.
     in_place: bool,
     elsewhere: u32,
 }
@@ -51,9 +54,9 @@ impl SensorBias {
         elsewhere: 0,
     };
 
-    /// Subtracts the curve's bias from a reading in the sensor's axes; `initialised`: static initialisation has been done.
-    /// Returns whether this is the first reading that it is subtracted from: static initialisation must not mix it with
-    /// those before.
+    /// Subtracts the curve's bias from a reading in the sensor's axes; `initialised` is true after static
+    /// initialisation. Returns whether this is the first reading that a bias is subtracted from: static
+    /// initialisation must not mix it with earlier readings.
     pub(super) fn subtract(
         &mut self,
         sample: &mut ImuSample,
@@ -82,7 +85,8 @@ impl SensorBias {
         !before
     }
 
-    /// Compares a second's mean specific force with that of earlier drives: a single sample shows bumps and braking.
+    /// Compares a second's mean specific force with that of earlier drives: a single sample also shows bumps and
+    /// braking.
     fn end_second(&mut self) {
         let (sums, count) = core::mem::take(&mut self.force);
         let Some((_, before)) = self.early.filter(|_| count > 0) else { return };

@@ -5,6 +5,7 @@
 //! independent: the network's, from the error that it predicts for its windows ([`crate::model::Estimate::scale`]), and
 //! the bias's, from the zero-rate updates.
 
+use crate::sqrt::sqrt;
 use crate::units::AngularRate;
 
 /// Holds the factors that turn the network's predicted error into the error over a second.
@@ -33,13 +34,13 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Begins before the first window.
+    /// Creates the state before the first window.
     #[must_use]
     pub const fn new(config: UncertaintyConfig) -> Self {
         Self { config, scale_square: None }
     }
 
-    /// Takes the error that the network predicts for a window.
+    /// Adds the error that the network predicts for a window.
     pub fn window(&mut self, scale: AngularRate) {
         let scale = scale.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         let square = scale * scale;
@@ -48,7 +49,7 @@ impl Uncertainty {
     }
 
     /// Returns the sigma of a rate, rounded up, from the `bias` sigma in rad/s; a rate not `corrected` by the network
-    /// has the fixed one.
+    /// has a fixed sigma in place of the network's.
     #[must_use]
     pub fn sigma(&self, corrected: bool, bias: f32) -> AngularRate {
         let UncertaintyConfig { per_scale, uncorrected } = self.config;
@@ -56,7 +57,7 @@ impl Uncertainty {
             Some(scale_square) if corrected => per_scale * per_scale * scale_square,
             _ => uncorrected * uncorrected,
         };
-        let sigma = crate::root::sqrt(own + bias * bias);
+        let sigma = sqrt(own + bias * bias);
         // Beyond the code's range the cast saturates.
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
     }

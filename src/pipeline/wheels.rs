@@ -1,4 +1,4 @@
-//! The pipeline needs two facts of the wheels: whether the vehicle stands, and whether a wheel has fallen silent.
+//! The pipeline needs two facts about the wheels: whether the vehicle stands, and whether a wheel has become silent.
 
 use crate::sample::{Standstill, WHEELS, WheelSample};
 
@@ -11,10 +11,10 @@ pub(super) struct Wheels {
 }
 
 impl Wheels {
-    /// Starts before the first report.
+    /// The state before the first report.
     pub const START: Self = Self { newest: None, seen: [false; WHEELS] };
 
-    /// Takes a report.
+    /// Stores a report.
     pub fn update(&mut self, wheels: WheelSample) {
         for (seen, speed) in self.seen.iter_mut().zip(&wheels.speeds) {
             *seen |= speed.is_some();

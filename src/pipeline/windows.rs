@@ -19,7 +19,7 @@ pub(super) struct Windows {
 }
 
 impl Windows {
-    /// Starts without a sample and without a window handed out.
+    /// The state without a sample and without a window handed out.
     pub const START: Self =
         Self { window: Window::EMPTY, since: 0, out: None, accepted: false, faults: Faults::NONE };
 
@@ -47,7 +47,7 @@ impl Windows {
         Some(DueWindow { end: tick, features })
     }
 
-    /// Takes the estimate of the window handed out; returns false if `end` names no window that waits for one.
+    /// Accepts the estimate of the window handed out; returns false if `end` names no window that waits for one.
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
         match &mut self.out {
             Some((due, slot @ None)) if *due == end => {
@@ -58,7 +58,8 @@ impl Windows {
         }
     }
 
-    /// Returns the estimate that is due at this tick: `Some(None)` if it has not come in time, `None` if none is due.
+    /// Returns the estimate that is due at this tick: `Some(None)` if it did not arrive in time, `None` if none is
+    /// due.
     pub fn take_estimate(&mut self, tick: u32, delay: u32) -> Option<Option<Estimate>> {
         let (_, estimate) = self.out.take_if(|(end, _)| tick.wrapping_sub(*end) >= delay)?;
         Some(estimate)

@@ -1,14 +1,14 @@
-//! These modules simulate the sensors that a vehicle may have, byte by byte.
+//! These modules simulate the sensor parts that a vehicle may have, byte by byte.
 //!
-//! A recording goes through the bytes of a part: its samples are encoded as the part would send them and read back by
-//! the parser that the board runs. The fault campaign damages the same bytes.
+//! The samples of a recording are encoded as the part would send them, and decoded by the parser that the board runs.
+//! The fault campaign corrupts the same bytes.
 //!
 //! | part | what is sent | what is rounded |
 //! |---|---|---|
-//! | Xsens MTi | an MTData2 message a row, single precision | nothing: every code is an f32 |
-//! | KVH DSP-1760 | ten increments a row about each axis; accelerometer as recorded | f32 increments, the code of their sum |
-//! | ICM-42688-P | a 20-bit FIFO packet a row, over a simulated SPI bus | 1/131 deg/s, 1/8192 g |
-//! | ADIS16465-2 | a burst a row, over a simulated SPI bus | 1/40 deg/s, 1/4000 g |
+//! | Xsens MTi | one MTData2 message per row, single precision | nothing: every code is an f32 |
+//! | KVH DSP-1760 | ten increments per row about each axis; accelerometer as recorded | f32 increments, the code of their sum |
+//! | ICM-42688-P | one 20-bit FIFO packet per row, over a simulated SPI bus | 1/131 deg/s, 1/8192 g |
+//! | ADIS16465-2 | one burst per row, over a simulated SPI bus | 1/40 deg/s, 1/4000 g |
 
 pub(crate) mod adis16465;
 pub mod compare;
@@ -20,7 +20,7 @@ use crate::drive::recording::{Recording, Row};
 use gyronet::sample::ImuSample;
 use gyronet::units::{AngularRate, SpecificForce};
 
-/// Names a sensor of the vehicle.
+/// A sensor part of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Part {
@@ -41,7 +41,7 @@ impl std::fmt::Display for Part {
     }
 }
 
-/// Holds the steps to which a part's readings are rounded; 0 without rounding.
+/// The steps to which a part's readings are rounded; 0 without rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Quantisation {
     /// Step of the rate, rad/s.
@@ -50,11 +50,11 @@ pub struct Quantisation {
     pub force: f64,
 }
 
-/// The reason why a recording does not pass through a part.
+/// The reason why a recording cannot be sent through a part.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ViaError {
-    /// A row's bytes gave no sample.
+    /// The bytes of a row gave no sample.
     #[error("{path}: line {line}: the {part} delivers no sample: {why}")]
     NoSample {
         /// The recording.
@@ -76,14 +76,14 @@ pub enum ViaError {
     },
 }
 
-/// Holds a recording that has passed through a part.
+/// A recording that was sent through a part.
 #[derive(Debug, Clone)]
 pub struct Via {
     /// The rows with the samples that the part's parser delivered.
     pub recording: Recording,
-    /// The part's steps.
+    /// The rounding of the part's readings.
     pub quantisation: Quantisation,
-    /// Bytes that the parser was given.
+    /// Number of bytes that the parser received.
     pub bytes: u64,
 }
 
@@ -121,8 +121,7 @@ impl Part {
         })
     }
 
-    /// Returns the steps of the part's readings in this recording: those of the part itself, of our codes and of f32 at
-    /// the largest rate.
+    /// Returns the rounding of the part's readings in this recording: the part's steps, our codes, and f32.
     fn quantisation(self, recording: &Recording) -> Quantisation {
         let rates = recording.rows.iter().flat_map(|row| row.sample.angular_rate);
         let peak = rates.map(|rate| rate.rad_per_sec().abs()).fold(0.0, f64::max);
@@ -133,9 +132,9 @@ impl Part {
         let ulp = f64::from(f32::EPSILON);
         match self {
             Self::Xsens => Quantisation::default(),
-            // The increment is rounded once; ten equal ones have equal errors.
+            // An increment is rounded once; ten equal increments have equal errors.
             Self::Dsp1760 => Quantisation { rate: rate_code + ulp * peak, force: 0.0 },
-            // The driver divides and multiplies in f32: two more roundings.
+            // The driver divides and multiplies in f32, which adds two roundings.
             Self::Icm42688 => Quantisation {
                 rate: icm42688::RATE_STEP + rate_code + 3.0 * ulp * peak,
                 force: icm42688::FORCE_STEP + force_code + 3.0 * ulp * peak_force,
@@ -162,5 +161,5 @@ pub fn mti_bytes(recording: &Recording) -> Vec<Vec<u8>> {
     xsens::messages(recording).collect()
 }
 
-/// Holds the sample of each row from a part, and the number of bytes that they took.
+/// The sample of each row from a part, and the number of bytes that were sent.
 type Sent = (Vec<ImuSample>, u64);

@@ -98,7 +98,7 @@ fn duplicates_and_steps_back_leave_the_grid() {
     assert_eq!(place(&mut aligner, 2_004_000), Err(AlignError::OffGrid { last, at: Micros(2_004_000) }));
     assert_eq!(place(&mut aligner, 2_010_000), Ok((1, 0)));
     let text = |error: AlignError| error.to_string();
-    assert_eq!(text(AlignError::Duplicate { at }), "the sample of 1990000 us has come twice");
+    assert_eq!(text(AlignError::Duplicate { at }), "duplicate sample at 1990000 us");
     assert_eq!(text(AlignError::Backwards { last, at }), "time goes backwards, from 2000000 to 1990000 us");
 }
 

@@ -228,11 +228,11 @@ fn every_flipped_bit_is_noticed() {
 #[test]
 fn refusals_say_why() {
     for (error, text) in [
-        (BlobError::Magic(*b"ELF!"), "this is none, it begins with [45, 4c, 46, 21], not [47, 59, 52, 4e]"),
-        (BlobError::Version { found: 2, expected: 3 }, "format version 2, this reads 3"),
+        (BlobError::Magic(*b"ELF!"), "it begins with [45, 4c, 46, 21], should be [47, 59, 52, 4e]"),
+        (BlobError::Version { found: 2, expected: 3 }, "format version 2, should be 3"),
         (BlobError::Length { expected: 10, found: 9 }, "9 bytes, should be 10"),
         (BlobError::Misaligned, "not on a 4-byte boundary"),
-        (BlobError::Crc { computed: 1, stored: 0xABCD }, "checksum is 00000001, the file says 0000abcd"),
+        (BlobError::Crc { computed: 1, stored: 0xABCD }, "checksum is 00000001, the file has 0000abcd"),
         (BlobError::Provenance, "provenance is not UTF-8"),
         (BlobError::Scale, "input clamp or output scale out of range"),
         (
@@ -245,7 +245,7 @@ fn refusals_say_why() {
              (1: 10, 6, 60, 2, 10, or fewer units in steps of 4, or no linear outputs)",
         ),
         (BlobError::LinearBound { output: 9 }, "output 9 of the linear part could overflow its accumulator"),
-        (BlobError::Units { found: 60, largest: 16 }, "60 units a direction, there is memory for 16"),
+        (BlobError::Units { found: 60, largest: 16 }, "60 units a direction, memory holds 16"),
     ] {
         assert_eq!(error.to_string(), format!("weight file: {text}"));
     }

@@ -76,7 +76,7 @@ fn a_network_whose_weights_are_gone_is_left_out_at_once_and_reported() {
     let mut fog = with_fognet(true);
     let sent = run(&mut fog, 1..301, |_| true);
     assert_eq!(sent.last().map(|yaw| yaw.source), Some(Source::FogNet));
-    fog.network_gone();
+    fog.fognet_unavailable();
     let late = fog.counters().late;
     let sent = run(&mut fog, 301..701, |_| true);
     let without = (Source::EarthRate, Quality::Degraded, Faults::STORED);
@@ -153,7 +153,7 @@ fn a_gyro_that_is_expected_is_missed_from_the_start() {
     let mut fog = with_fognet(true);
     assert_eq!(run(&mut fog, 0..101, |_| false), []);
     let mut fog = with_fognet(true);
-    fog.expect(Micros(0));
+    fog.start_without_sample(Micros(0));
     let sent = run(&mut fog, 0..501, |step| step > 100);
     // Step 0 is due 10 ms on; each of silence is no rate.
     assert_eq!(sent.len(), 501);

@@ -1,7 +1,7 @@
 //! A real DSP-1760, on a car of KAIST Urban: increments through the part's bytes, the parser, the
 //! 100 Hz grid and the CAN messages. Wants the recordings.
 
-use gyronet::align::streams::{Fitted, Streams};
+use gyronet::align::fog_grid::FogGrid;
 use gyronet::can::config::{BoschSettings, Config, E2e, Settings};
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::yaw::AngleMessage;
@@ -42,17 +42,17 @@ fn bytes(increments: &[f64]) -> impl Iterator<Item = (Micros, Vec<u8>)> {
 /// Returns the angle of each step of the grid, as the board finds it.
 fn turns(increments: &[f64]) -> Vec<Angle> {
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
-    let mut streams = Streams::new(Fitted { imu: false, fog: true });
+    let mut grid = FogGrid::START;
     let mut turns = Vec::new();
     for (now, message) in bytes(increments) {
         for byte in message {
             part.receive(byte);
             while let Some(sample) = part.next_sample() {
-                streams.add_fog(now, sample.expect("intact")).expect("in time");
+                grid.add(now, sample.expect("intact")).expect("in time");
             }
         }
-        while let Some(step) = streams.next_step(now) {
-            let [.., yaw] = step.fog.angle;
+        while let Some(step) = grid.next_step(now) {
+            let [.., yaw] = step.turn.angle;
             turns.push(yaw.expect("the axis is good"));
         }
     }

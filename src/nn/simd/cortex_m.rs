@@ -1,10 +1,9 @@
 //! This is the kernel for Cortex-M with the DSP extension (M4, M7, M33 and up), in assembly.
 //!
 //! # Where the work is
-//! A GyroNet window is 1.12 million multiply-accumulates (1.18 by its shape, but the first step has
-//! no recurrent product), 54 % of them in input projections and 46 % in recurrent products. SMLAD
-//! does two in a cycle; the rest is getting int8 weights into its halfwords. Two rows share a
-//! halfword ([`crate::nn`]), which makes it
+//! A GyroNet window is 1.12 million multiply-accumulates (1.18 by its shape, but the first step has no recurrent
+//! product), 54 % of them in input projections and 46 % in recurrent products. SMLAD does two in a cycle; the rest is
+//! unpacking int8 weights into its halfwords. Two rows share a halfword ([`crate::nn`]), which costs
 //!
 //! | per column pair | instructions | cycles |
 //! |---|---|---|
@@ -14,34 +13,32 @@
 //! | SMLAD over the low rows | 2 for each step | 2 |
 //!
 //! # Two shapes
-//! [`project`] knows its inputs beforehand, so it takes two steps at once: 4 rows x 2 steps, 16
-//! multiply-accumulates for 14 instructions and 15 cycles. That is as many as the registers
-//! hold: 8 accumulators, 2 words of weights, 2 of columns, 2 pointers. [`step`] must wait for
-//! the state before it: 4 rows x 1 step, two column pairs at a time, 16 multiply-accumulates
-//! for 18 instructions and 19 cycles; its 4 rows are one unit's gates, so the unit is finished
-//! on the spot and no gate is ever stored. (8 rows would save an eighth of the recurrent
-//! cycles, but their accumulators and weights do not fit beside the pointers.)
+//! [`project`] has its inputs beforehand, so it computes two steps at once: 4 rows x 2 steps, 16 multiply-accumulates
+//! for 14 instructions and 15 cycles. That is as many as the registers hold: 8 accumulators, 2 words of weights, 2 of
+//! columns, 2 pointers. [`step`] must wait for the previous state: 4 rows x 1 step, two column pairs at a time, 16
+//! multiply-accumulates for 18 instructions and 19 cycles; its 4 rows are one unit's gates, so the unit is finished
+//! on the spot and no gate is ever stored. (8 rows would save an eighth of the recurrent cycles, but their
+//! accumulators and weights do not fit beside the pointers.)
 //!
-//! Loads stand side by side, since they are pipelined (Cortex-M4 TRM 3.3.2), and go to low registers,
-//! so that they take two bytes: a load through a pointer that stands 4 bytes before its words reaches
-//! 30 of them so. The last one through each pointer moves it on.
+//! Loads are adjacent, since they are pipelined (Cortex-M4 TRM 3.3.2), and use low registers, so that they need two
+//! bytes. Through a pointer 4 bytes before its words such loads reach 30 words. The last load through each pointer
+//! advances it.
 //!
 //! # As small as the cache
-//! Flash is read in lines of 16 bytes, six cycles each on an STM32F405 at 168 MHz, and its accelerator
-//! holds 64 of them (RM0090 3.5.2). Inner loops are unrolled [`PROJECT_UNROLL`] and [`STEP_UNROLL`]
-//! times, so that each kernel fits in four fifths of that with the loop around it: only weights are
-//! read from flash, and those of several pairs of steps once. Loops are entered in the middle where the
-//! columns do not divide by the unrolling. Where a loop reads weights from flash, it begins in the middle
-//! of a line: the load that misses comes last in its line, when the prefetch of the next one is over.
-//! No branch depends on data: the count of instructions is the same for all inputs.
+//! Flash is read in lines of 16 bytes, six cycles each on an STM32F405 at 168 MHz, and its accelerator holds 64 of
+//! them (RM0090 3.5.2). Inner loops are unrolled [`PROJECT_UNROLL`] and [`STEP_UNROLL`] times, so that each kernel
+//! and the loop around it fit in four fifths of that: only weights are read from flash, and for several pairs of
+//! steps only once. Loops are entered in the middle where the number of columns is not a multiple of the unrolling.
+//! Where a loop reads weights from flash, it begins in the middle of a line: the load that misses is the last one in
+//! its line, when the prefetch of the next line has ended. No branch depends on data: the count of instructions is
+//! the same for all inputs.
 //!
 //! # A unit's end
-//! Sums to gate inputs: SMULWB/SMULWT with 16-bit multipliers, SSAT to 18 bits. A gate: table
-//! word by the upper bits, SMLABB by the lower ones. Cell state: SMULWT, SMULTT, QDADD. About
-//! 50 instructions and 70 cycles for four gates, cell, hidden state and the turn to the next
-//! unit.
+//! Sums to gate inputs: SMULWB/SMULWT with 16-bit multipliers, SSAT to 18 bits. A gate: table word by the upper bits,
+//! SMLABB by the lower ones. Cell state: SMULWT, SMULTT, QDADD. About 50 instructions and 70 cycles for four gates,
+//! cell, hidden state and the jump to the next unit.
 //!
-//! # Expected and got
+//! # Expected and modelled cycles
 //! Modelled cycles per multiply-accumulate (`cargo bench-target`):
 //!
 //! | kernel | multiply-accumulates | inner loop alone | zero wait states | flash at 5 |
@@ -58,8 +55,8 @@ use crate::nn::lstm::{Accumulators, BIAS_WORDS, DirectionWeights, MAX_INPUTS, Pr
 use core::arch::naked_asm;
 use core::mem::MaybeUninit;
 
-/// Names a core that has the extension, where the architecture has it as an option: the code of
-/// a naked function is assembled without the compiler's target features.
+/// Names a core that has the extension, where it is optional in the architecture: the code of a naked function is
+/// assembled without the compiler's target features.
 #[cfg(gyronet_armv8m)]
 macro_rules! cpu {
     () => {
@@ -85,9 +82,9 @@ const STEP_BYTES: usize = 64;
 /// Holds the arguments of the projection kernel, in the order in which it unpacks them.
 #[repr(C)]
 struct ProjectCall {
-    /// A word before the columns of the first pair of steps.
+    /// One word before the columns of the first pair of steps.
     x: *const u32,
-    /// A word before the end of those of the last one.
+    /// One word before the end of the columns of the last pair of steps.
     x_end: *const u32,
     /// Accumulators of the first unit in the first step.
     projection: *mut Accumulators,
@@ -97,7 +94,7 @@ struct ProjectCall {
     record_bytes: usize,
     /// Bytes into the unrolled loop at which a pair of steps begins.
     entry: usize,
-    /// Bytes of columns and of weights before where they begin, as if the loop were entered at its top.
+    /// Bytes of columns and of weights that the entry skips: pointers start this far before the data.
     skipped: usize,
     /// Bytes from a step's accumulators to those of the next one.
     step_bytes: usize,
@@ -108,9 +105,9 @@ struct ProjectCall {
 /// Holds the arguments of the step kernel, in the order in which it unpacks them.
 #[repr(C)]
 struct StepCall {
-    /// A word before the columns, less those that the first turn of the loop leaves out.
+    /// One word before the columns, less those that the first iteration of the loop skips.
     previous: *const u32,
-    /// A word before their end.
+    /// One word before the end of the columns.
     previous_end: *const u32,
     projection: *const Accumulators,
     cell_state: *mut i32,
@@ -118,8 +115,8 @@ struct StepCall {
     hidden_end: *const u16,
     /// Bytes into the unrolled loop at which a unit begins, or [`NO_PREVIOUS`].
     entry: usize,
-    /// The step from a unit's weights back to where they would begin if the loop were entered at its top; without a
-    /// previous state, over all of them to its multipliers.
+    /// Bytes from a unit's weights back to where they would begin if the loop were entered at its top. Without a
+    /// previous state: bytes over all weights to the unit's multipliers.
     to_weights: isize,
     sigmoid: *const i32,
     tanh: *const i32,
@@ -129,16 +126,16 @@ struct StepCall {
 const NO_PREVIOUS: usize = usize::MAX;
 
 pub(in crate::nn) fn project<const U: usize>(
-    direction: &DirectionWeights<'_>,
+    weights: &DirectionWeights<'_>,
     x: &[u32],
     projection: &mut [Projection<U>],
 ) {
-    let inputs = direction.inputs();
-    // The caller has made sure of all lengths.
-    if projection.is_empty() || x.len() != inputs * projection.len() || direction.units() > U {
+    let inputs = weights.inputs();
+    // The caller has checked all lengths.
+    if projection.is_empty() || x.len() != inputs * projection.len() || weights.units() > U {
         return;
     }
-    // A record is read for each pair of steps: from a second one on, its copy is the quicker one to read.
+    // A record is read for each pair of steps: from the second pair on, reading a copy is faster.
     let mut record = MaybeUninit::<[u32; BIAS_WORDS + MAX_INPUTS]>::uninit();
     let copy = if projection.len() > 1 { record.as_mut_ptr().cast() } else { core::ptr::null_mut() };
     let first = projection.as_mut_ptr().cast::<Accumulators>();
@@ -147,7 +144,7 @@ pub(in crate::nn) fn project<const U: usize>(
         x: x.as_ptr().wrapping_sub(1),
         x_end: x.as_ptr_range().end.wrapping_sub(1),
         projection: first,
-        projection_end: first.wrapping_add(direction.units()),
+        projection_end: first.wrapping_add(weights.units()),
         record: copy,
         record_bytes: size_of::<Accumulators>() + 4 * inputs,
         entry: skipped * PROJECT_BYTES,
@@ -155,22 +152,22 @@ pub(in crate::nn) fn project<const U: usize>(
         step_bytes: size_of::<[Accumulators; U]>(),
         pair_bytes: 4 * inputs,
     };
-    // SAFETY: `Direction` guarantees units x (4 + inputs) readable words, at least one pair of inputs
+    // SAFETY: `DirectionWeights` guarantees units x (4 + inputs) readable words, at least one pair of inputs
     // and at most as many as `record` has words for; `x` has `inputs` words for each pair of steps, and
     // `projection` two times `U` records, at least `units`. The kernel reads and writes just these, and
     // nothing else is aliased by the `&mut`.
-    unsafe { project_kernel(&call, direction.input().as_ptr()) }
+    unsafe { project_kernel(&call, weights.input().as_ptr()) }
 }
 
 pub(in crate::nn) fn step<const U: usize, const W: usize>(
-    direction: &DirectionWeights<'_>,
+    weights: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
     previous: Option<&[u32; W]>,
     cell_state: &mut [i32; U],
     hidden: &mut [u32; W],
 ) {
     let hidden = hidden.as_mut_ptr().cast::<u16>();
-    let columns = DirectionWeights::padded(direction.units());
+    let columns = DirectionWeights::padded(weights.units());
     let quads = columns / 4;
     let skipped = entry(quads, STEP_UNROLL);
     let (start, entry, to_weights) = match previous {
@@ -183,21 +180,21 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
         projection: projection.as_ptr(),
         cell_state: cell_state.as_mut_ptr(),
         hidden,
-        hidden_end: hidden.wrapping_add(direction.units()),
+        hidden_end: hidden.wrapping_add(weights.units()),
         entry,
         to_weights,
         // Entry 0 is the most negative input; the kernel indexes from the middle.
         sigmoid: SIGMOID[SIGMOID.len() / 2..].as_ptr(),
         tanh: TANH[TANH.len() / 2..].as_ptr(),
     };
-    // SAFETY: `Direction` guarantees units x (columns + 2) readable words; `lstm::step` has checked
+    // SAFETY: `DirectionWeights` guarantees units x (columns + 2) readable words; `lstm::step` has checked
     // that `units` is at most `U`, and that `W` words are at least `units` halfwords, rounded up to four.
     // `previous` has as many words, an even number, or is not read. Table indices come out of SSAT to 18 bits
     // and stay inside both tables. Nothing else is read or written.
-    unsafe { step_kernel(&call, direction.recurrent().as_ptr()) }
+    unsafe { step_kernel(&call, weights.recurrent().as_ptr()) }
 }
 
-/// Words that the copying kernel takes at once.
+/// Words that the copying kernel copies at once.
 const COPY_WORDS: usize = 8;
 
 /// Copies as many words as both slices have.
@@ -205,7 +202,7 @@ pub(in crate::nn) fn copy(from: &[u32], to: &mut [u32]) {
     let (from, to) = (from.as_chunks::<COPY_WORDS>(), to.as_chunks_mut::<COPY_WORDS>());
     let chunks = from.0.len().min(to.0.len());
     if chunks > 0 {
-        // SAFETY: both have so many chunks, and the `&mut` is aliased by nothing.
+        // SAFETY: both have `chunks` chunks, and nothing aliases the `&mut`.
         unsafe { copy_kernel(from.0.as_ptr(), to.0.as_mut_ptr(), to.0.as_ptr().wrapping_add(chunks)) }
     }
     for (from, to) in from.1.iter().zip(to.1) {
@@ -213,8 +210,8 @@ pub(in crate::nn) fn copy(from: &[u32], to: &mut [u32]) {
     }
 }
 
-/// Copies chunks until `to` is `to_end`, at least one. The loop lies in one line of flash, whose reads do
-/// not get in the way of the data's then.
+/// Copies chunks until `to` is `to_end`, at least one. The loop lies in one line of flash, so that fetching it does
+/// not delay reading the data.
 ///
 /// # Safety
 /// As stated where it is called.
@@ -239,15 +236,15 @@ unsafe extern "C" fn copy_kernel(
     )
 }
 
-/// Returns the place to enter a loop of `unroll`, so that `count` is met at the end of a turn.
+/// Returns where to enter a loop unrolled `unroll` times, so that `count` items end with a full iteration.
 fn entry(count: usize, unroll: usize) -> usize {
     (unroll - count % unroll) % unroll
 }
 
 /// Computes for each unit and each pair of steps: both steps' accumulators := bias + rows . columns.
 ///
-/// r0 a word before the weights, r1 a word before the columns, r2 r3 columns of both steps, r4 r5
-/// weights, r6-r9 sums of the first step, r10-r12 lr of the second.
+/// r0 one word before the weights, r1 one word before the columns, r2 r3 columns of both steps, r4 r5 weights, r6-r9
+/// sums of the first step, r10-r12 lr of the second.
 ///
 /// # Safety
 /// As stated where it is called.
@@ -263,11 +260,11 @@ unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
         "sub sp, sp, #16",
         "push {{r2-r11}}",
         // sp: +0 x, +4 x_end, +8 projection, +12 projection_end, +16 record, +20 record_bytes,
-        // +24 entry, +28 skipped, +32 step_bytes, +36 pair_bytes; +40 the record at work, +44 the
-        // accumulators at work, +48 the end of the pair's columns, +52 the next unit's record
-        // All pointers to records stand at their last bias.
+        // +24 entry, +28 skipped, +32 step_bytes, +36 pair_bytes; +40 the current record, +44 the
+        // current accumulators, +48 the end of the pair's columns, +52 the next unit's record
+        // All pointers to records point to the last bias.
         "add.w r1, r1, #12",
-        // A unit: its record is copied, or read where it lies.
+        // A unit: its record is copied, or read in place.
         "1:",
         "ldr r0, [sp, #16]",
         "ldr r2, [sp, #20]",
@@ -336,8 +333,8 @@ unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
         "ldr r2, [sp, #48]",
         "cmp r1, r2",
         "bne.w 2b",
-        // The next line is wanted before its prefetch has ended. So it comes into the cache, and is not
-        // prefetched again with each turn, when the first weights are to be read.
+        // The next line is needed before its prefetch has ended. The branch brings it into the cache, so that it is
+        // not prefetched again in each iteration when the first weights are to be read.
         "b.n 8f",
         ".p2align 4",
         "8:",
@@ -375,7 +372,7 @@ unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
         "cmp r0, r3",
         "bne.n 5b",
         "9:",
-        // Less than two lines are left, half of one where the pairs of columns are odd in number.
+        // Less than two lines are left, with half a line where the number of column pairs is odd.
         "tst r2, #16",
         "itt ne",
         "ldmne r1!, {{r4-r7}}",
@@ -392,8 +389,8 @@ unsafe extern "C" fn project_kernel(call: &ProjectCall, weights: *const u32) {
 
 /// Computes for each unit: sums := projection + rows . previous; gates; cell state; hidden state.
 ///
-/// r0 a word before the weights, r1 a word before previous, r2 r3 columns, r4-r7 weights, r8-r11 sums,
-/// r12 and lr the middles of the tables.
+/// r0 one word before the weights, r1 one word before previous, r2 r3 columns, r4-r7 weights, r8-r11 sums, r12 and lr
+/// the middles of the tables.
 ///
 /// # Safety
 /// As stated where it is called.
@@ -406,7 +403,7 @@ unsafe extern "C" fn step_kernel(call: &StepCall, weights: *const u32) {
         "sub.w r0, r1, #4",
         "mov r12, r10",
         "mov lr, r11",
-        // Without a previous state the entry is behind the products.
+        // Without a previous state the entry is after the products.
         "adr.w r10, 2f",
         "adr.w r11, 3f",
         "add r10, r10, r8",
@@ -473,7 +470,7 @@ unsafe extern "C" fn step_kernel(call: &StepCall, weights: *const u32) {
         "bne.w 2b",
         ".p2align 2",
         "3:",
-        // The high rows are what the packed sums have more than the low ones, times 256.
+        // The packed sums less the low ones are the high rows' sums times 256.
         "ldr r2, [r0, #4]",
         "ldr.w r3, [r0, #8]!",
         "sub r9, r9, r8",

@@ -13,9 +13,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// The simulated model has a range of 500 deg/s.
 pub const MODEL: Model = Model::Adis16465_2;
-/// One read takes this many bytes on the bus: the command and the burst.
+/// Bytes of a read on the bus: the command and the burst.
 const READ_BYTES: u64 = 2 + BURST as u64;
-/// The part reports room temperature, counts of 0.1 deg C.
+/// The reported temperature, counts of 0.1 deg C: room temperature.
 const TEMPERATURE: i16 = 250;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
@@ -44,7 +44,7 @@ fn counts() -> [f64; 2] {
     [per_rad, f64::from(MODEL.counts_per_g()) / f64::from(STANDARD_GRAVITY)]
 }
 
-/// Returns the burst of a sample, its readings rounded to the part's steps.
+/// Encodes a sample as a burst, with the readings rounded to the part's steps.
 pub fn burst(number: usize, sample: &ImuSample) -> Burst {
     let [per_rad, per_force] = counts();
     let count = |value: f64| libm::round(value) as i16;
@@ -57,7 +57,7 @@ pub fn burst(number: usize, sample: &ImuSample) -> Burst {
     }
 }
 
-/// Simulates a bus on which every read gives the same bytes until others are set.
+/// A simulated SPI bus on which every read returns the same bytes until others are set.
 #[derive(Debug, Clone, Default)]
 pub struct Bus(Arc<Mutex<[u8; BURST]>>);
 

@@ -1,20 +1,20 @@
-//! This module compares the corrected yaw of a drive through a part with the direct replay: a part's rounding changes
-//! it, and a bound follows from the part's steps alone.
+//! This module compares the corrected yaw of a drive through a part with that of the direct replay. The part's
+//! rounding changes the yaw; a bound of the change follows from the part's steps alone.
 //!
-//! With readings rounded to steps of q, N samples of dt after static initialisation:
+//! With readings rounded to steps of q, and N samples of period dt after static initialisation:
 //!
-//! - **rounding**: an error is even within +-q/2, q / sqrt(12) rms, and the next one knows
-//!   nothing of it (the readings' own noise is wider than q). Their sum walks: q / sqrt(12) x dt x
+//! - **rounding**: errors are uniform within +-q/2, q / sqrt(12) rms, and independent of each other (the
+//!   readings' own noise is wider than q). Their sum is a random walk: q / sqrt(12) x dt x
 //!   sqrt(N).
 //! - **bias**: the mean of the 300 samples of static initialisation is off by q / sqrt(12) /
-//!   sqrt(300), and that is taken off every sample: times N dt. Both terms count four times, as
+//!   sqrt(300), and is subtracted from every sample: times N dt. Both terms count four times, as
 //!   4 sigma.
-//! - **network**, and the zero-rate updates behind it: their answer is no formula. It is measured, not on
-//!   the part's samples but on stand-ins: the recording with even noise of the same steps on all six channels, from
-//!   [`STAND_INS`] seeds. Twice the largest departure that the sum of the corrections shows.
+//! - **network**, and the zero-rate updates after it: their response has no formula. It is measured on
+//!   stand-ins instead of the part's samples: the recording with uniform noise of the same steps on all six channels,
+//!   from [`STAND_INS`] seeds. The term is twice the largest change of the sum of the corrections.
 //!
-//! The bound is the sum of the three. For the rates' rms they are q/2, four sigma of the bias, and
-//! twice the rms of the stand-ins' corrections. Where a part rounds nothing the bound is zero.
+//! The bound is the sum of the three terms. For the rms of the rates the terms are q/2, four sigma of the bias, and
+//! twice the rms change of the stand-ins' corrections. If a part rounds nothing, the bound is zero.
 
 use super::Quantisation;
 use crate::drive::recording::Recording;
@@ -27,23 +27,23 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::{AngularRate, SpecificForce};
 
-/// The network's response is measured with this many seeds.
+/// Number of seeds with which the network's response is measured.
 pub const STAND_INS: u64 = 2;
 const SIGMAS: f64 = 4.0;
 const NETWORK_MARGIN: f64 = 2.0;
 
-/// Holds the differences of two replays of a drive, row by row.
+/// The difference of two replays of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
     /// Largest difference of the accumulated yaw, rad.
     pub yaw_largest: f64,
-    /// The difference at the end, rad.
+    /// Difference of the accumulated yaw at the end, rad.
     pub yaw_final: f64,
     /// RMS of the rates' difference, rad/s.
     pub rate_rms: f64,
-    /// Rows that both replays have sent.
+    /// Number of rows that both replays have sent.
     pub rows: usize,
-    /// Rows that only one of them has sent.
+    /// Number of rows that only one replay has sent.
     pub unpaired: usize,
 }
 
@@ -59,7 +59,7 @@ impl Difference {
         Self::of(direct, via, |step| step.vehicle.prompt.correction)
     }
 
-    /// Compares from the first step after both have been initialised.
+    /// Compares two replays, each from its first step after static initialisation.
     fn of(direct: &Replay, via: &Replay, what: impl Fn(&Step) -> AngularRate) -> Self {
         let (mut difference, mut sum, mut squares) = (Self::default(), 0.0, 0.0);
         let (mut a, mut b) = (direct.steps[direct.start..].iter(), via.steps[via.start..].iter());
@@ -89,16 +89,16 @@ impl Difference {
     }
 }
 
-/// Holds the bound of the difference, term by term.
+/// The bound of the difference, by term.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bound {
-    /// The yaw from the rounding of each sample, rad.
+    /// Bound of the yaw from the rounding of each sample, rad.
     pub rounding: f64,
-    /// The yaw from the static bias, rad.
+    /// Bound of the yaw from the static bias, rad.
     pub bias: f64,
-    /// The yaw from the network's response, rad.
+    /// Bound of the yaw from the network's response, rad.
     pub network: f64,
-    /// The rms of the rates from all of them, rad/s.
+    /// Bound of the rates' rms difference from all three, rad/s.
     pub rate_rms: f64,
 }
 
@@ -107,7 +107,7 @@ impl Bound {
     /// times for each row, unless nothing is rounded.
     ///
     /// # Errors
-    /// [`ReplayError`], when a stand-in does not initialise.
+    /// [`ReplayError`], if static initialisation of a stand-in fails.
     pub fn new(
         quantisation: Quantisation,
         recording: &Recording,
@@ -138,7 +138,7 @@ impl Bound {
         })
     }
 
-    /// Returns the bound of the accumulated yaw anywhere in the drive, rad.
+    /// Returns the bound of the difference of the accumulated yaw anywhere in the drive, rad.
     #[must_use]
     pub fn yaw(&self) -> f64 {
         self.rounding + self.bias + self.network

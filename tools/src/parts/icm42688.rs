@@ -1,5 +1,5 @@
-//! This module sends FIFO packets of 20 bits through the driver and a simulated SPI bus: reset, identity, settings,
-//! packets and the register that is checked with each of them.
+//! This module sends 20-bit FIFO packets through the driver and a simulated SPI bus: reset, identity, settings,
+//! packets, and the register that is checked with each packet.
 
 use super::{Part, Sent, ViaError};
 use crate::drive::recording::Recording;
@@ -14,18 +14,18 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A rate has steps of 1/131 deg/s: the part uses 19 of its 20 bits.
+/// Step of a rate, 1/131 deg/s: the part uses 19 of the 20 bits.
 pub const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
-/// An acceleration has steps of 1/8192 g: the part uses 18 of its 20 bits.
+/// Step of an acceleration, 1/8192 g: the part uses 18 of the 20 bits.
 pub const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
-/// One step is this many counts of a 20-bit reading.
+/// Counts of a 20-bit reading per step.
 const RATE_COUNTS: f64 = 2.0;
 const FORCE_COUNTS: f64 = 4.0;
-/// The range of an acceleration ends at these counts; lower ones mean "no reading".
+/// Ends of the range of an acceleration, counts; lower counts mean "no reading".
 pub const ENDS: [f64; 2] = [-524_256.0, 524_284.0];
-/// The part's counter of 16 bits wraps.
+/// Range of the part's 16-bit time counter.
 const WRAP: u64 = 1 << 16;
-/// The counter, in units of 32/30 us, wraps after this many microseconds.
+/// Time after which the counter wraps, microseconds; a count is 32/30 us.
 pub const WRAP_US: f64 = WRAP as f64 * 32.0 / 30.0;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
@@ -39,7 +39,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
         bus.fill(packet(&row.sample).emit());
         let sample = part.next_sample().map_err(|e| error(e.to_string()))?;
         let sample = sample.ok_or_else(|| error("its FIFO seems empty".to_owned()))?;
-        // The part's clock begins anywhere, and only the arrival times show its wraps in a silence.
+        // The part's clock starts at any count; only the row's time shows how often it has wrapped in a gap.
         let (sent, read) = (counts(row.sample.time), counts(sample.time));
         let turns = sent.saturating_sub(read) / WRAP;
         samples.push(ImuSample { time: micros(read + turns * WRAP), ..sample });
@@ -48,17 +48,17 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     Ok((samples, bytes))
 }
 
-/// Returns the nearest count of the part's counter at a time, as if it never wrapped.
+/// Returns the nearest count of the part's counter at a time, without wrapping.
 const fn counts(time: Micros) -> u64 {
     (time.0 * 30 + 16) / 32
 }
 
-/// Returns the nearest microsecond.
+/// Returns the time of a count, rounded to the nearest microsecond.
 const fn micros(counts: u64) -> Micros {
     Micros((counts * 32 + 15) / 30)
 }
 
-/// Makes the packet of a sample, with its readings rounded to the part's steps and clipped at its ends.
+/// Encodes a sample as a packet, with the readings rounded to the part's steps and clipped at the ends of the range.
 pub fn packet(sample: &ImuSample) -> Packet {
     let reading = |value: f64, step: f64, counts: f64| {
         Some((libm::round(value / step) * counts).clamp(ENDS[0], ENDS[1]) as i32)
@@ -74,7 +74,7 @@ pub fn packet(sample: &ImuSample) -> Packet {
     }
 }
 
-/// Simulates the part on its bus: registers that hold what is written, and a FIFO.
+/// A simulated part: registers that keep what is written, and a FIFO.
 #[derive(Debug, Default)]
 struct Simulated {
     registers: std::collections::HashMap<(u8, u8), u8>,
@@ -105,12 +105,12 @@ impl Simulated {
     }
 }
 
-/// Shares the simulated part between the driver and the code that fills its FIFO.
+/// A simulated SPI bus; its clones share the part, so that the FIFO can be filled while the driver owns a clone.
 #[derive(Debug, Clone, Default)]
 pub struct Bus(Arc<Mutex<Simulated>>);
 
 impl Bus {
-    /// Puts bytes into the part's FIFO.
+    /// Appends bytes to the part's FIFO.
     pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
         self.part().fifo.extend(bytes);
     }
@@ -142,7 +142,7 @@ impl SpiDevice for Bus {
                     part.bytes += to.len() as u64;
                     part.read(selected, to);
                 }
-                // The driver uses none of these.
+                // The driver does not use these operations.
                 Operation::Transfer(..) | Operation::TransferInPlace(_) | Operation::DelayNs(_) => {}
             }
         }
@@ -150,7 +150,7 @@ impl SpiDevice for Bus {
     }
 }
 
-/// Does not wait.
+/// A delay that does not wait.
 pub struct NoDelay;
 
 impl DelayNs for NoDelay {

@@ -6,17 +6,17 @@ use gyronet::sample::ImuSample;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 
-/// All six clipping bits of the status word are set.
+/// The six clipping bits of the status word.
 pub const CLIPPED: u32 = 0x3F << 8;
 /// The status word of a good sample: self-test passed, filter valid.
 const GOOD: u32 = 3;
-/// A tick of SampleTimeFine lasts this long, microseconds.
+/// Length of a tick of SampleTimeFine, microseconds.
 const TICK_US: u64 = 100;
 
 pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut mti = Mti::new();
     let (mut samples, mut bytes) = (Vec::with_capacity(recording.rows.len()), 0);
-    // The part's first 32-bit tick lacks the whole wraps of the recording's time.
+    // The part's 32-bit tick counter does not contain the earlier wraps of the recording's time.
     let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
     let epoch = first - first % (TICK_US << 32);
     for (row, frame) in recording.rows.iter().zip(messages(recording)) {
@@ -36,7 +36,7 @@ pub fn messages(recording: &Recording) -> impl Iterator<Item = Vec<u8>> {
     rows.map(|(number, row)| message(number, &row.sample).emit().to_vec())
 }
 
-/// Returns the message of a sample. Its codes came from f32 and go back to the same ones.
+/// Encodes a sample as a message. The sample's codes come from f32, so decoding gives the same codes.
 pub fn message(number: usize, sample: &ImuSample) -> MtData2 {
     MtData2 {
         packet_counter: Some(number as u16),

@@ -1,0 +1,91 @@
+//! This module puts the increments of a fibre-optic gyro on a grid of the board's clock.
+//!
+//! Grid steps are the multiples of 10 ms of the board's clock. A step is emitted as soon as the increments have passed
+//! it, and at the latest [`MAX_DELAY_US`] after its time, with the increments that have arrived by then. Later ones are
+//! not used.
+
+use super::clock::{ClockCounters, ClockError, PartClock};
+use super::increments::{IncrementCounters, Increments, Turn};
+use crate::sample::{FogSample, PERIOD_US};
+use crate::units::Micros;
+
+/// The longest time that a step waits for increments.
+pub const MAX_DELAY_US: u64 = 10_000;
+/// The time between two calls after which the grid restarts, at the next step: one second.
+pub const MAX_SILENCE_US: u64 = 1_000_000;
+
+/// The turn of one grid step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Step {
+    /// The step's time by the board's clock, a multiple of [`PERIOD_US`].
+    pub time: Micros,
+    /// The turn since the step before.
+    pub turn: Turn,
+}
+
+/// The gyro's clock, its increments, and the next step of the grid.
+#[derive(Debug, Clone)]
+pub struct FogGrid {
+    clock: PartClock,
+    increments: Increments,
+    /// Time of the next step; set by the first sample.
+    next: Option<u64>,
+}
+
+impl FogGrid {
+    /// The state before the first sample.
+    pub const START: Self = Self { clock: PartClock::START, increments: Increments::EMPTY, next: None };
+
+    /// Adds a sample that arrived at `now`.
+    ///
+    /// # Errors
+    /// [`ClockError`]: the sample is not used.
+    pub fn add(&mut self, now: Micros, sample: FogSample) -> Result<(), ClockError> {
+        let board = self.clock.translate(sample.time, now)?;
+        if board.jumped {
+            self.increments.disconnect();
+        }
+        self.begin(board.time);
+        self.increments.add(board.time, &sample);
+        Ok(())
+    }
+
+    /// Returns the next step, if it is complete or due. Call it until `None` after every sample, and at least every
+    /// few milliseconds.
+    #[inline(never)]
+    pub fn next_step(&mut self, now: Micros) -> Option<Step> {
+        let next = self.next?;
+        let waited = now.0.saturating_sub(next);
+        if waited > MAX_SILENCE_US {
+            // The caller has not asked for a step for a second, so these steps are useless by now.
+            self.next = Some(now.0.next_multiple_of(PERIOD_US));
+            self.increments.clear();
+            return None;
+        }
+        let time = Micros(next);
+        if !self.increments.has_reached(time) && waited < MAX_DELAY_US {
+            return None;
+        }
+        self.next = Some(next + PERIOD_US);
+        Some(Step { time, turn: self.increments.take(time) })
+    }
+
+    /// Returns the events of the gyro's clock since the start.
+    #[must_use]
+    pub fn clock(&self) -> &ClockCounters {
+        self.clock.counters()
+    }
+
+    /// Returns the events of the increments since the start.
+    #[must_use]
+    pub fn increments(&self) -> &IncrementCounters {
+        self.increments.counters()
+    }
+
+    /// Starts the grid at the next step from `time` on, unless it has started. The first sample does that, too; a
+    /// caller that expects a sample starts the grid earlier, and gets empty steps until the sample arrives.
+    pub fn begin(&mut self, time: Micros) {
+        self.next.get_or_insert(time.0.next_multiple_of(PERIOD_US));
+    }
+}
