@@ -1,11 +1,11 @@
-/* The cycle model: what an instruction costs on a Cortex-M4 with zero wait states.
+/* The cycle model: the cycles of an instruction on a Cortex-M4 with zero wait states.
  *
  * "TRM" is Arm's Cortex-M4 Technical Reference Manual, ARM DDI 0439: tables 3-1 (instructions),
- * 3-2 (DSP instructions) and 7-1 (FPU instructions), section 3.3.2 (load/store timings). What is
- * marked "assumption" is a simplification of ours where the TRM gives a range, less, or nothing.
+ * 3-2 (DSP instructions) and 7-1 (FPU instructions), section 3.3.2 (load/store timings).
+ * "Assumption" marks a simplification of ours where the TRM gives a range, less, or nothing.
  *
- * Instructions are told apart by the disassembler's text. Assumption: a contended fetch, a full
- * write buffer and an address that the instruction before has computed (all TRM 3.3.2) are free.
+ * Instructions are identified by the disassembler's text. Assumption: a contended fetch, a full
+ * write buffer and an address computed by the previous instruction (all TRM 3.3.2) cost nothing.
  */
 #ifndef M4COST_H
 #define M4COST_H
@@ -39,7 +39,7 @@ enum insn_class {
     CLASSES,
 };
 
-/* As a histogram prints them. */
+/* The names of the classes in the histogram. */
 static const char *const class_names[CLASSES] = {
     [CLASS_ALU] = "alu",
     [CLASS_MUL] = "mul/mla",
@@ -64,55 +64,56 @@ static const char *const class_names[CLASSES] = {
 };
 
 enum {
-    /* P, the refill of the pipeline, is 1 to 3 by the target's alignment and width, and by whether
-     * its address was guessed early (TRM 3-1; 3.3.2 has 3 for ldr pc, tbb and tbh). Assumption: 1
-     * where the instruction holds the target, 2 where a register or memory does. */
+    /* P, the refill of the pipeline, takes 1 to 3 cycles, depending on the target's alignment and
+     * width, and on whether its address was predicted early (TRM 3-1; 3.3.2 has 3 for ldr pc, tbb
+     * and tbh). Assumption: 1 if the instruction contains the target, 2 if a register or memory
+     * does. */
     REFILL_DIRECT = 1,
     REFILL_INDIRECT = 2,
-    /* Assumption: 2 to 12 by the operands (TRM 3-1). */
+    /* Assumption: the TRM has 2 to 12, depending on the operands (TRM 3-1). */
     DIVISION = 7,
-    /* Assumption: no Cortex-M4 has MVE; its instructions are four beats, here two a cycle. */
+    /* Assumption: no Cortex-M4 has MVE. An MVE instruction has four beats; here two run per cycle. */
     VECTOR = 2,
-    /* TRM 3-1 and 7-1: a load of one register that nothing is pipelined with. */
+    /* TRM 3-1 and 7-1: a load of one register that is not pipelined. */
     LOAD = 2,
-    /* Assumption: however unaligned; by TRM 3.3.2 it is 2 for a word at an odd address. */
+    /* Assumption: for any misalignment; TRM 3.3.2 has 2 for a word at an odd address. */
     UNALIGNED = 1,
 };
 
-/* What a rule asks for beside the beginning of the mnemonic. */
+/* A rule's condition in addition to the beginning of the mnemonic. */
 enum condition {
     ALWAYS,
     IF_WHOLE,
     IF_VECTOR,
 };
 
-/* What comes on top of a rule's cycles. */
+/* Cycles that are added to a rule's cycles. */
 enum extra {
     NOTHING,
     IF_DOUBLE,           /* 1 if the first operand is a double */
     IF_REGISTER_OFFSET,  /* 1 if a register is added to the address */
     LISTED,              /* 1 for each register in the list, 2 for a double */
-    LISTED_REFILL_IF_PC, /* the same, and a refill if the pc is among them */
+    LISTED_REFILL_IF_PC, /* as LISTED, and a refill if the pc is listed */
     REFILL_IF_PC,        /* a refill if the pc is the first operand */
 };
 
 struct rule {
-    const char *beginning; /* of the mnemonic */
+    const char *beginning; /* beginning of the mnemonic */
     enum condition condition;
     enum insn_class class;
     unsigned cycles;
     enum extra extra;
 };
 
-/* The first rule that fits counts. */
+/* The first rule that matches applies. */
 static const struct rule rules[] = {
     /* Vectors. */
     {"v",      IF_VECTOR, CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
     {"vctp",   ALWAYS,    CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
     {"vpst",   ALWAYS,    CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
     {"vpt",    ALWAYS,    CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
-    /* Floating point. Assumption: integers do not overtake vdiv and vsqrt; between a core and a
-     * floating-point register (TRM 7-1: 2), vmov is 1. */
+    /* Floating point. Assumption: integer instructions do not overtake vdiv and vsqrt; vmov between
+     * a core and a floating-point register (TRM 7-1: 2) takes 1 cycle. */
     {"vldr",   ALWAYS,    CLASS_VLDR,     LOAD, IF_DOUBLE},               /* TRM 7-1: 2, double 3 */
     {"vstr",   ALWAYS,    CLASS_VSTR,     2, IF_DOUBLE},                  /* TRM 7-1: 2, double 3 */
     {"vldm",   ALWAYS,    CLASS_VLDM,     1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
@@ -128,8 +129,8 @@ static const struct rule rules[] = {
     {"vnml",   ALWAYS,    CLASS_FP_FMA,   3, NOTHING},                    /* TRM 7-1 */
     {"vfnm",   ALWAYS,    CLASS_FP_FMA,   3, NOTHING},                    /* TRM 7-1 */
     {"v",      ALWAYS,    CLASS_FP_ALU,   1, NOTHING},                    /* TRM 7-1 */
-    /* Loads and stores. ldrd and strd are pipelined with nothing; a store with an immediate offset
-     * is done while the next instruction runs (both TRM 3.3.2). */
+    /* Loads and stores. ldrd and strd are not pipelined; a store with an immediate offset completes
+     * while the next instruction runs (both TRM 3.3.2). */
     {"ldrd",   ALWAYS,    CLASS_LDRD,     3, NOTHING},                    /* TRM 3-1: 1+N */
     {"strd",   ALWAYS,    CLASS_STR,      3, NOTHING},                    /* TRM 3-1: 1+N */
     {"ldm",    ALWAYS,    CLASS_LDM,      1, LISTED_REFILL_IF_PC},        /* TRM 3-1: 1+N, 1+N+P */
@@ -138,8 +139,8 @@ static const struct rule rules[] = {
     {"push",   ALWAYS,    CLASS_STM,      1, LISTED},                     /* TRM 3-1: 1+N */
     {"ldr",    ALWAYS,    CLASS_LDR,      LOAD, REFILL_IF_PC},            /* TRM 3-1: 2, 2+P */
     {"str",    ALWAYS,    CLASS_STR,      1, IF_REGISTER_OFFSET},         /* TRM 3-1: 2; 3.3.2: 1 */
-    /* Multiplication and division: TRM 3-1 has those of 32 and 64 bits, 3-2 those of halfwords, of
-     * the most significant word, and umaal. */
+    /* Multiplication and division. TRM 3-1 has the multiplications of 32 and 64 bits; 3-2 has those
+     * of halfwords, those of the most significant word, and umaal. */
     {"sdiv",   ALWAYS,    CLASS_DIV,      DIVISION, NOTHING},             /* assumption */
     {"udiv",   ALWAYS,    CLASS_DIV,      DIVISION, NOTHING},             /* assumption */
     {"smlad",  ALWAYS,    CLASS_DSP_MAC,  1, NOTHING},                    /* TRM 3-2 */
@@ -156,38 +157,38 @@ static const struct rule rules[] = {
     {"umla",   ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1 */
     {"uma",    ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-2 */
     {"smm",    ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-2 */
-    /* Branches to what a register or memory holds. Assumption: a bx under a condition (bxeq) is as
-     * any other branch. */
+    /* Branches to an address in a register or in memory. Assumption: a conditional bx (bxeq) costs
+     * as much as any other branch. */
     {"tbb",    ALWAYS,    CLASS_INDIRECT, 2 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 2+P */
     {"tbh",    ALWAYS,    CLASS_INDIRECT, 2 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 2+P */
     {"bx",     IF_WHOLE,  CLASS_INDIRECT, 1 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 1+P */
     {"blx",    ALWAYS,    CLASS_INDIRECT, 1 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 1+P */
-    /* What begins as a branch does and is none: bic, bfc and bfi, bkpt. */
+    /* Mnemonics that begin like a branch but are not one: bic, bfc and bfi, bkpt. */
     {"bic",    ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* TRM 3-1 */
     {"bf",     ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* TRM 3-1 */
     {"bk",     ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* assumption */
-    /* Other branches. Where one is taken, the refill comes on top of the next instruction:
-     * cycles_behind(). Loops of ARMv8.1-M (le, wls, dls) are such. */
+    /* Other branches. If a branch is taken, cycles_behind() adds the refill to the next instruction.
+     * The loop instructions of ARMv8.1-M (le, wls, dls) count as branches. */
     {"b",      ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* TRM 3-1: 1, 1+P */
     {"cbz",    ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* TRM 3-1: 1, 1+P */
     {"cbnz",   ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* TRM 3-1: 1, 1+P */
     {"le",     ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* assumption */
     {"wls",    ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* assumption */
     {"dls",    ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* assumption */
-    /* All else. Assumption: so are barriers (1+B), waits (1+W), msr, mrs and cps (1 or 2), and what
-     * computes the pc (1+P). */
+    /* All other instructions. Assumption: this includes barriers (1+B), waits (1+W), msr, mrs and cps
+     * (1 or 2), and arithmetic that writes the pc (1+P). */
     {"",       ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* TRM 3-1, 3-2 */
 };
 
-/* What the model knows of an instruction. */
+/* The properties of an instruction that the model uses. */
 struct cost {
     enum insn_class class;
-    unsigned cycles;      /* alone */
-    char first[8];        /* operand: mostly the register that is written */
-    const char *operands; /* all of them, in the instruction's text */
+    unsigned cycles;      /* without the effect of the previous instruction */
+    char first[8];        /* first operand: usually the written register */
+    const char *operands; /* all operands, inside the instruction's text */
 };
 
-/* Whether operands name a register, and not only one that its name is a part of. */
+/* Returns whether operands contain a register, not only a name that contains the register's. */
 static bool names_register(const char *operands, const char *name)
 {
     size_t length = strlen(name);
@@ -216,13 +217,13 @@ static bool names_vector(const char *operands)
     return false;
 }
 
-/* The number in a register's name. */
+/* Returns the number in a register's name. */
 static int register_number(const char *name)
 {
     return name[0] == '\0' ? 0 : atoi(name + 1);
 }
 
-/* Counts the registers in {..}, a double as two; where there is no list, it is one. */
+/* Counts the registers in {..}, a double as two; returns 1 if there is no list. */
 static unsigned listed_registers(const char *operands)
 {
     const char *at = strchr(operands, '{');
@@ -253,7 +254,7 @@ static unsigned listed_registers(const char *operands)
     return count != 0 ? (unsigned)count : 1;
 }
 
-/* Whether an address is offset by a register, not by an immediate or not at all. */
+/* Returns whether an address has a register offset, rather than an immediate offset or none. */
 static bool has_register_offset(const char *operands)
 {
     const char *address = strchr(operands, '[');
@@ -269,7 +270,7 @@ static const struct rule *rule_for(const char *mnemonic, size_t length, const ch
 {
     const struct rule *rule = rules;
     for (;; rule++) {
-        /* The last one's beginning is empty: it fits anything. */
+        /* The last rule's beginning is empty: it matches any mnemonic. */
         size_t beginning = strlen(rule->beginning);
         if (strncmp(mnemonic, rule->beginning, beginning) != 0) {
             continue;
@@ -304,7 +305,7 @@ static unsigned extra_cycles(enum extra extra, const struct cost *cost)
     return 0;
 }
 
-/* What an instruction costs alone, by its disassembly, which must stay where it is. */
+/* Computes an instruction's own cost from its disassembly, which must outlive the result. */
 static struct cost cost_of(const char *text)
 {
     size_t mnemonic = strcspn(text, " \t");
@@ -338,24 +339,25 @@ static bool is_fp_arithmetic(const struct cost *cost)
         || cost->class == CLASS_FP_DIV;
 }
 
-/* Cycles of an instruction that runs behind another one (NULL: nothing is known of it), and
- * `jumped` where it does not lie behind that. */
+/* Returns the cycles of an instruction that runs after `previous` (NULL: unknown). `jumped` says that
+ * it does not follow `previous` in memory. */
 static unsigned cycles_behind(const struct cost *cost, const struct cost *previous, bool jumped)
 {
     unsigned cycles = cost->cycles;
     if (previous == NULL) {
         return cycles;
     }
-    /* TRM 3.3.2: a load is pipelined behind a load, unless its address needs what that one loads.
-     * Assumption: vldr is as well; a store with a register offset is not, though it could be. */
+    /* TRM 3.3.2: a load is pipelined after a load, unless its address needs the loaded value.
+     * Assumption: vldr is pipelined too; a store with a register offset is not, although it could
+     * be. */
     if (loads_one(previous) && loads_one(cost) && cost->cycles == LOAD) {
         if (!names_register(behind_first(cost), previous->first)) {
             cycles = 1;
         }
     }
-    /* TRM, chapter 7: a result of floating-point arithmetic that the next instruction consumes
-     * costs a cycle more. Assumption: being accumulated to, or stored, is being consumed; what vmov
-     * and vcmp name first is a result. */
+    /* TRM, chapter 7: if the next instruction consumes the result of floating-point arithmetic, it
+     * takes one more cycle. Assumption: accumulating to a register and storing it consume it; the
+     * first operand of vmov and vcmp is a result. */
     bool stores = cost->class == CLASS_VSTR;
     bool may_consume = is_fp_arithmetic(cost) || stores;
     if (is_fp_arithmetic(previous) && previous->first[0] == 's' && may_consume) {
@@ -365,7 +367,7 @@ static unsigned cycles_behind(const struct cost *cost, const struct cost *previo
             cycles += 1;
         }
     }
-    /* Taken. */
+    /* The previous branch was taken. */
     if (jumped && previous->class == CLASS_BRANCH) {
         cycles += REFILL_DIRECT;
     }

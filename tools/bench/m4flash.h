@@ -1,30 +1,30 @@
-/* What an STM32F405 at 168 MHz makes a Cortex-M4 wait for: flash with 5 wait states behind ST's
- * accelerator (ART), instructions from SRAM, registers of slow buses.
+/* The wait states of a Cortex-M4 in an STM32F405 at 168 MHz: flash with 5 wait states behind ST's
+ * accelerator (ART), instructions from SRAM, peripheral registers on slow buses.
  *
  * Sources: "RM" is ST's RM0090, 3.4 (lines of 128 bits, 5 wait states at 168 MHz) and 3.5.2 (ART);
  * "TRM" is Arm's Cortex-M4 TRM, 2.3.1 (bus interfaces), whose text on fetches is that of the
  * Cortex-M3 TRM, DDI 0337, 14.5; "APB" is Arm's IHI 0024. Rules:
  *
- *   - A line is read in 6 cycles, one read at a time; one that has begun ends before the next one
- *     begins. (RM: DCode goes before ICode. Assumption: it does not stop a read.)
- *   - Instructions come without delay from the line in use, the instruction cache (64 lines) and the
- *     prefetched line, if that is there. (RM)
- *   - When another line comes into use, the one behind it is prefetched unless the cache holds it.
- *     (RM says that prefetch reads the next line; that a line in the cache is left out, and that a line
- *     from the cache starts it too, are assumptions.)
- *   - Both caches hold any line anywhere, and replace the least recently used one. (RM: LRU for the
- *     instruction cache, and that the data cache works like it. Any line anywhere: assumption.)
- *   - A line goes into the instruction cache if it was missed: read, or still on its way from the
- *     prefetch. One that was prefetched in time does not. (RM; a line on its way: assumption.)
- *   - Data from flash (literals, tables, weights) come over DCode, with a cache of 8 lines. (RM)
- *   - SRAM is fetched over the system bus: two cycles a word, one more where a jump ends, and none in a
- *     cycle in which data take that bus. (TRM: fetches there are registered, cannot follow each other at
- *     once, and data go first. Words are fetched three ahead at most: TRM 2.1.)
+ *   - A line is read in 6 cycles, one read at a time; a read in progress ends before the next one
+ *     begins. (RM: DCode has priority over ICode. Assumption: DCode does not abort a read.)
+ *   - Instructions are available without delay from the line in use, the instruction cache (64 lines)
+ *     and the prefetched line, if its read has ended. (RM)
+ *   - When the line in use changes, the next line is prefetched unless the cache holds it. (RM says
+ *     that prefetch reads the next line. That a cached line is not prefetched, and that a line from the
+ *     cache triggers a prefetch too, are assumptions.)
+ *   - Both caches are fully associative and replace the least recently used line. (RM: LRU for the
+ *     instruction cache, and the data cache works like it. Full associativity: assumption.)
+ *   - A line enters the instruction cache if it was missed: read, or still being read by the prefetch.
+ *     A line that was prefetched in time does not. (RM; a line still being read: assumption.)
+ *   - Data from flash (literals, tables, weights) are read over DCode, with a cache of 8 lines. (RM)
+ *   - Instructions in SRAM are fetched over the system bus: two cycles a word, one more at the target of a
+ *     jump, and no fetch in a cycle in which data use that bus. (TRM: fetches there are registered,
+ *     cannot be back to back, and data have priority. At most three words are fetched ahead: TRM 2.1.)
  *   - CCM is on DCode, without delay, and cannot be executed. (RM 2.3.1)
- *   - A register of APB1 takes two of its clocks, 8 cycles, and up to 3 until one begins; one of APB2 4
- *     and 1. (APB; RM 2.3.1 has the clocks at most. Writes are counted as reads.)
+ *   - Access to a register of APB1 takes two APB1 clocks, 8 cycles, and up to 3 cycles until a clock
+ *     begins; for APB2 4 and 1. (APB; RM 2.3.1 has the maximum clocks. Writes count as reads.)
  *
- * Left out: fetches ahead of a jump that is taken, DMA, and the other masters.
+ * Not modelled: fetches ahead of a taken jump, DMA, and the other bus masters.
  */
 #ifndef M4FLASH_H
 #define M4FLASH_H
@@ -45,23 +45,23 @@ enum {
     APB2_WAIT = 4 + 1 - 1,
 };
 
-/* No line has this number. */
+/* A number that no line has. */
 static const uint32_t NO_LINE = UINT32_MAX;
 
-/* What the manual leaves open, or what would be if it were wrong. */
+/* Policies that the manual leaves open, or that apply if the manual is wrong. */
 static struct {
     bool first_in_first_out; /* instead of LRU */
-    bool keep_prefetched;    /* what was prefetched in time goes into the cache too */
+    bool keep_prefetched;    /* lines prefetched in time enter the cache too */
 } policy;
 
 struct cache {
     uint32_t lines[INSTRUCTION_LINES];
-    uint64_t used[INSTRUCTION_LINES]; /* or filled; 0: empty */
+    uint64_t used[INSTRUCTION_LINES]; /* sequence number of the last use, or of the fill; 0: empty */
     unsigned size;
     unsigned fills;
 };
 
-/* What a core meets on its way to memory, and when. */
+/* The state of the memory system, with times in cycles. */
 struct memory {
     uint64_t now;
     uint64_t uses;
@@ -72,12 +72,12 @@ struct memory {
     uint32_t prefetched;
     uint64_t prefetched_at;
     uint32_t next_pc;
-    uint32_t sram_word;     /* fetched last */
-    uint64_t sram_word_at;  /* and there */
-    uint64_t word_begins[WORDS_AHEAD]; /* the last ones that began to run */
+    uint32_t sram_word;     /* last fetched word */
+    uint64_t sram_word_at;  /* time at which it is available */
+    uint64_t word_begins[WORDS_AHEAD]; /* times at which the last words began to run */
 };
 
-/* Empty caches, and nothing on its way. */
+/* Returns a memory system with empty caches and no read in progress. */
 static struct memory cold_memory(void)
 {
     struct memory memory = {.line_in_use = NO_LINE, .prefetched = NO_LINE, .sram_word = NO_LINE};
@@ -97,7 +97,7 @@ static bool is_sram(uint32_t address)
     return address >= 0x20000000 && address < 0x40000000;
 }
 
-/* The place of a line in a cache, or -1. */
+/* Returns the index of a line in a cache, or -1. */
 static int find_line(const struct cache *cache, uint32_t line)
 {
     for (unsigned k = 0; k < cache->size; k++) {
@@ -133,10 +133,10 @@ static void fill(struct memory *memory, struct cache *cache, uint32_t line)
     cache->fills++;
 }
 
-/* Reads a line that the core wants now; how long it waits. */
+/* Reads a line that the core needs now; returns the wait states. */
 static unsigned read_line(struct memory *memory)
 {
-    /* Without wait states it would have been asked for a cycle ago, and be there. */
+    /* Without wait states the read would have begun a cycle ago, and the line would be available now. */
     uint64_t begins = memory->now - 1;
     if (begins < memory->flash_busy_until) {
         begins = memory->flash_busy_until;
@@ -145,12 +145,12 @@ static unsigned read_line(struct memory *memory)
     return (unsigned)(memory->flash_busy_until - memory->now);
 }
 
-/* The line comes into use; how long the core waits for it. */
+/* Makes a line the line in use; returns the wait states. */
 static unsigned use_line(struct memory *memory, uint32_t line)
 {
     unsigned wait = 0;
     if (hits(memory, &memory->instructions, line)) {
-        /* There. */
+        /* Available without a wait. */
     } else if (memory->prefetched == line) {
         if (memory->prefetched_at > memory->now) {
             wait = (unsigned)(memory->prefetched_at - memory->now);
@@ -176,7 +176,7 @@ static unsigned use_line(struct memory *memory, uint32_t line)
     return wait;
 }
 
-/* The word of SRAM is to run; how long the core waits for it. */
+/* Fetches a word of SRAM that is to run; returns the wait states. */
 static unsigned use_sram_word(struct memory *memory, uint32_t word)
 {
     uint64_t at;
@@ -185,7 +185,7 @@ static unsigned use_sram_word(struct memory *memory, uint32_t word)
         uint64_t begins = memory->sram_word_at > room ? memory->sram_word_at : room;
         at = begins + WORD_FROM_SRAM;
     } else {
-        /* A jump's own cycles have the first of the two. */
+        /* The first of the two cycles is part of the jump's own cycles. */
         at = memory->now + WORD_FROM_SRAM - 1;
     }
     memory->sram_word = word;
@@ -195,7 +195,7 @@ static unsigned use_sram_word(struct memory *memory, uint32_t word)
     return wait;
 }
 
-/* An instruction is to run that takes so many cycles without wait states; how long it waits. */
+/* Fetches an instruction that takes `cycles` cycles without wait states; returns the wait states. */
 static unsigned fetch(struct memory *memory, uint32_t pc, uint32_t size, unsigned cycles)
 {
     unsigned waits = 0;
@@ -225,7 +225,7 @@ static unsigned fetch(struct memory *memory, uint32_t pc, uint32_t size, unsigne
     return waits;
 }
 
-/* An instruction reads or writes so many bytes; how long it waits. */
+/* Reads or writes data of an instruction; returns the wait states. */
 static unsigned use_data(struct memory *memory, uint32_t address, unsigned bytes)
 {
     unsigned waits = 0;
@@ -239,20 +239,20 @@ static unsigned use_data(struct memory *memory, uint32_t address, unsigned bytes
             }
         }
     } else if (is_sram(address)) {
-        /* Fetches from there wait. */
+        /* Instruction fetches from SRAM wait. */
         memory->sram_word_at += (bytes + 3) / 4;
     }
     return waits;
 }
 
-/* A register is waited for, which holds the system bus. */
+/* Waits for a peripheral register, whose access occupies the system bus. */
 static void wait_for_device(struct memory *memory, unsigned waits)
 {
     memory->now += waits;
     memory->sram_word_at += waits;
 }
 
-/* Cycles that a register of a slow bus takes beyond those of memory. */
+/* Returns the wait states of a peripheral register on a slow bus; 0 for other addresses. */
 static unsigned device_wait(uint32_t address)
 {
     if (address >= 0x40000000 && address < 0x40008000) {

@@ -1,8 +1,8 @@
-/* What exception handlers cost, activation by activation, and how long interrupts are kept off.
+/* Counts the cost of each activation of exception handlers, and the time that interrupts are off.
  *
- * With wait states, a handler and a time without interrupts begin with empty caches, as if what ran
- * before them had left nothing that they use; what a handler preempts finds the caches as it left them.
- * What it loses there is for the schedule to add: it knows from `fills` whether there is anything. */
+ * With wait states, a handler and a time without interrupts begin with empty caches, as if the code
+ * before them had left no line that they use. Code that a handler preempts finds the caches as it left
+ * them; the schedule adds the cost of its lost lines, which it computes from `fills`. */
 #ifndef M4HANDLERS_H
 #define M4HANDLERS_H
 
@@ -13,12 +13,12 @@
 
 enum {
     HANDLERS = 32,
-    /* How deep they preempt each other. */
+    /* Largest depth of preemption. */
     FRAMES = 32,
-    /* Kinds of activations: by how often the handler's DATA or the watched instruction was seen in
-     * them; the last one is as often or more. */
+    /* Kinds of activations, by the number of accesses to the handler's DATA or of executions of the
+     * watched instruction; the last kind includes larger numbers. */
     KINDS = 5,
-    /* Instructions that read or write some handler's DATA. */
+    /* Largest number of instructions that access the DATA of a handler. */
     TOUCHING = 64,
 };
 
@@ -31,36 +31,36 @@ struct activations {
     uint64_t most_fills;  /* lines of both caches */
 };
 
-/* The cheapest activation; 0: none. */
+/* The costs of the cheapest activation; 0 if there was none. */
 struct least {
     uint64_t cycles;
     uint64_t waited; /* cycles with wait states */
-    uint64_t fills;  /* of that one */
+    uint64_t fills;  /* lines that the activation with the least `waited` loaded */
 };
 
 struct handler {
     char name[48];
     uint32_t start;
     uint32_t end;
-    uint32_t data; /* address, or 0: the watched instruction is looked for instead */
+    uint32_t data; /* address, or 0: count the watched instruction instead */
     struct least least;
-    struct least least_looking; /* of those in which the second watched instruction ran, not the first */
+    struct least least_looking; /* of the activations that ran the instruction at look=ADDR and have seen == 0 */
     struct activations kinds[KINDS];
 };
 
-/* A handler that is running, or preempted. */
+/* A handler that is running or preempted. */
 struct frame {
     int handler;
     int seen;
-    bool looked; /* the second watched instruction ran */
+    bool looked; /* the instruction at look=ADDR ran */
     uint64_t insns;
     uint64_t cycles;
     uint64_t waits;
-    const struct insn *previous; /* of this handler: what preempts it is left out */
-    struct memory preempted;     /* what it has preempted, as that left it */
+    const struct insn *previous; /* previous instruction of this handler, without what preempts it */
+    struct memory preempted;     /* memory state of the preempted code */
 };
 
-/* A time for which interrupts are kept off. */
+/* A time during which interrupts are off. */
 struct lock {
     bool held;
     uint64_t cycles;
@@ -95,19 +95,19 @@ static uint32_t looking_pc;
 
 static struct frame frames[FRAMES];
 static int depth;
-/* The last instruction was one with which the handler on top may return. */
+/* The last instruction may have returned from the handler on top. */
 static bool leaving;
 static uint32_t last_end;
 
 static struct lock all_off;
 static struct lock some_off;
-/* What runs now finds this. */
+/* The memory state of the running code. */
 static struct memory memory;
 static const struct insn *last_insn;
-/* A handler has run: before that the image starts, and may have interrupts off. */
+/* A handler has run. Before that the image starts, and may have interrupts off for long. */
 static bool started;
 
-/* handler=NAME:START:END:DATA, watch=ADDR or look=ADDR; anything else is somebody else's. */
+/* Parses handler=NAME:START:END:DATA, watch=ADDR or look=ADDR; ignores other arguments. */
 static void take_argument(const char *argument)
 {
     struct handler handler = {0};
@@ -120,7 +120,7 @@ static void take_argument(const char *argument)
     sscanf(argument, "look=%" SCNx32, &looking_pc);
 }
 
-/* What a translated instruction means to the handlers. */
+/* Finds the handlers that begin or end at a translated instruction. */
 static void find_handlers(struct insn *insn)
 {
     insn->watched = watched_pc != 0 && insn->pc == watched_pc;
@@ -136,9 +136,9 @@ static void find_handlers(struct insn *insn)
     }
 }
 
-/* Instructions that read or write a handler's DATA, as far as they have been seen to. With -icount
- * an access to a device is not always reported, its instruction is: one that was seen to touch DATA
- * counts from then on, whenever it runs. */
+/* Instructions that have been seen to access a handler's DATA. With -icount QEMU does not report every
+ * access to a device, but it reports every instruction: one that was seen to access DATA counts from then
+ * on whenever it runs. */
 static uint32_t touching[TOUCHING];
 static int touching_count;
 
@@ -152,7 +152,7 @@ static bool touches_data(uint32_t pc)
     return false;
 }
 
-/* An instruction has read or written an address. */
+/* Records that an instruction has accessed an address. */
 static void note_access(const struct insn *insn, uint64_t address)
 {
     if (depth == 0 || address == 0 || handlers[frames[depth - 1].handler].data != address) {
@@ -163,7 +163,7 @@ static void note_access(const struct insn *insn, uint64_t address)
     }
 }
 
-/* The handler on top has returned. */
+/* Ends the activation on top, whose handler has returned. */
 static void pop_frame(void)
 {
     const struct frame *frame = &frames[--depth];
@@ -183,7 +183,7 @@ static void pop_frame(void)
     memory = frame->preempted;
 }
 
-/* An instruction runs that may begin or end a lock: both of them are part of it. */
+/* Counts an instruction for a lock. The instructions that begin and end the lock are part of it. */
 static void count_lock(struct lock *lock, const struct insn *insn, unsigned cycles, bool begins, bool ends)
 {
     if (begins && !lock->held) {
@@ -214,7 +214,7 @@ static void count_locks(const struct insn *insn)
     if (started) {
         count_lock(&all_off, insn, cycles, insn->lock_change == ALL_OFF, insn->lock_change == ALL_ON);
     }
-    /* Only thread mode's. */
+    /* Only locks of thread mode count. */
     if (depth == 0) {
         count_lock(&some_off, insn, cycles, insn->lock_change == SOME_OFF, insn->lock_change == SOME_ON);
     }
@@ -235,7 +235,7 @@ static void count_frame(const struct insn *insn, unsigned waits)
     leaving = insn->leaves == frame->handler;
 }
 
-/* Data were waited for. */
+/* Adds wait states of data to the running handler. */
 static void wait_in_handlers(unsigned waits)
 {
     if (depth > 0) {
@@ -243,7 +243,7 @@ static void wait_in_handlers(unsigned waits)
     }
 }
 
-/* The same, if what is read lies in a cache that is empty when interrupts go off. */
+/* Adds wait states of data to a lock, whose caches were empty when interrupts were switched off. */
 static void wait_in_lock(struct lock *lock, uint32_t address, unsigned bytes)
 {
     if (lock->held) {
@@ -251,11 +251,11 @@ static void wait_in_lock(struct lock *lock, uint32_t address, unsigned bytes)
     }
 }
 
-/* An instruction is to run: handlers that have ended, and one that begins. */
+/* Before an instruction runs: ends the handler that has returned, and begins a new one. */
 static void follow_handlers(const struct insn *insn)
 {
-    /* A return that is not taken falls through; handlers lie one behind the other, but none falls
-     * into the next. */
+    /* A conditional return that is not taken falls through. Handlers are adjacent in memory, but none
+     * falls through into the next. */
     if (leaving && depth > 0 && (insn->pc != last_end || insn->enters != NO_HANDLER)) {
         pop_frame();
     }
@@ -267,7 +267,7 @@ static void follow_handlers(const struct insn *insn)
     }
 }
 
-/* An instruction runs, after so many wait states. */
+/* Counts an instruction, with its wait states, for the locks and the running handler. */
 static void count_for_handlers(const struct insn *insn, unsigned waits)
 {
     count_locks(insn);

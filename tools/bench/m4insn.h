@@ -1,4 +1,4 @@
-/* An instruction as it was translated: what it costs, and what it does to handlers and locks. */
+/* A translated instruction: its cost, and its effect on handlers and interrupt locks. */
 #ifndef M4INSN_H
 #define M4INSN_H
 
@@ -12,7 +12,7 @@ enum marker {
     REGION_ENDS,
 };
 
-/* What becomes of interrupts: PRIMASK keeps all of them off, BASEPRI some. */
+/* The effect on interrupts: PRIMASK masks all of them, BASEPRI some. */
 enum lock_change {
     LOCK_UNCHANGED,
     ALL_OFF,
@@ -29,14 +29,14 @@ struct insn {
     struct cost cost;
     enum marker marker;
     enum lock_change lock_change;
-    bool returns; /* or would, were its condition met */
-    bool watched;
+    bool returns; /* is a return instruction, perhaps a conditional one */
+    bool watched; /* is the instruction at watch=ADDR */
     int enters; /* the handler that begins here, or NO_HANDLER */
     int leaves; /* the handler that ends here, or NO_HANDLER */
-    unsigned device_wait; /* once it was seen to access a register */
+    unsigned device_wait; /* wait states, once it was seen to access a peripheral register */
     const char *text;
-    uint64_t executed; /* in the region */
-    uint64_t waited;   /* cycles, in the region */
+    uint64_t executed; /* number of executions in the region */
+    uint64_t waited;   /* wait states in the region, cycles */
 };
 
 static uint32_t halfword(const uint8_t *bytes)
@@ -44,14 +44,14 @@ static uint32_t halfword(const uint8_t *bytes)
     return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8;
 }
 
-/* By the first halfword: 0b11101, 0b11110 and 0b11111 begin a 32-bit instruction.
- * Not qemu_plugin_insn_size(): QEMU 7.2 over-reports it near the ends of 1 KiB pages. */
+/* Returns the size by the first halfword: 0b11101, 0b11110 and 0b11111 begin a 32-bit instruction.
+ * qemu_plugin_insn_size() is not used: QEMU 7.2 over-reports near the ends of 1 KiB pages. */
 static uint32_t size_of(const uint8_t *bytes)
 {
     return bytes[1] >> 3 >= 0x1D ? 4 : 2;
 }
 
-/* DBG #1 and DBG #2. */
+/* Decodes the markers DBG #1 and DBG #2. */
 static enum marker marker_of(uint32_t first, uint32_t second)
 {
     if (first == 0xF3AF && second == 0x80F1) {
@@ -63,8 +63,8 @@ static enum marker marker_of(uint32_t first, uint32_t second)
     return NO_MARKER;
 }
 
-/* Assumption: PRIMASK is written only to have interrupts on again, and BASEPRI only to be what it
- * was before BASEPRI_MAX was raised. What is written is not looked at. */
+/* Assumption: PRIMASK is written only to unmask interrupts, and BASEPRI only to restore its value from
+ * before BASEPRI_MAX was raised. The written value is not checked. */
 static enum lock_change lock_change_of(uint32_t first, uint32_t second)
 {
     if (first == 0xB672) { /* cpsid i */
@@ -96,7 +96,7 @@ static bool is_return(uint32_t first, uint32_t second)
         || (first == 0xF85D && second == 0xFB04);      /* ldr pc, [sp], #4 */
 }
 
-/* All that its encoding and its text say; the text must stay where it is. */
+/* Decodes an instruction from its encoding and its text; the text must outlive the instruction. */
 static void decode(struct insn *insn, uint32_t pc, const uint8_t *bytes, const char *text)
 {
     insn->pc = pc;
@@ -118,7 +118,7 @@ static bool jumps(const struct insn *insn, const struct insn *previous)
     return insn->pc != previous->pc + previous->size;
 }
 
-/* Cycles of an instruction behind another one, or behind NULL. */
+/* Returns the cycles of an instruction that runs after `previous` (NULL: unknown). */
 static unsigned cycles_of(const struct insn *insn, const struct insn *previous)
 {
     if (previous == NULL) {

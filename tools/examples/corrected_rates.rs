@@ -1,10 +1,9 @@
-//! Corrected yaw rates of a recorded drive, as CSV.
+//! This example prints the corrected yaw rates of a recorded drive as CSV.
 //!
 //! `cargo run --release -p gyronet-tools --example corrected_rates -- tools/data/simulated_drive.csv`
 //!
-//! A line a sample, from the end of static initialisation on: its time, s; the gyro's yaw rate, the
-//! corrected one as it is sent at once, the one that is sent for navigation 70 ms later, and the error
-//! to expect of the last, all in rad/s (empty: not known).
+//! Each line is a sample after static initialisation: time, s; the yaw rate of the gyro, the prompt rate, the
+//! navigation rate, which is sent 70 ms later, and its expected error, rad/s. An empty field is unknown.
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
@@ -15,10 +14,10 @@ use std::error::Error;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let file = std::env::args().nth(1).ok_or("which drive? Name a CSV file")?;
+    let file = std::env::args().nth(1).ok_or("no drive given: pass the path of a CSV file")?;
     let recording = Recording::read(Path::new(&file))?;
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
-    // The wheels, where the drive has them, say when it stands still.
+    // If the drive has wheels, they show when the vehicle stands.
     let wheels = WheelFrames::new(&recording);
     let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, wheels, &mut network, || {})?;
 

@@ -1,11 +1,11 @@
-//! This module calibrates one unit: gain and mounting of its gyro, from drives with a reference of their heading.
+//! This module calibrates the gain and the mounting of one unit's gyro, from drives with a heading reference.
 //!
-//! A yaw rate that the coprocessor has corrected still contains a share of the roll rate and of the pitch rate (the
-//! sensor is not level in the vehicle, or the reference is not) and a share of itself (gain). Over a second or more
-//! these errors add up to an angle, and the reference shows it. The shares are fitted to those angles, each drive with
-//! a constant of its own, because bias belongs to the drive and not to the unit. They are the last row of a 3 x 3 map
-//! ([`gyronet::mounting::GyroMap`]) that the board applies to every sample. The rows above it stay those of the
-//! identity, because a heading does not depend on them.
+//! The yaw rate that the coprocessor has corrected still contains a share of the roll rate and of the pitch rate (the
+//! sensor or the reference is not level in the vehicle) and a share of itself (gain). Over a second or more these
+//! errors add up to an angle, which the reference shows. The shares are fitted to those angles, with a separate
+//! constant for each drive, because bias belongs to the drive and not to the unit. The shares are the last row of a 3
+//! x 3 map ([`gyronet::mounting::GyroMap`]) that the board applies to every sample. The other rows stay those of the
+//! identity, because the heading does not depend on them.
 
 mod fit;
 mod spans;
@@ -18,83 +18,83 @@ use gyronet::mounting::GyroMap;
 use spans::Span;
 use unit_file::UnitFile;
 
-/// A drive needs at least this many seconds after static initialisation.
+/// Shortest reference that a drive needs after static initialisation, s.
 const SHORTEST_S: f64 = 30.0;
-/// The sigma of another axis's share may be at most this: 1.1 deg of mounting.
+/// Largest sigma of the share of the roll or pitch rate: 1.1 deg of mounting.
 const MAX_CROSS_SIGMA: f64 = 0.02;
-/// The sigma of the gain may be at most this.
+/// Largest sigma of the gain.
 const MAX_GAIN_SIGMA: f64 = 0.005;
-/// The robust deviation of the spans' angles from the fit may be at most this, rad: no corrected gyro has so large an
-/// error in so short a time.
+/// Largest robust deviation of the spans' angles from the fit, rad. No corrected gyro has an error that large in that
+/// time.
 const MAX_RESIDUAL_RAD: f64 = 0.05;
 
 /// The reason why a drive gives no calibration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrateError {
-    /// The drive cannot be run.
+    /// The drive cannot be replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// The drive has no reference of its heading.
-    #[error("{path}: no {columns}, which a calibration needs")]
+    /// The drive has no heading reference.
+    #[error("{path}: no {columns}: a calibration needs one of these columns")]
     NoReference {
         /// The recording.
         path: String,
-        /// The columns that would serve as one.
+        /// The columns that are missing.
         columns: &'static str,
     },
-    /// The drive is too short.
-    #[error("{path}: {seconds:.0} s with a reference, a calibration needs {SHORTEST_S:.0}")]
+    /// The reference of the drive is too short.
+    #[error("{path}: only {seconds:.0} s with a reference; a calibration needs {SHORTEST_S:.0} s")]
     TooShort {
         /// The recording.
         path: String,
         /// The time with a reference, s.
         seconds: f64,
     },
-    /// Reference and gyro contradict each other, whatever the calibration.
-    #[error("{path}: reference and gyro differ by {rad:.3} rad from span to span: they are not of one drive")]
+    /// No calibration makes the gyro agree with the reference.
+    #[error("{path}: reference and gyro differ by {rad:.3} rad from span to span: not the same drive")]
     Contradiction {
         /// The recording.
         path: String,
-        /// The robust deviation.
+        /// The robust deviation of the spans from the fit, rad.
         rad: f64,
     },
-    /// An element is further from the identity than a real unit's can be.
-    #[error("{what} {value:+.4}: no unit is so far off; configure how the sensor is mounted")]
+    /// A share is larger than a real unit's can be.
+    #[error("{what} {value:+.4} is too large for any unit; configure how the sensor is mounted")]
     Implausible {
-        /// The name of the element.
+        /// The name of the share.
         what: &'static str,
-        /// Its value.
+        /// The value of the share.
         value: f64,
     },
 }
 
-/// Holds a share of the map, with its sigma.
+/// A share that the fit has found, with its sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Share {
     /// The name of the share.
     pub name: &'static str,
-    /// The value; 0 where it is refused.
+    /// The value; 0 if the share is refused.
     pub value: f64,
-    /// Its standard deviation, from fits that leave out one block of time each.
+    /// Standard deviation of the value, from fits that each leave out one block of time.
     pub sigma: f64,
-    /// The reason why it is refused: the drives do not show it.
+    /// The reason why the share is refused: what the drives lack to show it.
     pub refused: Option<&'static str>,
 }
 
-/// Holds a drive, replayed with the weights that the board runs.
+/// A drive, replayed with the weights that the board runs.
 pub struct Drive<'a> {
     /// The recording.
     pub recording: &'a Recording,
-    /// Its replay, without a map.
+    /// The replay of the recording, without a map.
     pub replay: Replay,
 }
 
-/// Lists the shares: the name, the largest sigma, and what the drives lack if the share is not found.
+/// Name of each share, its largest sigma, and the reason for a refusal.
 const SHARES: [(&str, f64, &str); 3] = [
-    ("roll", MAX_CROSS_SIGMA, "no rolling: the drives do not show it"),
-    ("pitch", MAX_CROSS_SIGMA, "no pitching: the drives do not show it"),
-    ("gain", MAX_GAIN_SIGMA, "no turns, or all alike: the drives do not tell it from a bias"),
+    ("roll", MAX_CROSS_SIGMA, "too little rolling in the drives to observe it"),
+    ("pitch", MAX_CROSS_SIGMA, "too little pitching in the drives to observe it"),
+    ("gain", MAX_GAIN_SIGMA, "too few turns, or all alike: the drives cannot tell it from a bias"),
 ];
 
 /// Fits the map of a unit to its drives.
@@ -103,7 +103,7 @@ const SHARES: [(&str, f64, &str); 3] = [
 /// [`CalibrateError`].
 pub fn calibrate(drives: &[Drive<'_>], weights: u32) -> Result<UnitFile, CalibrateError> {
     let spans: Vec<Vec<Span>> = drives.iter().map(spans::of).collect::<Result<_, _>>()?;
-    // A share that the drives hardly show makes the others uncertain, so the least certain one goes first.
+    // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.
     let (mut fitted, mut refused) = ([true; 3], [None; 3]);
     let fit = loop {
         let fit = Fit::new(&spans, fitted);
@@ -155,8 +155,8 @@ mod tests {
         }
     }
 
-    /// Simulates 20 minutes of a unit that reads 2 % too much about z. The reference is a course once a second, which is
-    /// known to 0.02 rad, missing for a minute, and ends at a sample.
+    /// Simulates 20 minutes of a unit that reads 2 % too much about z. The reference is a course once a second with a
+    /// sigma of 0.02 rad. It is missing for a minute, and ends at the sample `end`.
     fn by_course(end: usize) -> Result<UnitFile, CalibrateError> {
         let mut bytes = Vec::new();
         csv::write(&Config { seconds: 1_200, seed: 5, ..Config::DEFAULT }, &mut bytes).unwrap();
@@ -179,7 +179,7 @@ mod tests {
     fn a_course_shows_the_gain() {
         let [.., gain] = by_course(usize::MAX).unwrap().shares;
         assert_eq!(gain.refused, None, "{gain:?}");
-        // The true rate is the reading over 1.02; the part has a gain of its own, 0.1 % of sigma.
+        // The true rate is the reading over 1.02; the simulated part adds a gain with a sigma of 0.1 %.
         assert!((gain.value + 0.02).abs() < 0.003 + 3.0 * gain.sigma, "{gain:?}");
     }
 

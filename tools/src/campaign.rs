@@ -1,24 +1,25 @@
 //! These modules inject faults: drives become bytes on the board's lines, faults damage them, and a receiver judges the
 //! board's messages.
 //!
-//! A [`drive::Drive`] becomes the bytes that a [`Part`] and the vehicle's wheels would send; faults disturb what is
-//! measured ([`motion`]) or damage bytes on a line ([`wire`]); the [`board::Board`], the library's own parts in the
-//! order of the image, turns them into bytes of frames; a [`receiver::Receiver`] reads these as an ECU would. The
-//! judgement rests on these bytes alone, as a vehicle's would.
+//! A [`drive::Drive`] is encoded as the bytes that a [`Part`] and the vehicle's wheels would send. Faults disturb the
+//! measurements ([`motion`]) or damage bytes on a line ([`wire`]). The [`board::Board`] runs the library's components
+//! in the order of the image and converts the bytes to CAN frames. A [`receiver::Receiver`] reads these as an ECU
+//! would. The judgement uses only the bytes of these frames, as a vehicle would.
 //!
 //! | word | meaning |
 //! |---|---|
-//! | reported | a receiver of our own messages sees it: quality, fault bits, E2E, silence of 35 ms; with a fibre-optic gyro, of that one's messages |
-//! | marked good | a set of messages that arrives whole, quality good, no fault bit |
-//! | moved | yaw turned in a second, all of it marked good, less the same second of the same drive undamaged, by the accumulated yaw on the bus |
-//! | limit | the expected error (1 sigma) that is sent with the last set of that second, but at most [`judge::Limits::moved`] |
-//! | undetected | yaw has moved by more than the limit, and nothing had reported the fault |
-//! | harmless | nothing reported it, and yaw has not moved by more than the limit |
-//! | error | yaw turned in a good second less the drive's reference: what is left of it without faults is the method's |
+//! | reported | a receiver of our own messages (with a fibre-optic gyro, of that gyro's messages) detects the fault: by quality, fault bits, E2E, or silence of 35 ms |
+//! | marked good | a complete set of messages with quality good and no fault bit |
+//! | moved | difference of the yaw turned in a second that is all marked good from that of the same second of the undamaged drive, by the accumulated yaw on the bus |
+//! | limit | the expected error (1 sigma) sent with the last set of that second, but at most [`judge::Limits::moved`] |
+//! | undetected | yaw moved by more than the limit before any report of the fault |
+//! | harmless | the fault was not reported, and yaw did not move by more than the limit |
+//! | error | difference of the yaw turned in a good second from the drive's reference; without faults it is the error of the method |
 //! | recovery | from the end of the fault to the last report |
 //!
-//! From 0.2 s after the last report on, the error of a good second is compared with that of the same second undamaged:
-//! the network's windows then begin at another sample, and two equally good estimates need not be equal.
+//! From 0.2 s after the last report on, the error of a good second is compared with that of the same undamaged
+//! second. The yaw itself is not compared there: the network's windows then begin at another sample, and two equally
+//! good estimates need not be equal.
 
 pub mod board;
 pub mod drive;
@@ -54,38 +55,38 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub const QUICK: usize = 320;
 /// A run has at most this many rows: 8 s.
 const ROWS: usize = 800;
-/// A run has this many rows after its faults are over, and with faults that last.
+/// A run has [`AFTER`] rows after its faults are over, or [`WITH`] rows with faults that last to the end.
 const AFTER: usize = 350;
 const WITH: usize = 400;
 /// A fault begins after at least this many rows, so that a good second comes first.
 const HEALTHY: usize = 101;
 /// In a run that starts with static initialisation, a fault begins after at least this many rows.
 const HEALTHY_AT_START: usize = 20;
-/// One run in so many starts at the beginning of its drive.
+/// One run in this many starts at the beginning of its drive.
 const START_EVERY: u64 = 8;
-/// [`SINGLE`] of so many runs have one fault, the others have two.
+/// [`SINGLE`] of [`OF`] runs have one fault, the others have two.
 const OF: usize = 5;
 const SINGLE: usize = 3;
 
 /// Describes the size of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
-    /// Runs.
+    /// Number of runs.
     pub runs: usize,
-    /// Seed of the runs; the same one gives the same runs.
+    /// Seed of the runs; the same seed gives the same runs.
     pub seed: u64,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
 }
 
 /// Holds one run of a drive with faults.
 #[derive(Debug, Clone)]
 pub struct Run {
-    /// Its number.
+    /// Index of the run in the campaign.
     pub number: usize,
-    /// The drive.
+    /// Name of the drive.
     pub drive: String,
-    /// The part.
+    /// The sensor whose bytes the drive is encoded as.
     pub part: Part,
     /// The one or two faults.
     pub faults: Vec<Fault>,
@@ -137,7 +138,7 @@ pub fn scenes<'d>(
     )
 }
 
-/// Runs the plan and returns the runs in their order; `tick` is called after each of them.
+/// Runs the plan and returns the runs in order; `tick` is called after each run.
 #[must_use]
 pub fn run(plan: Plan, scenes: &[Scene<'_>], blob: &Blob<'_>, tick: impl Fn() + Sync) -> Vec<Run> {
     on_threads(
@@ -184,7 +185,7 @@ fn one(seed: u64, number: usize, scenes: &[Scene<'_>], networks: &mut Integer<'_
     Run { number, drive: scene.drive.name.clone(), part: scene.part, faults, outcome }
 }
 
-/// Makes `count` results on some threads, each with a tool of its own, and returns them in order.
+/// Computes `count` results on several threads, each with its own tool, and returns them in order.
 fn on_threads<W, T: Send>(
     threads: usize,
     count: usize,
@@ -203,7 +204,7 @@ fn on_threads<W, T: Send>(
                     }
                     own.push((n, make(&mut tool, n)));
                 }
-                // A thread that panicked has ended the program already.
+                // If a thread panicked, `scope` panics too, so the poisoned data are not used.
                 done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut own);
             });
         }

@@ -1,5 +1,5 @@
-//! Clients of a board: [`device`] asks and configures it over diagnosis on a [`bus`], [`monitor`] checks its CAN messages
-//! as a receiver would. A serial line or a socket is a [`connection`].
+//! Clients of a board: [`device`] queries and configures a board over diagnosis on a [`bus`], and [`monitor`] checks
+//! the board's CAN messages as a receiver would. A [`connection`] is a serial line or a socket.
 
 pub mod bus;
 pub mod connection;

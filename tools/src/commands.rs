@@ -1,4 +1,5 @@
-//! The subcommands: one file for each, which reads arguments and writes text and files, and the code that they share.
+//! The subcommands, one file each. They parse arguments, call the library, and write text and files. This file holds
+//! the code that they share.
 
 pub mod bench_target;
 pub mod bus;
@@ -39,11 +40,11 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-/// The library's errors are typed; here all that matters is that each prints as one clear line
+/// The result of a subcommand. The library's errors are typed; here an error only needs to print as one clear line
 /// that names the file.
 pub type Result = std::result::Result<(), Box<dyn std::error::Error>>;
 
-/// Writes a value as JSON, with a line end.
+/// Writes a value as pretty-printed JSON and a newline.
 fn print_json(out: &mut impl std::io::Write, value: &impl serde::Serialize) -> Result {
     serde_json::to_writer_pretty(&mut *out, value).map_err(std::io::Error::from)?;
     Ok(writeln!(out)?)
@@ -55,7 +56,7 @@ fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> 
     if common.quiet { Ok(()) } else { writeln!(std::io::stderr(), "{line}") }
 }
 
-/// Reads a drive, and names the vehicle file beside it.
+/// Reads a drive, and prints a remark if it has a vehicle file beside it.
 fn read_drive(
     path: &std::path::Path,
     common: Common,
@@ -65,7 +66,7 @@ fn read_drive(
     Ok(recording)
 }
 
-/// Names the vehicle file beside a drive.
+/// Prints the path of the vehicle file beside a drive, if there is one.
 fn remark_vehicle(recording: &Recording, common: Common) -> std::io::Result<()> {
     if let Some(vehicle) = &recording.vehicle.path {
         remark(common, format_args!("{}: vehicle file {}", recording.path, vehicle.display()))?;
@@ -79,7 +80,7 @@ pub struct Common {
     /// Print results and errors only: no progress, no remarks.
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// Print results as JSON, on standard output.
+    /// Print results as JSON on standard output.
     #[arg(long, global = true)]
     pub json: bool,
 }
@@ -99,7 +100,7 @@ impl WriteError {
     }
 }
 
-/// Writes a drive's frames to a file.
+/// Writes the CAN log of a replayed drive to a file; returns the number of frames.
 fn write_log(drive: &Replay, path: &Path) -> std::result::Result<u64, WriteError> {
     let error = WriteError::to(path);
     let file = File::create(path).map_err(&error)?;

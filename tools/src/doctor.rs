@@ -1,8 +1,8 @@
-//! A recording is examined before anyone trusts it: what its sensor does, what can be judged on it, and what a calibration
-//! or a training could gain.
+//! The doctor examines a recording before its results are trusted: how the sensor behaves, what the recording can
+//! judge, and what a calibration or a training could gain.
 //!
-//! The recording is read row by row and refused by nobody here: what the other commands would refuse it for is one of the
-//! findings.
+//! The recording is read row by row and not rejected for its defects: a defect for which other commands would reject
+//! the recording is reported as a finding.
 
 mod allan;
 mod finding;
@@ -30,27 +30,27 @@ use gyronet::pipeline::PipelineConfig;
 use recording::Rows;
 use std::path::Path;
 
-/// Rows in which static initialisation is over.
+/// Rows that are enough for static initialisation.
 const STARTED: usize = 400;
 
-/// Holds a recording examined.
+/// The results of examining a recording.
 #[derive(Debug)]
 pub struct Doctor {
-    /// Its name.
+    /// The name of the recording.
     pub name: String,
     /// The time from the first row to the last, s.
     pub seconds: f64,
     /// The findings.
     pub findings: Vec<Finding>,
-    /// The standstills: from and to, s.
+    /// Begin and end of each standstill, s.
     pub standstills: Vec<(f64, f64)>,
     /// Allan deviations of the gyro about x, y and z in the longest standstill.
     pub allan: Option<[Allan; 3]>,
-    /// Their figures.
+    /// Noise figures of the gyro about x, y and z.
     pub noise: Option<[Option<Noise>; 3]>,
-    /// The mounting.
+    /// The mounting, by gravity at rest.
     pub mounting: Option<Mounting>,
-    /// The yaw rate over time, rad/s, for the picture: the gyro's and the reference's.
+    /// Yaw rate of the gyro and of the reference over time, rad/s, for the chart.
     pub curves: [Vec<(f64, f64)>; 2],
 }
 
@@ -58,7 +58,7 @@ impl Doctor {
     /// Examines a recording.
     ///
     /// # Errors
-    /// [`DataError`]: the file is no drive at all.
+    /// [`DataError`]: the file is not a drive.
     pub fn examine(path: &Path) -> Result<Self, DataError> {
         let mut doctor = Self::of(&Rows::read(path)?);
         doctor.findings.insert(0, start(path));
@@ -79,7 +79,7 @@ impl Doctor {
             allan::finding(noise.as_ref(), longest),
             Finding::note(
                 "temperature",
-                "Not a column of a drive: a bias that follows temperature cannot be told from one that drifts.",
+                "A drive has no temperature column: a bias that follows temperature cannot be told from one that drifts.",
             ),
             mounting::finding(mounting.as_ref()),
             forward::finding(rows, mounting.as_ref()),
@@ -100,14 +100,14 @@ impl Doctor {
         }
     }
 
-    /// Returns the finding on a subject.
+    /// Returns the finding about a subject.
     #[must_use]
     pub fn finding(&self, what: &str) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.what == what)
     }
 }
 
-/// Runs the beginning of the drive through the pipeline, which says itself whether it can start.
+/// Runs the beginning of the drive through the pipeline and reports whether static initialisation succeeds.
 fn start(path: &Path) -> Finding {
     let run = || -> Result<(), Box<dyn std::error::Error>> {
         let mut recording = Recording::read(path)?;
@@ -119,9 +119,9 @@ fn start(path: &Path) -> Finding {
         Ok(()) => Finding::good("start", "Static initialisation succeeds."),
         Err(reason) => {
             let reason = reason.to_string();
-            // The page has its own name, and may be sent to others.
+            // The page may be sent to others, so it shows the recording's name instead of a path.
             let reason = reason.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&reason);
-            Finding::bad("start", format!("{reason}; `gyronet import --from` leaves out a beginning."))
+            Finding::bad("start", format!("{reason}; `gyronet import --from` skips the beginning."))
         }
     }
 }

@@ -1,6 +1,7 @@
-//! These modules handle recorded drives: [`recording`] reads one, [`wheel_frames`] turns its wheels into the frames of
-//! a vehicle's bus, [`vehicle`] is the file beside it that says what is known of the vehicle, [`replay`] runs it through the coprocessor as the board would, [`candump`] writes what was
-//! sent, [`foxglove`] writes everything for Foxglove, and [`export`] writes tables and paths.
+//! These modules handle recorded drives. [`recording`] reads a drive, [`vehicle`] reads the vehicle file beside the
+//! drive, and [`wheel_frames`] turns wheel speeds into CAN frames. [`replay`] runs the drive through the coprocessor
+//! as the board would. [`candump`] writes the frames that were sent, [`foxglove`] everything for Foxglove, and
+//! [`export`] tables and paths.
 
 pub mod candump;
 pub mod error;
@@ -14,5 +15,5 @@ pub mod wheel_frames;
 
 use gyronet::sample::RATE_HZ;
 
-/// One sample on the grid takes this time, s.
+/// Sample period of the grid, s.
 pub const DT: f64 = 1.0 / RATE_HZ as f64;

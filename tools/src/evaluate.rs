@@ -1,6 +1,6 @@
-//! Each of the [`methods`] is run on a drive with a reference ([`rates`]); [`heading_error`] and [`trajectory_error`]
-//! measure its error, [`cost`] its work and delay, and [`report`] tabulates them. [`ablation`] switches parts of the
-//! compensation off.
+//! These modules compare methods of computing a yaw rate. [`rates`] runs each of the [`methods`] on a drive with a
+//! reference, [`heading_error`] and [`trajectory_error`] compute the errors, [`cost`] the multiplications and the
+//! delay, and [`report`] writes the tables. [`ablation`] switches off parts of the compensation.
 
 pub mod ablation;
 pub mod cost;

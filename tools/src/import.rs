@@ -1,10 +1,11 @@
-//! Drives from other people's logs: the formats read one file each as timed measurements, [`drive`] puts
-//! those that were chosen on the 100 Hz grid and writes the CSV that every other command reads.
+//! These modules import drives from logs of other programs. The format modules read one file each as timed
+//! measurements. [`drive`] resamples the chosen channels to the 100 Hz grid and writes the CSV that every other
+//! command reads.
 //!
-//! A log is read once, from front to back, with one record in memory at a time; what stays is the samples of the
-//! channels that a drive can need, of plain numbers only those that are named, up to [`log::MAX_SAMPLES`] of each, in
-//! temporary files where they are many. A record that cannot be used is counted with the reason, and reading goes on
-//! behind it where the format allows that.
+//! A log is read once, from front to back, with one record in memory at a time. Only samples that a drive can need
+//! are kept: of plain numbers the named channels, and at most [`log::MAX_SAMPLES`] of each channel. Many samples are
+//! kept in temporary files. A record that cannot be used is counted with the reason; reading continues with the next
+//! record if the format allows it.
 
 pub(crate) mod align;
 mod blf;

@@ -1,8 +1,7 @@
-//! The host's side of gyronet: tools that run recorded and simulated drives through the library and measure the
-//! results.
+//! Host tools of gyronet: they run recorded and simulated drives through the library and measure the results.
 //!
-//! Each product is one module, and an arrow below means "uses". The commands of the `gyronet` binary are
-//! thin adapters over these modules.
+//! Each tool is one module; an arrow below means "uses". The commands of the `gyronet` binary are thin adapters over
+//! these modules.
 //!
 //! ```text
 //! drive <- parts <- campaign -> plot, client, simulate

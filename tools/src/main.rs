@@ -1,5 +1,8 @@
 //! The `gyronet` command.
-#![deny(clippy::print_stdout, reason = "it panics where the reader has gone: `gyronet size | head`")]
+#![deny(
+    clippy::print_stdout,
+    reason = "it panics when the reader has closed the pipe: `gyronet size | head`"
+)]
 
 mod commands;
 
@@ -7,20 +10,24 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Run gyronet on a host: recorded drives through the code that is flashed.
+/// Replay drives through gyronet's firmware code; configure and monitor boards.
 ///
-/// Start with `gyronet demo`. A drive is a CSV at 100 Hz with a header, its columns in any order;
-/// other columns are ignored:
+/// Start with `gyronet demo`. `gyronet import` converts logs of other tools to a
+/// drive, and `gyronet doctor` checks a drive.
+///
+/// A drive is a CSV file at 100 Hz with a header. The vehicle must stand still for
+/// the first 3 s. Columns may be in any order; other columns are ignored:
 ///
 ///   t_s                    time, s
 ///   acc_x, acc_y, acc_z    specific force, m/s^2 (x forward, y left, z up)
 ///   gyr_x, gyr_y, gyr_z    angular rate, rad/s
-///   ref_gyr_z              true yaw rate, rad/s; optional, this or the next is needed for errors
-///   ref_yaw                course by GNSS, rad to the left; optional, empty where unknown
-///   wheel1_rate ..4        wheels, rad/s; optional (front right, rear right, front left, rear left)
+///   ref_gyr_z              true yaw rate, rad/s; optional
+///   ref_yaw                course over ground by GNSS, rad, left positive;
+///                          optional, empty where unknown
+///   wheel1_rate ..4        wheel rates, rad/s; optional
+///                          (front right, rear right, front left, rear left)
 ///
-/// `gyronet import` makes one of other tools' logs, `gyronet doctor` says what it is worth.
-/// The vehicle must stand still for the first 3 s.
+/// Errors can be computed only with ref_gyr_z or ref_yaw.
 #[derive(Debug, Parser)]
 #[command(
     name = "gyronet",
@@ -28,7 +35,8 @@ use std::process::ExitCode;
     arg_required_else_help = true,
     verbatim_doc_comment,
     after_help = "\
-Exit status: 0 success; 1 failure or failed check (the reason is on standard error); 2 wrong arguments.
+Exit status: 0 success; 1 failure or failed check (standard error has the reason);
+2 wrong arguments.
 Colours and progress appear on a terminal only; NO_COLOR=1 turns colours off."
 )]
 struct Cli {
@@ -103,12 +111,12 @@ fn main() -> ExitCode {
         Command::WarmUp(args) => commands::warm_up::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
-    // The reader of our output has closed it: `gyronet replay FILE | head`.
+    // The reader of our output has closed the pipe: `gyronet replay FILE | head`.
     let closed = |error: &std::io::Error| error.kind() == ErrorKind::BrokenPipe;
     if error.downcast_ref().is_some_and(closed) {
         return ExitCode::SUCCESS;
     }
-    // Nothing is left to do where even stderr is gone.
+    // If even stderr is closed, the error cannot be reported.
     let mark = console::style("error:").for_stderr().red().bold();
     let _ = writeln!(std::io::stderr(), "{mark} {error}");
     ExitCode::FAILURE

@@ -1,5 +1,6 @@
-//! These modules handle the networks' weights on a host: [`checkpoint`]s from training are [`quantize`]d into
-//! [`weight_file`]s, and [`quantization_error`] measures the error that this adds.
+//! These modules handle the networks' weights on the host. [`checkpoint`] reads the result of a training,
+//! [`quantize`] turns it into a weight file, [`weight_file`] reads such files, and [`quantization_error`] measures
+//! the error that quantisation adds.
 
 pub mod checkpoint;
 pub mod quantization_error;

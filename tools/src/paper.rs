@@ -1,5 +1,6 @@
-//! These modules repeat the paper's evaluation: [`sequence`] reads the data sets, [`trajectory`] those of other methods,
-//! [`fog_replay`] runs FoGNet, [`tables`] computes the paper's tables and figures, and [`rerun`] does all of it, training included.
+//! These modules repeat the paper's evaluation: [`sequence`] reads the data sets, [`trajectory`] reads the
+//! trajectories of other methods, [`fog_replay`] runs FoGNet, [`tables`] computes the paper's tables and figures, and
+//! [`rerun`] runs the complete evaluation, training included.
 
 pub mod fog_replay;
 pub mod rerun;

@@ -1,5 +1,5 @@
-//! These modules make pictures and pages: [`svg`] draws figures for a file, [`page`] writes HTML with charts that can
-//! be zoomed. Neither depends on what it shows; each product draws its own pictures with them.
+//! These modules draw pictures and pages. [`svg`] draws figures for a file, and [`page`] writes HTML with charts that
+//! can be zoomed. They do not depend on the data; each tool draws its own pictures with them.
 
 pub mod curve;
 pub mod page;

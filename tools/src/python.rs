@@ -1,42 +1,42 @@
-//! Some steps are Python programs of this repository: [`interpreter`] finds a Python for them, or makes a virtual
-//! environment.
+//! Some steps run Python programs of this repository: [`interpreter`] finds a Python interpreter for them, or creates
+//! a virtual environment.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// The reason why there is no Python for a step.
+/// The reason why no Python interpreter can run a step.
 #[derive(Debug, thiserror::Error)]
 pub enum PythonError {
     /// A program cannot be started.
     #[error("{}: {source}", program.display())]
     Start {
-        /// The program.
+        /// Path of the program.
         program: PathBuf,
-        /// The reason.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The interpreter lacks a package.
     #[error("{}: {reason} (needed: {})", python.display(), packages.join(", "))]
     Packages {
-        /// The interpreter.
+        /// Path of the interpreter.
         python: PathBuf,
-        /// The end of its output.
+        /// The last line of the interpreter's error output.
         reason: String,
-        /// All that are needed.
+        /// All packages that the step needs.
         packages: Vec<String>,
     },
-    /// A step of making the environment failed; its own message stands before this one.
-    #[error("{}: could not be made: {step} failed (without network, name a Python that has all: --python)", environment.display())]
+    /// A command that creates the environment failed; the command has printed its own error message.
+    #[error("{}: could not be created: {step} failed (without a network, pass --python with a Python that has all packages)", environment.display())]
     Environment {
-        /// The folder.
+        /// The folder of the environment.
         environment: PathBuf,
-        /// The step.
+        /// The command that failed.
         step: &'static str,
     },
 }
 
-/// Returns an interpreter that imports all `packages`: `given`, or that of the virtual environment, which is made and
-/// filled with `requirements` where it is not there or not whole. What pip prints goes to standard error.
+/// Returns an interpreter that can import all `packages`: `given`, or else that of the virtual environment. A missing
+/// or incomplete environment is created and `requirements` are installed. pip prints to standard error.
 ///
 /// # Errors
 /// [`PythonError`].
@@ -63,7 +63,7 @@ pub fn interpreter(
     imports(&python, packages).map(|()| python)
 }
 
-/// Runs a command with its output on standard error; says whether it succeeded.
+/// Runs a command with its output on standard error; returns whether it succeeded.
 fn run(command: &mut Command) -> Result<bool, PythonError> {
     let status = command.stdout(Stdio::from(std::io::stderr())).status();
     let program = || command.get_program().into();
@@ -78,7 +78,7 @@ fn imports(python: &Path, packages: &[&str]) -> Result<(), PythonError> {
         return Ok(());
     }
     let text = String::from_utf8_lossy(&output.stderr);
-    let reason = text.trim().lines().last().unwrap_or("ended without a word").to_owned();
+    let reason = text.trim().lines().last().unwrap_or("ended without a message").to_owned();
     let packages = packages.iter().map(|package| (*package).to_owned()).collect();
     Err(PythonError::Packages { python: python.to_owned(), reason, packages })
 }

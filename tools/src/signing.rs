@@ -1,6 +1,6 @@
-//! Keys of those who may write to a board, and signatures of what they write ([`gyronet::uds::signature`]).
+//! Keys that authorise writes to a board, and the signatures of what is written ([`gyronet::uds::signature`]).
 //!
-//! The private part stays in its file on this computer; the board gets the public part.
+//! The private key stays in its file on this computer; the board stores the public key.
 
 use ed25519_dalek::{Signer, SigningKey};
 use gyronet::uds::signature::{self, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
@@ -9,32 +9,32 @@ use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// The first lines of both files.
+/// First line of a private key file, and of a public one.
 const PRIVATE: &str = "gyronet private key 1";
 const PUBLIC: &str = "gyronet public key 1";
 
-/// The error of a key or signature that cannot be made, read or written.
+/// The reason why a key cannot be generated, read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum KeyError {
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
         /// The system's error.
         source: std::io::Error,
     },
-    /// The file holds something else.
+    /// The file is not a key file of the expected kind.
     #[error("{}: not a {what}", path.display())]
     Content {
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
-        /// The expected kind.
+        /// The expected kind of key.
         what: &'static str,
     },
     /// The system has no random numbers.
-    #[error("no random numbers: {0}")]
+    #[error("the system gives no random numbers: {0}")]
     Random(getrandom::Error),
 }
 
@@ -43,7 +43,7 @@ pub enum KeyError {
 pub struct PrivateKey(SigningKey);
 
 impl PrivateKey {
-    /// Makes a key of the system's random numbers.
+    /// Creates a key from the system's random numbers.
     ///
     /// # Errors
     /// [`KeyError::Random`].
@@ -61,7 +61,7 @@ impl PrivateKey {
         Ok(Self(SigningKey::from_bytes(&read(path, PRIVATE)?)))
     }
 
-    /// Writes `NAME.key`, which its owner alone can read, and `NAME.pub`. Neither may be there.
+    /// Writes `NAME.key`, which only its owner can read, and `NAME.pub`. Neither file may exist.
     ///
     /// # Errors
     /// [`KeyError::File`].
@@ -82,13 +82,13 @@ impl PrivateKey {
         Ok(paths)
     }
 
-    /// Returns the public part.
+    /// Returns the public key.
     #[must_use]
     pub fn public(&self) -> [u8; 32] {
         self.0.verifying_key().to_bytes()
     }
 
-    /// Returns the trailer that has a board accept a content: one board by its serial number, or any.
+    /// Returns the trailer that makes the board with this serial number, or any board, accept `content`.
     #[must_use]
     pub fn trailer(
         &self,
@@ -130,7 +130,7 @@ pub fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// Reads as many bytes as there are of hexadecimal digits.
+/// Parses 2 `N` hexadecimal digits as `N` bytes; `None` for any other text.
 #[must_use]
 pub fn unhex<const N: usize>(text: &str) -> Option<[u8; N]> {
     let digits: Option<Vec<u8>> =

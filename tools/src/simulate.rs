@@ -1,18 +1,18 @@
-//! This module simulates a drive: a car stands, pulls away, follows bends, turns and stops, and a MEMS part with errors
-//! of known size measures it. Its yaw rate is known exactly.
+//! This module simulates a drive: a car stands, pulls away, follows bends, turns and stops, and a MEMS sensor with
+//! known errors measures the motion. The true yaw rate is known exactly.
 //!
-//! [`route`] says where the driver wants to go, [`car`] moves on a plane with grade, bank and
-//! suspension, [`vibration`] shakes the part, [`mems`] adds the part's own errors, [`csv`]
-//! writes the recording. [`layout`] writes whole sequences of a drive through a [`town`] as the
-//! data sets KAIST and NCLT have them, with a fibre-optic gyro ([`fog`]) and wheels
-//! ([`odometer`]); [`vehicles`] has every number with its source. The truth is what a perfect part at the same place
-//! would say were the car not shaking: vibration turns the car nowhere and counts as an error.
+//! [`route`] generates the route, [`car`] moves on a plane with grade, bank and suspension, [`vibration`] shakes the
+//! sensor, [`mems`] adds the sensor's own errors, and [`csv`] writes the recording. [`layout`] writes sequences of a
+//! drive through a [`town`] in the formats of the data sets KAIST and NCLT, with a fibre-optic gyro ([`fog`]) and
+//! wheels ([`odometer`]); [`vehicles`] lists every parameter with its source. The truth is the reading of a perfect
+//! sensor at the same position without vibration: vibration does not change the car's heading, and counts as an
+//! error.
 //!
-//! It is not a model of a particular part or car. It shows that everything works, and how well static initialisation
-//! does on it; only a recording of a real car shows whether a network helps there.
+//! The simulation does not model a particular sensor or car. It shows that everything works, and how well static
+//! initialisation performs; only recordings of a real car show whether a network helps.
 //!
-//! The same seed gives the same bytes on every machine: the random numbers are ChaCha8's and
-//! the transcendental functions are libm's, in Rust.
+//! The same seed gives the same bytes on every machine, because the random numbers come from ChaCha8 and the
+//! transcendental functions from libm in Rust.
 
 pub mod car;
 pub mod csv;
@@ -49,7 +49,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// The default drive lasts 90 s; car, shaking and part resemble those of the recordings.
+    /// The default drive lasts 90 s; car, vibration and sensor resemble those of the recordings.
     pub const DEFAULT: Self = Self {
         seconds: 90,
         seed: 1,
@@ -62,13 +62,13 @@ impl Config {
 /// Holds a sample of a simulated drive: x forward, y left, z up, except for the part's tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Since the start, s.
+    /// Time since the start, s.
     pub seconds: f64,
     /// The measured specific force, m/s^2.
     pub specific_force: [f64; 3],
     /// The measured angular rate, rad/s.
     pub angular_rate: [f64; 3],
-    /// The truth, rad/s.
+    /// True angular rate, rad/s.
     pub reference: [f64; 3],
     /// Rates of the wheels front right, rear right, front left, rear left, rad/s.
     pub wheels: [f64; 4],
@@ -76,7 +76,7 @@ pub struct Sample {
     pub speed: f64,
 }
 
-/// Generates samples of a drive without end.
+/// An endless iterator over the samples of a drive.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     car: Car,
@@ -106,7 +106,7 @@ impl Iterator for Simulation {
         self.tick += 1;
         let motion = self.car.step();
         let shake = self.vibration.step(motion.speed);
-        // A tilted part measures everything tilted; so would a perfect one beside it.
+        // The truth is tilted too, because it is that of a perfect part with the same mounting.
         let reference = self.mems.tilt(motion.angular_rate);
         let force = add(self.mems.tilt(motion.specific_force), shake.specific_force);
         let (specific_force, angular_rate) = self.mems.measure(force, add(reference, shake.angular_rate));

@@ -1,6 +1,6 @@
-//! These modules measure the firmware's cost on its processor. [`emulator`] runs an image in QEMU; [`mod@bench`] counts
-//! instructions and modelled cycles of the networks and parsers, [`tasks`] those of every interrupt handler, from which
-//! [`schedule`] computes worst response times. [`size`] and [`stack`] read the image's ELF file.
+//! These modules measure the firmware's cost on its processor. [`emulator`] runs an image in QEMU. [`mod@bench`]
+//! counts instructions and models cycles of the networks and parsers; [`tasks`] does so for every interrupt handler,
+//! and [`schedule`] computes worst-case response times from that. [`size`] and [`stack`] read the image's ELF file.
 
 pub mod bench;
 pub mod emulator;

@@ -1,6 +1,7 @@
-//! These modules are what `gyronet train` does around the Python that trains: [`examine`] refuses drives that cannot
-//! carry a training, [`roles`] chooses which drive trains, validates and is held out, [`history`] reads what the training
-//! reported, [`gain`] says what its weights gain on drives held out, and [`page`] reports all of it.
+//! These modules are the Rust part of `gyronet train`; the training itself is a Python program. [`examine`] rejects
+//! drives that cannot be trained on. [`roles`] chooses which drives train, validate and are held out. [`history`]
+//! reads the history of the training, [`gain`] computes what the weights gain on held-out drives, and [`page`] writes
+//! the page.
 
 pub mod examine;
 pub mod gain;

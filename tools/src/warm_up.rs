@@ -1,5 +1,5 @@
-//! This module measures how far the heading drifts while the sensor warms up and the vehicle does not stop: by static
-//! calibration, by zero-rate updates, by the bias curve, and by the difference of the rear wheels.
+//! This module measures how far the heading drifts while the sensor warms up and the vehicle does not stop. It
+//! compares static initialisation, zero-rate updates, the bias curve, and the difference of the rear wheels.
 
 mod drive;
 pub mod plot;

@@ -1,8 +1,8 @@
-//! These modules describe the wheel frames of a vehicle's bus in a file that a person reads and edits, and make that
+//! These modules read and write a text file that describes the wheel frames of a vehicle's bus, and create such a
 //! file from a DBC file and the names of the signals.
 //!
-//! The board keeps the same settings as a record ([`gyronet::can::wheel::WheelSettings`]), so that another vehicle
-//! needs no new image. Both pass the library's own check.
+//! The board stores the same settings as a record ([`gyronet::can::wheel::WheelSettings`]), so that another vehicle
+//! needs no new image. Both are checked by the library.
 
 #[cfg(feature = "logs")]
 pub(crate) mod dbc;

@@ -14,7 +14,7 @@ fn states_are_sentences() {
     let rate = StoreError::Field(FieldError::BitRateNotInImage(250_000));
     assert_eq!(
         Origin::Refused(rate).to_string(),
-        "built in; what is stored is refused: can.bits_per_second: this firmware image does not drive the bus \
+        "built in; the stored one is refused: can.bits_per_second: this firmware image does not drive the bus \
          at 250000 bit/s"
     );
     assert_eq!(
@@ -58,17 +58,17 @@ fn events_are_sentences() {
         (EventKind::Started(ResetCause::PowerOn), "started by power on"),
         (
             EventKind::Crashed(crash),
-            "crashed before: hard fault at 0x08001234, called from 0x08005679, CFSR 0x00008200, address 0x1ffffff8, 2 since power came on",
+            "crashed before: hard fault at 0x08001234, called from 0x08005679, CFSR 0x00008200, address 0x1ffffff8, 2 since power-on",
         ),
         (
             EventKind::Crashed(panic),
-            "crashed before: panic in line 12 of coprocessor/src/main.rs, 2 since power came on",
+            "crashed before: panic in line 12 of coprocessor/src/main.rs, 2 since power-on",
         ),
         (EventKind::SlotRefused(Slot::A, SlotError::Empty), "slot A not used: the slot is empty"),
         (EventKind::Status(Status::Init), "status: initialising, no bias yet"),
         (
             EventKind::Calibrated(Some(CalibrationFault::Clipped)),
-            "calibration found nothing: a sample was saturated",
+            "calibration failed: a sample was saturated",
         ),
         (
             EventKind::Sensor(Some(SensorFault::Setting { bank: 1, address: 0x0A, got: 0xFF })),

@@ -165,9 +165,9 @@ fn what_cannot_be_read_is_named() {
     let (text, foreign) = (text.to_str().unwrap(), foreign.to_str().unwrap());
     for (arguments, part) in [
         (&["/no/such/port"][..], "/no/such/port: not host:port, and not a serial port"),
-        (&[&closed], "cannot be connected"),
+        (&[&closed], "cannot connect"),
         (&[text], "no.log: no CAN frame in it"),
-        (&[foreign, "--once"], "foreign.log: no whole set of messages"),
+        (&[foreign, "--once"], "foreign.log: no complete set of messages"),
         (&[foreign, "--csv", "/no/such/folder/a.csv"], "/no/such/folder/a.csv: "),
         (&[foreign, "--for=-1"], "invalid value '-1'"),
     ] {

@@ -36,27 +36,27 @@ fn refused(folder: &Path, arguments: &[&str]) -> String {
 fn a_folder_that_cannot_carry_a_training_is_refused_with_the_reasons() {
     let few = folder("train-few");
     assert!(refused(&few.join("none"), &[]).contains("train-few/none: No such file"));
-    assert!(refused(&few, &[]).contains("0 drives can be used, needed are 4"));
+    assert!(refused(&few, &[]).contains("0 drives can be used, but 4 are needed"));
     for name in ["a.csv", "b.csv", "c.csv"] {
         write(&few, name, 40, 0.1);
     }
     write(&few, "short.csv", 20, 0.1);
     std::fs::write(few.join("empty.csv"), "t_s\n").unwrap();
     let error = refused(&few, &[]);
-    assert!(error.contains("3 drives can be used, needed are 4"), "{error}");
-    assert!(error.contains("short.csv: 17 s after the 3 s at rest; a training needs 30"), "{error}");
+    assert!(error.contains("3 drives can be used, but 4 are needed"), "{error}");
+    assert!(error.contains("short.csv: 17 s after the 3 s at rest; training needs 30"), "{error}");
     assert!(error.contains("empty.csv: ") && error.lines().count() == 3, "{error}");
 
     write(&few, "d.csv", 40, 0.1);
-    assert!(refused(&few, &[]).contains("the training drives have 74 s together, needed are 300"));
-    assert!(refused(&few, &["--validate", "z"]).contains("0 drives for the name \"z\""));
-    assert!(refused(&few, &["--hold-out", "c", "d"]).contains("4 drives can be used, needed are 5"));
+    assert!(refused(&few, &[]).contains("the training drives have 74 s together, but 300 s are needed"));
+    assert!(refused(&few, &["--validate", "z"]).contains("0 drives match the name \"z\""));
+    assert!(refused(&few, &["--hold-out", "c", "d"]).contains("4 drives can be used, but 5 are needed"));
 
     let straight = folder("train-straight");
     for name in ["a.csv", "b.csv", "c.csv", "d.csv"] {
         write(&straight, name, 160, 0.001);
     }
-    assert!(refused(&straight, &[]).contains("no turns: the training drives turn by 0 degrees"));
+    assert!(refused(&straight, &[]).contains("too few turns: the training drives turn by 0 degrees"));
 }
 
 #[test]

@@ -103,7 +103,7 @@ fn what_import_writes_is_not_turned_again() {
 
     std::fs::write(folder.join("level.toml"), "[mounting]\nrol_deg = 180\n").unwrap();
     let (good, err) = gyronet(&folder, &["replay", "level.csv"]);
-    assert!(!good && err.contains("level.toml: no vehicle file: "), "{err}");
+    assert!(!good && err.contains("level.toml: not a valid vehicle file: "), "{err}");
     assert!(err.contains("unknown field `rol_deg`"), "{err}");
 }
 

@@ -63,8 +63,8 @@ fn trials(test: &str) -> Option<&'static [Trial]> {
 /// The README's rows: how each begins, its method, and the place among its numbers of the ratio of both drives to static
 /// initialisation, behind which stand those of each drive.
 const ROWS: [(&str, Method, usize); 2] = [
-    ("| sent at once |", Method::PROMPT, 1),
-    ("| sent 70 ms later, for navigation |", Method::NAVIGATION, 1),
+    ("| gyronet, sent at once |", Method::PROMPT, 1),
+    ("| gyronet, sent for navigation |", Method::NAVIGATION, 1),
 ];
 /// The sentence that begins so has the ratio to the best classical method as its first number.
 const OVER_BEST_CLASSICAL: &str = "The navigation rate has";

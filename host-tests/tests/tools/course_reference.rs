@@ -96,9 +96,9 @@ fn a_drive_that_starts_moving_gets_a_simulated_standstill() {
 fn references_that_cannot_be_used_are_refused_with_the_reason() {
     let text = |recording: &Recording| errors(recording).expect_err("it cannot be used").to_string();
     let none = text(&drive(500, 1.0, "other"));
-    assert!(none.starts_with("made/up.csv: line 302: no reference, which evaluation needs"), "{none}");
+    assert!(none.starts_with("made/up.csv: line 302: no reference to evaluate against"), "{none}");
     let mirrored = text(&drive(500, -1.0, "ref_yaw"));
-    assert!(mirrored.starts_with("made/up.csv: ref_yaw turns otherwise than the gyro, by "), "{mirrored}");
+    assert!(mirrored.starts_with("made/up.csv: ref_yaw disagrees with the gyro by "), "{mirrored}");
     let mut short = drive(500, 1.0, "ref_yaw");
     short.rows.truncate(1_800);
     let short = text(&short);

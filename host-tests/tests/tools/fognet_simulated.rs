@@ -2,7 +2,7 @@
 //! minutes better, on another one it must not run. The figures of whole sequences are a report: `cargo gyronet tables`.
 
 use gyronet::estimate::YawEstimate;
-use gyronet::fog::NotForThisGyro;
+use gyronet::fog::GyroMismatch;
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet_host_tests::sequence::simulate;
@@ -52,5 +52,5 @@ fn fognet_makes_the_turns_of_minutes_better() {
 fn fognet_does_not_run_on_another_gyro() {
     let trained = FogBlob::new_checked(&weights::FOGNET.0).expect("checked").training;
     let refused = check_weights(&simulated(2, 504), trained).expect_err("device 2");
-    assert!(matches!(refused, NotForThisGyro::Other { serial: 2, .. }), "{refused}");
+    assert!(matches!(refused, GyroMismatch::Other { serial: 2, .. }), "{refused}");
 }

@@ -195,17 +195,17 @@ fn what_cannot_be_compared_is_left_out_and_named() {
     let own_frame =
         rows(&Sequence { origin: [0.0; 2], ..sequence.clone() }, |k| (steps[k].position, steps[k].yaw));
     for (rows, expected) in [
-        (good[..9_000].to_vec(), "k.txt: has poses from 1524000000.01 to 1524000090.00 s, needed are"),
+        (good[..9_000].to_vec(), "k.txt: has poses from 1524000000.01 to 1524000090.00 s, but"),
         (good[1_000..].to_vec(), "k.txt: has poses from 1524000010.01 to"),
         (shifted(-86_400.0), "k.txt: has poses from 1523913600.01 to"),
-        (shifted(-1.524e9), "k.txt: has poses from 0.01 to 119.99 s, needed are 1524000003.00 to"),
+        (shifted(-1.524e9), "k.txt: has poses from 0.01 to 119.99 s, but 1524000003.00 to"),
         (own_frame, "k.txt: line 299: 4040624.95 m and 0.0 deg from the truth at the start"),
         (turned, "k.txt: line 299: 0.00 m and 28.6 deg from the truth at the start"),
         (with(4_001, &nan), "k.txt: line 4001, column z: \"NaN\" is not finite"),
         (with(4_001, "1.5 0"), "k.txt: line 4001: 2 columns, expected 8"),
         (with(4_001, "\u{7f}"), "k.txt: line 4001: 1 columns, expected 8"),
         (swapped, "k.txt: line 502: time goes backwards from"),
-        (holed, "k.txt: line 701: 0.61 s after the pose before"),
+        (holed, "k.txt: line 701: 0.61 s after the previous pose"),
         (far, "k.txt: line 9001: 29999 m from the truth, where at most 1903 m are possible"),
         (Vec::new(), "k.txt: holds no samples"),
     ] {

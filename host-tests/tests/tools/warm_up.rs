@@ -12,7 +12,7 @@ fn the_bias_curve_leaves_a_fifth_of_the_drift_at_most_and_rear_wheels_alone_more
     let outcome = warm_up::run(2, SEED, &mut network, || {}).expect("drives that begin at rest");
     let ratio = |name: &str| outcome.rows.iter().find(|row| row.name == name).expect("a row").ratio;
     let (curve, wheels) = (ratio("default"), ratio("rear_wheels"));
-    println!("over static calibration and zero-rate updates: curve {curve:.3}, rear wheels {wheels:.3}");
+    println!("over static initialisation and zero-rate updates: curve {curve:.3}, rear wheels {wheels:.3}");
     assert!(curve <= 0.2, "{curve}");
     assert!(wheels > 2.0 * curve, "{wheels}");
     let [with, _] = outcome.inside_one_sigma;

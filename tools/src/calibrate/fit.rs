@@ -1,28 +1,28 @@
-//! This module fits the shares to the spans of all drives, robustly.
+//! This module fits the shares to the spans of all drives by robust least squares.
 //!
-//! Huber's weights (1.345 robust deviations) give little weight to a span of a lost reference; leaving out one block of
-//! time after the other (jackknife) gives sigmas that remain valid for errors that last for seconds.
+//! Huber's weights (1.345 robust deviations) give little weight to a span whose reference was lost. The sigmas come
+//! from leaving out one block of time after the other (jackknife), so they hold for errors that last for seconds.
 
 use super::spans::Span;
 use nalgebra::{DMatrix, DVector};
 
-/// The fit is reweighted this many times.
+/// Number of reweighting iterations.
 const ROUNDS: usize = 30;
 /// Huber's constant: 95 % of the efficiency of least squares where the errors are normal.
 const HUBER: f64 = 1.345;
-/// The median of magnitudes is this many normal deviations.
+/// Median of the magnitudes of a normal distribution, in standard deviations.
 const MEDIAN: f64 = 0.6745;
-/// A drive is cut into this many blocks, which are left out in turn.
+/// Number of blocks of a drive for the jackknife.
 const BLOCKS: usize = 10;
-/// The robust deviation is taken as at least this, rad: below it is rounding.
+/// Least robust deviation, rad; anything smaller is rounding.
 const FLOOR_RAD: f64 = 1e-9;
 
-/// Holds the result of a fit.
+/// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Shares of the roll, pitch and yaw rate; 0 for one that is not fitted.
     pub shares: [f64; 3],
-    /// Their standard deviations.
+    /// Standard deviations of the shares.
     pub sigmas: [f64; 3],
     /// The constant of each drive, rad/s.
     pub biases: Vec<f64>,
@@ -63,14 +63,14 @@ fn residual(span: &Span, shares: &[f64; 3], bias: f64) -> f64 {
     span.error - explained - bias * span.seconds
 }
 
-/// Returns the robust standard deviation of some residuals about zero.
+/// Returns the robust standard deviation of residuals about zero.
 fn deviation(mut residuals: Vec<f64>) -> f64 {
     residuals.iter_mut().for_each(|residual| *residual = residual.abs());
     residuals.sort_by(f64::total_cmp);
     residuals.get(residuals.len() / 2).map_or(0.0, |median| median / MEDIAN).max(FLOOR_RAD)
 }
 
-/// Solves for the shares and each drive's constant over the spans that are kept.
+/// Solves for the shares and each drive's constant over the spans that `keep` accepts.
 fn solve(
     drives: &[Vec<Span>],
     fitted: [bool; 3],
@@ -99,7 +99,7 @@ fn solve(
         let weighted =
             DMatrix::from_fn(kept.len(), columns, |row, column| inputs[(row, column)] * weights[row]);
         let normal = weighted.transpose() * &inputs;
-        // For a column of zeros the solution is zero.
+        // The pseudoinverse gives zero for a column of zeros.
         let inverse = normal.svd(true, true).solve(&(weighted.transpose() * &errors), f64::EPSILON);
         let Ok(found) = inverse else { break };
         solution = found;
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Makes spans of a second with known shares, noise, and a few lost references.
+    /// Creates spans of one second with known shares, noise, and a few lost references.
     fn spans(shares: [f64; 3], bias: f64, seed: u64, turning: f64) -> Vec<Span> {
         let mut random = Random::new(seed, 0);
         let span = |k: usize, random: &mut Random| {

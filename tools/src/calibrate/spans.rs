@@ -1,31 +1,31 @@
-//! Spans are pieces of a drive for which the reference gives the angle turned; over a second or more its noise is small
-//! beside the errors to be fitted.
+//! Spans are pieces of a drive for which the reference gives the angle turned. Over a second or more the noise of the
+//! reference is small compared with the errors that are fitted.
 //!
-//! A yaw rate as reference gives a span a second. A course by GNSS is noisy from one second to the next, so its spans go
-//! from the median of ten seconds to that of the next ten.
+//! A reference yaw rate gives one span per second. A GNSS course is noisy from one second to the next, so its spans
+//! reach from the median of ten seconds to the median of the next ten.
 
 use super::{CalibrateError, Drive, SHORTEST_S};
 use crate::drive::DT;
 use crate::evaluate::heading_error::{BLOCK_S, medians, off_course};
 use gyronet::sample::RATE_HZ;
 
-/// With a yaw rate as reference, a span has this many samples: a second.
+/// Samples of a span with a yaw rate as reference: one second.
 const RATE_SPAN: usize = RATE_HZ as usize;
-/// With a course, it has this many.
+/// Samples of a span with a course as reference.
 const COURSE_SPAN: usize = BLOCK_S * RATE_HZ as usize;
 
-/// Holds a piece of a drive.
+/// The turns and the error of one piece of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Span {
     /// The true turn less that of the corrected yaw rate, rad.
     pub error: f64,
     /// The turns about x, y and z by the gyro, rad.
     pub turns: [f64; 3],
-    /// Its length, s.
+    /// Length of the span, s.
     pub seconds: f64,
 }
 
-/// Holds a sample of a drive.
+/// One sample of a drive.
 struct Sample {
     /// Corrected yaw rate, rad/s.
     corrected: f64,
@@ -37,7 +37,7 @@ struct Sample {
     course: Option<f64>,
 }
 
-/// Cuts a drive into spans, by its yaw rate of reference, or by its course.
+/// Cuts a drive into spans by its reference yaw rate, or else by its course.
 ///
 /// # Errors
 /// [`CalibrateError::NoReference`], [`CalibrateError::TooShort`].
@@ -69,7 +69,7 @@ pub fn of(Drive { recording, replay }: &Drive<'_>) -> Result<Vec<Span>, Calibrat
     Ok(spans)
 }
 
-/// Sums up a span; `None` if the reference is not known throughout.
+/// Sums up the samples of a span; `None` if one of them has no reference.
 fn by_rate(samples: &[Sample]) -> Option<Span> {
     let mut span = Span { error: 0.0, turns: [0.0; 3], seconds: samples.len() as f64 * DT };
     for Sample { corrected, turns, reference, .. } in samples {
@@ -79,12 +79,12 @@ fn by_rate(samples: &[Sample]) -> Option<Span> {
     Some(span)
 }
 
-/// Returns the spans between the blocks whose course is known, each from the middle of a block to that of the next.
+/// Returns the spans between neighbouring blocks with a known course, between the middles of the blocks.
 fn by_course(samples: &[Sample]) -> Vec<Span> {
     let corrected: Vec<f64> = samples.iter().map(|sample| sample.corrected).collect();
     let course: Vec<Option<f64>> = samples.iter().map(|sample| sample.course).collect();
     let off: Vec<Option<f64>> = medians(&off_course(&corrected, &course)).collect();
-    // The mean turn since the start over each block, whose median is taken of the errors.
+    // The mean over each block of the turn since the start, to match the blocks' median errors.
     let mut sum = [0.0; 3];
     let turned: Vec<[f64; 3]> = samples
         .chunks(COURSE_SPAN)

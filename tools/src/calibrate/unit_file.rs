@@ -1,4 +1,4 @@
-//! The file of a unit's calibration holds the map for the board, and how well it is known.
+//! The calibration file of a unit holds the map for the board and the uncertainty of the map.
 
 use super::{Drive, Share, fit::Fit};
 use gyronet::mounting::GyroMap;
@@ -6,33 +6,33 @@ use gyronet::store::UnitMap;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Holds the calibration of a unit.
+/// The calibration of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitFile {
-    /// The map.
+    /// The map that the board applies to the gyro.
     pub gyro_map: GyroMap,
-    /// The last row of the map: the shares of roll, pitch and yaw rate that are added to the yaw rate.
+    /// The shares of roll, pitch and yaw rate that the last row of the map adds to the yaw rate.
     pub shares: [Share; 3],
     /// The checksum of the weights that corrected the drives.
     pub weights: u32,
-    /// The drives.
+    /// The fit on each drive.
     pub drives: Vec<DriveFit>,
 }
 
-/// Holds the fit on one drive.
+/// The fit on one drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DriveFit {
-    /// The recording.
+    /// The name of the recording.
     pub name: String,
-    /// The gyro's bias about x, y and z at its start, rad/s.
+    /// The gyro's bias about x, y and z at the start of the drive, rad/s.
     pub gyro_bias_rad_per_s: [f64; 3],
-    /// The mean of the reference less the corrected yaw rate, rad/s: the remaining bias.
+    /// The remaining bias, rad/s: the reference less the corrected yaw rate.
     pub yaw_rate_bias_rad_per_s: f64,
     /// The robust standard deviation of the spans' angles from the fit, rad.
     pub deviation_rad: f64,
 }
 
-/// The reason why a file is not used.
+/// The reason why a calibration file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnitFileError {
@@ -44,7 +44,7 @@ pub enum UnitFileError {
         /// The reason.
         source: std::io::Error,
     },
-    /// The file is not the calibration of a unit.
+    /// The file is not a calibration file.
     #[error("{path}: {source}")]
     Json {
         /// The file.
@@ -58,19 +58,19 @@ pub enum UnitFileError {
         /// The file.
         path: String,
     },
-    /// The calibration was found with other weights.
-    #[error("{path}: found with the weights {found:08x}, these are {runs:08x}")]
+    /// The calibration was computed with other weights.
+    #[error("{path}: computed with the weights {found:08x}, but {runs:08x} are in use")]
     OtherWeights {
         /// The file.
         path: String,
-        /// The checksum of the weights that it was found with.
+        /// The checksum of the weights that the calibration was computed with.
         found: u32,
         /// The checksum of the weights in use.
         runs: u32,
     },
 }
 
-/// Mirrors the JSON of the file.
+/// The JSON of the file.
 #[derive(Serialize, Deserialize)]
 struct Content {
     gyro_map: [[f32; 3]; 3],
@@ -113,7 +113,7 @@ pub fn read(path: &Path) -> Result<UnitMap, UnitFileError> {
     Ok(UnitMap { gyro_map, weights: content.weights })
 }
 
-/// Reads the map of a file for weights with this checksum.
+/// Reads the map of a file, which must have been computed with weights of the checksum `runs`.
 ///
 /// # Errors
 /// [`UnitFileError`], which names the file.

@@ -1,7 +1,7 @@
-//! This module is the board on the host: bytes of its lines go in and bytes of its CAN line come out, a millisecond at
-//! a time.
+//! This module models the board on the host, a millisecond at a time: its input is the bytes of the sensor and wheel
+//! lines, its output the bytes of the CAN line.
 //!
-//! It is the image's input and output around the library's [`Coprocessor`]: parsers of the part, SLCAN port, networks.
+//! The model does the image's input and output around the library's [`Coprocessor`]: parsers, SLCAN port, networks.
 
 use super::drive::START_US;
 use super::fault::Line;
@@ -21,10 +21,10 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::units::{AngularRate, Micros};
 
-/// At most this many frames may wait, as in the image.
+/// Capacity of the queue of outgoing frames, as in the image.
 const QUEUE: usize = 24;
 
-/// Holds the whole state of a board.
+/// Holds the complete state of a board.
 #[derive(Debug, Clone)]
 pub struct Board {
     input: Input,
@@ -35,7 +35,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Begins before the first byte.
+    /// Creates a board before its first byte.
     #[must_use]
     pub fn new(part: Part, pipeline: PipelineConfig) -> Self {
         let wheels = Some(wheel_frames::receiver());
@@ -74,7 +74,7 @@ impl Board {
             Line::Sensor | Line::Gyro => {
                 for delivered in self.input.receive(message, now) {
                     match delivered {
-                        // The coprocessor counts what it refuses.
+                        // The coprocessor counts refused samples.
                         Delivered::Imu(Some(sample)) => {
                             self.row = message.row;
                             let _ = self.coprocessor.imu(sample, now);
@@ -98,7 +98,7 @@ impl Board {
         }
     }
 
-    /// Does what is due at `now` without a byte, in a row of the drive.
+    /// Polls the board at `now`, during this row of the drive, without an incoming byte.
     pub fn poll(&mut self, now: Micros, row: usize, networks: &mut impl Networks, out: &mut Vec<Message>) {
         if let Ok(Some(_)) = self.coprocessor.poll(now) {
             self.row = row;
@@ -164,7 +164,7 @@ impl Board {
         }
     }
 
-    /// Returns the row of the drive that a frame belongs to; the fibre-optic gyro's frames are on the grid of the
+    /// Returns the row of the drive that a frame belongs to. The ticks of the fibre-optic gyro's frames follow the
     /// board's clock.
     fn row_of(&self, sent: &TimedFrame) -> usize {
         let is_fog = |id: Id| FOG_IDS.iter().any(|own| matches!(id, Id::Standard(id) if id.as_raw() == *own));

@@ -1,11 +1,11 @@
-//! This module prepares the drives that faults are injected into: the readings of undamaged sensors, row by row.
+//! This module prepares the drives that faults are injected into, as readings of undamaged sensors, row by row.
 
 use crate::drive::recording::Recording;
 use crate::drive::wheel_frames::WheelFrames;
 use gyronet::sample::{ImuSample, PERIOD_US, WHEELS};
 use gyronet::units::{AngularRate, Micros};
 
-/// The step before the first row has this board time, microseconds.
+/// Board time of the grid step before the first row, microseconds.
 pub const START_US: u64 = 1_000_000;
 
 /// Holds the undamaged measurements of one row.
@@ -23,7 +23,7 @@ pub struct Reading {
     pub stamp_us: i64,
     /// The saturated axes: gyro, then accelerometer.
     pub saturated: [bool; 6],
-    /// An axis that sends no number, and the form of what it sends.
+    /// An axis that sends no valid number, and the form of the value that it sends instead.
     pub no_number: Option<(usize, usize)>,
     /// The speed of each wheel, km/h.
     pub wheels: [Option<f64>; WHEELS],

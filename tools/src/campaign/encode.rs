@@ -1,4 +1,4 @@
-//! This module makes the messages of a part for one reading: those of [`crate::parts`], with the effects of a fault.
+//! This module encodes a reading as the messages of a part: those of [`crate::parts`], with the effects of a fault.
 
 use super::drive::Reading;
 use super::fault::Line;
@@ -13,9 +13,9 @@ use gyronet::sensor::dsp1760::message::{Extra, Validity};
 use gyronet::sensor::xsens::MtData2;
 use gyronet::units::Micros;
 
-/// An MTi's readings end here, rad/s and m/s^2.
+/// Full scale of an MTi, rad/s and m/s^2.
 const XSENS_LARGEST: [f32; 2] = [7.85, 98.0];
-/// The parts' clocks start at this time, because they are not the board's, microseconds.
+/// The parts' clocks start at this time, microseconds, to differ from the board's clock.
 const PART_EPOCH_US: u64 = 77_000_000;
 
 /// Appends the messages that a part sends for a row.
@@ -28,7 +28,7 @@ pub fn encode(part: Part, row: usize, reading: &Reading, out: &mut Vec<Message>)
                 let at = reading.at - PERIOD_US + n * MESSAGE_US;
                 out.push(message(Line::Gyro, at, &increment(reading, at)));
             }
-            // A fault of its gyro does not affect the other sensor.
+            // A fault of the fibre-optic gyro does not affect the inertial sensor beside it.
             let mut beside = *reading;
             beside.saturated[..3].fill(false);
             beside.no_number = reading.no_number.filter(|(axis, _)| *axis >= 3);
@@ -73,8 +73,8 @@ const fn no_number(form: usize) -> f32 {
     }
 }
 
-/// Makes the message of an increment. The part drops an axis's validity bit in saturation; if it sends no number, it
-/// may not notice. It has 1e-7 rad of noise in a millisecond (0.012 deg per square root of an hour).
+/// Encodes an increment. The part clears an axis's validity bit in saturation, but not when it sends a value that is
+/// no number. It has 1e-7 rad of noise in a millisecond (0.012 deg per square root of an hour).
 fn increment(reading: &Reading, at: u64) -> Vec<u8> {
     let mut message = message(at, &ImuSample { angular_rate: reading.fog, ..reading.sample });
     if !reading.fog_stuck {
@@ -115,7 +115,7 @@ fn fifo_packet(reading: &Reading) -> Vec<u8> {
     packet.emit().to_vec()
 }
 
-/// Makes the burst of a reading. The part has no code for NaN: it reports a fault instead.
+/// Encodes a reading as a burst. The part has no code for NaN: it reports a fault instead.
 fn burst(row: usize, reading: &Reading) -> Burst {
     let mut burst = adis16465::burst(row, &reading.sample);
     let largest = |code: i32| if code < 0 { i16::MIN } else { i16::MAX };

@@ -1,4 +1,4 @@
-//! This module lists the kinds of faults, and draws faults from a seed.
+//! This module lists the kinds of faults and draws faults from a seed.
 
 use crate::parts::Part;
 use crate::random::Random;
@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum Kind {
     /// Messages are lost.
     Drop,
-    /// Messages come twice.
+    /// Messages are sent twice.
     Duplicate,
     /// One bit of a message is wrong.
     BitFlip,
@@ -20,7 +20,7 @@ pub enum Kind {
     Truncation,
     /// A message overtakes those before it.
     Reordering,
-    /// The line is silent for a while; then everything comes at once, or stays lost.
+    /// The line is silent for a while; then all its messages arrive at once, or are lost.
     Stall,
     /// The part's clock, and with it its sampling, is too fast or too slow.
     ClockDrift,
@@ -28,17 +28,17 @@ pub enum Kind {
     ClockJump,
     /// Readings do not change.
     Stuck,
-    /// The motion is beyond the part's range.
+    /// Readings are saturated.
     Saturation,
-    /// A reading is suddenly off by a constant.
+    /// A constant is added to a reading.
     BiasStep,
-    /// The part sends no number.
+    /// The part sends a value that is not a valid number.
     NotANumber,
     /// Wheels spin, or are locked.
     WheelSlip,
-    /// Wheels have changed places.
+    /// The speeds of wheels are swapped.
     SwappedWheels,
-    /// The bus is lost: no wheel speeds come in, or no frames go out.
+    /// The bus fails: no wheel speeds are received, or no frames are sent.
     CanLoss,
 }
 
@@ -107,7 +107,7 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Line {
-    /// The line of the sensor; of the accelerometer where there are two sensors.
+    /// The line of the inertial sensor.
     Sensor,
     /// The line of the fibre-optic gyro.
     Gyro,
@@ -146,18 +146,18 @@ impl Axes {
 pub struct Fault {
     /// The kind of fault.
     pub kind: Kind,
-    /// The line, for a fault on a line.
+    /// The line that the fault affects, for a fault on a line.
     pub line: Line,
-    /// First row of the drive that it affects.
+    /// First affected row of the drive.
     pub from: usize,
-    /// The number of rows that it lasts.
+    /// Number of affected rows.
     pub rows: usize,
-    /// Share of the messages that it hits.
+    /// Share of the messages that the fault hits.
     pub share: f64,
     /// Size of the fault: microseconds of a clock jump, ppm of a drift, rad/s or m/s^2 of a bias, bytes of a burst,
-    /// places of a reordering, factor of the wheels' speed.
+    /// places of a reordering, factor on the wheels' speed.
     pub size: f64,
-    /// The axes of the sensor.
+    /// The affected axes of the sensor.
     pub axes: Axes,
     /// One of four forms of the same kind; the code that applies the fault says which.
     pub form: usize,
@@ -240,7 +240,7 @@ impl Fault {
         (self.from..self.from + self.rows).contains(&row)
     }
 
-    /// Returns the random numbers that are drawn while the fault lasts.
+    /// Returns the stream of random numbers for the effects of the fault.
     #[must_use]
     pub fn draw_on(&self) -> Random {
         Random::new(self.seed, 0)

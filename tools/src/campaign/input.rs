@@ -37,7 +37,7 @@ pub enum Delivered {
 }
 
 impl Input {
-    /// Begins before the first byte.
+    /// Creates the input before its first byte.
     #[must_use]
     pub fn new(part: Part) -> Self {
         match part {
@@ -94,12 +94,12 @@ pub struct Fifo {
     bus: Bus,
     /// The last good packet and its time.
     last: Option<(Vec<u8>, u64)>,
-    /// The board's time at which the driver's clock started.
+    /// The board's time when the driver's clock started, microseconds.
     epoch: u64,
 }
 
 impl Fifo {
-    /// Makes a driver that begins with the last packet, because a driver's state cannot be copied.
+    /// Creates a driver and feeds it the last packet, because a driver's state cannot be copied.
     fn new(last: Option<(Vec<u8>, u64)>) -> Self {
         let bus = Bus::default();
         let driver = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay);
@@ -154,7 +154,7 @@ impl Bursts {
         bursts
     }
 
-    /// Reads a burst; bytes that the part does not send read as ones.
+    /// Reads a burst; bits that the part does not send read as ones.
     fn receive(&mut self, bytes: &[u8], now: Micros) -> Delivered {
         let mut burst = [0xFF; BURST];
         burst.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);

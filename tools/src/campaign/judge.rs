@@ -1,35 +1,33 @@
-//! This module judges a run: it is compared with the undamaged run and with the truth.
+//! This module judges a run by comparing it with the undamaged run and with the truth.
 
 use super::receiver::{Reports, Seen};
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 
-/// Yaw is compared over this many rows: a second.
+/// Number of rows over which yaw is compared: a second.
 const SECOND: usize = RATE_HZ as usize;
-/// Holds the limits of errors: of undamaged drives against the truth, and of undetected faults.
+/// Holds the error limits of undamaged drives against the truth, and of undetected faults.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// The most that yaw may move in a second before anything is reported, whatever expected error is sent, rad. It
-    /// bounds a build that states too large an error.
+    /// Largest yaw that may move in a second before the first report, whatever expected error is sent, rad. It also
+    /// limits a build that states too large an error.
     pub moved: f64,
     /// The largest mean error of a second of an undamaged drive, rad.
     pub mean: f64,
     /// The largest error of a second of an undamaged drive, rad.
     pub largest: f64,
-    /// The share of these errors that lies inside the stated error, where one is stated.
+    /// Least and largest share of these errors that may be inside the stated error, if one is stated.
     pub inside_sigma: [f64; 2],
 }
 
 impl Limits {
-    /// These limits hold for a MEMS part: `moved` is twice the expected error of a rate that the network has not
-    /// corrected.
+    /// Limits of a MEMS part: `moved` is twice the expected error of a rate that the network has not corrected.
     pub const INERTIAL: Self = Self { moved: 5e-4, mean: 5e-4, largest: 2.5e-3, inside_sigma: [0.25, 0.85] };
-    /// These limits hold for a fibre-optic gyro, which states no error: `moved` is twice the error of its undamaged
-    /// drives.
+    /// Limits of a fibre-optic gyro, which states no error: `moved` is twice the error of its undamaged drives.
     pub const FIBRE_OPTIC: Self = Self { moved: 1e-4, mean: 1e-4, largest: 2e-4, inside_sigma: [0.0, 1.0] };
 }
 
-/// After a report this many rows are not judged, because their rates still compensate for estimates of bad samples.
+/// Number of rows after a report that are not judged: their rates still compensate for estimates of bad samples.
 const PAID: usize = 20;
 const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
 
@@ -59,19 +57,19 @@ pub struct Outcome {
     pub reported_after: Option<f64>,
     /// Says whether the board has counted an event, which a diagnosis would see.
     pub counted: bool,
-    /// The largest yaw moved in a second that is all marked good, before the first report, rad.
+    /// Largest yaw moved in a second that is all marked good, before the first report, rad.
     pub moved: f64,
-    /// The largest ratio of that to its limit: the smaller one of [`Limits::moved`] and the expected error that was
+    /// Largest ratio of the moved yaw to its limit: the smaller of [`Limits::moved`] and the expected error that was
     /// sent with it.
     pub moved_limits: f64,
-    /// The largest growth of a good second's error over the same second undamaged, from 0.2 s after the last report on,
-    /// rad; without a reference, how far yaw moved.
+    /// Largest growth of a good second's error over the same undamaged second, from 0.2 s after the last report on,
+    /// rad; without a reference, the largest yaw moved.
     pub grown: f64,
-    /// The largest ratio of that to the limit.
+    /// Largest ratio of the growth to the limit.
     pub grown_limits: f64,
     /// Largest error against the true yaw in a second all marked good, rad.
     pub error: f64,
-    /// Time from the end of the fault to the last report of it, s; 0 where the last report came before.
+    /// Time from the end of the fault to its last report, s; 0 if the last report was earlier.
     pub recovery: f64,
     /// Says whether the fault was still reported at the end.
     pub not_recovered: bool,
@@ -102,7 +100,7 @@ pub struct AgainstTruth {
     pub largest: f64,
     /// Share of the errors inside the expected error that was sent; `None` where none is sent.
     pub inside_sigma: Option<f64>,
-    /// Says whether all of these are within [`Limits`].
+    /// Says whether all these errors are within [`Limits`].
     pub in_order: bool,
 }
 
@@ -120,7 +118,7 @@ pub struct Times {
 }
 
 impl Baseline {
-    /// Collects the observations of a run, and the board's events after each row.
+    /// Collects the observations of the undamaged run, and the board's event count after each row.
     #[must_use]
     pub fn new(count: usize, seen: &[Seen], events: &[u64], truth: Option<Vec<f64>>, limits: Limits) -> Self {
         let mut rows = vec![Row::default(); count];
@@ -181,7 +179,7 @@ impl Baseline {
     #[must_use]
     pub fn judge(&self, seen: &[Seen], times: Times) -> Outcome {
         let mut outcome = Outcome::default();
-        // Yaw moved up to each row of the run, where that row was good, and error of the yaw.
+        // The yaw moved up to each row, and the yaw of each row; `None` for a row without a set.
         let mut moved = vec![None; self.rows.len()];
         let mut yaws = vec![None; self.rows.len()];
         let before = times.from.saturating_sub(SECOND + 1)..times.from;

@@ -1,4 +1,4 @@
-//! This module applies faults of the measurements: in the part, in its clock, at the wheels.
+//! This module applies faults to the measurements: in the sensor, in its clock, at the wheels.
 
 use super::drive::Reading;
 use super::fault::{Fault, Kind};
@@ -6,7 +6,7 @@ use crate::parts::Part;
 use gyronet::units::{AngularRate, SpecificForce};
 
 /// Applies a fault to the readings of the rows from `first_row` on and returns the time of its first effect.
-/// `gyro_bias` is the part of the readings that is not motion.
+/// `gyro_bias` is the part of the readings that is not motion; a clock drift does not scale it.
 pub fn disturb(
     readings: &mut [Reading],
     first_row: usize,
@@ -47,7 +47,7 @@ pub fn disturb(
                     _ => [rr, rl, fr, fl],
                 };
             }
-            // These faults are on a line.
+            // These faults affect bytes on a line.
             Kind::Drop
             | Kind::Duplicate
             | Kind::BitFlip
@@ -62,17 +62,17 @@ pub fn disturb(
     first
 }
 
-/// Drifts a part's clock: a part whose clock is fast by a share samples that much more often, and does not notice.
+/// Drifts a part's clock: a part whose clock is fast by a share samples more often by that share.
 ///
-/// The rows then show a vehicle that does all it does in less time, and turns faster by that share: so row n of the
-/// disturbed drive has turned as far as row n of the undisturbed one, and they can be compared. Increments are angles
-/// and do not depend on the clock: there only the stamps drift.
+/// The rows then show a vehicle that moves the same way in less time, and turns faster by that share. Row n of the
+/// disturbed drive has thus turned as far as row n of the undisturbed drive, so the two can be compared. Increments
+/// are angles and do not depend on the clock: only their stamps drift.
 fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bias: [AngularRate; 3]) {
     if part == Part::Dsp1760 {
         reading.stamp_us += ((reading.at - begin.at) as f64 * share) as i64;
         return;
     }
-    // With two such faults, the shifted position of the rows counts.
+    // With two such faults, the second one starts from the already shifted times.
     let since = reading.at.saturating_sub(begin.at) as f64;
     reading.at = begin.at + (since / (1.0 + share)) as u64;
     for (rate, bias) in reading.sample.angular_rate.iter_mut().zip(gyro_bias) {
@@ -81,7 +81,7 @@ fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bi
     }
 }
 
-/// Returns the gyro of the part: the fibre-optic one, if it has one.
+/// Returns the gyro of the part: the fibre-optic gyro if the part has one.
 fn gyro(reading: &mut Reading, part: Part) -> &mut [AngularRate; 3] {
     if part == Part::Dsp1760 { &mut reading.fog } else { &mut reading.sample.angular_rate }
 }
@@ -124,7 +124,7 @@ fn slip(reading: &mut Reading, fault: &Fault) {
             _ => wheel == 0,
         };
         if let (true, Some(speed)) = (slips, speed.as_mut()) {
-            // A standing vehicle's wheels may spin, too: at 5 km/h.
+            // The wheels of a standing vehicle may spin too, at 5 km/h.
             *speed = if fault.size > 0.0 { *speed * fault.size + 5.0 } else { 0.0 };
         }
     }

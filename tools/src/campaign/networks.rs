@@ -1,4 +1,4 @@
-//! This module runs both networks of the board, and remembers their estimates for an undamaged drive, because most
+//! This module runs both networks of the board and caches their estimates for an undamaged drive, because most
 //! windows of a damaged run are the same.
 
 use gyronet::model::fognet::{FogEstimate, FogNetState, MinuteNetwork};
@@ -9,11 +9,11 @@ use gyronet::units::{Angle, AngularRate};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// Runs the windows that a board hands out.
+/// Estimates the windows of a board.
 pub trait Networks {
-    /// Runs a window of GyroNet.
+    /// Returns GyroNet's estimate of a window.
     fn window(&mut self, window: &[Features; WINDOW]) -> Estimate;
-    /// Runs a window of FoGNet.
+    /// Returns FoGNet's estimate of a window.
     fn minute(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
 }
 
@@ -24,14 +24,14 @@ pub struct Integer<'a> {
 }
 
 impl<'a> Integer<'a> {
-    /// Makes GyroNet over these weights, FoGNet over the library's.
+    /// Creates GyroNet with these weights, and FoGNet with the library's.
     ///
     /// # Panics
-    /// When the library's own weights are refused.
+    /// If the library's own weights are refused.
     #[must_use]
     pub fn new(blob: Blob<'a>) -> Self {
         let fog = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
-        // Each thread keeps one for as long as the program runs.
+        // Leaks one state per thread, which lives as long as the program.
         let state = Box::leak(Box::new(FogNetState::ZERO));
         Self { gyronet: GyroNet::new(blob), fognet: FogNet::new(fog, state) }
     }
@@ -57,9 +57,9 @@ pub struct Known {
 
 /// Computes each window of an undamaged drive only once, because few windows of a run are new.
 pub struct Remembering<'a, N> {
-    /// The networks themselves.
+    /// The networks that estimate windows not in the cache.
     pub networks: &'a mut N,
-    /// The estimates that are known already.
+    /// The cache.
     pub known: &'a Known,
 }
 
@@ -82,7 +82,7 @@ impl<N: Networks> Networks for Remembering<'_, N> {
     }
 }
 
-/// Corrects nothing and records the windows that it gets.
+/// Records the windows that it gets, and estimates no correction.
 #[derive(Debug, Default)]
 pub struct Collecting(pub Known);
 

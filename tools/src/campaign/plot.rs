@@ -1,5 +1,5 @@
-//! This module draws the runs of single faults in two panels: how soon a receiver has a report of each kind of fault,
-//! and how far yaw has moved by then.
+//! This module plots the runs with a single fault in two panels: the time until a receiver detects each kind of
+//! fault, and how far yaw has moved by then.
 
 use super::Run;
 use super::fault::Kind;
@@ -9,15 +9,15 @@ const SIZE: (u32, u32) = (1200, 660);
 const DETECTED: Color = COLORS[0];
 const NAMED: Color = COLORS[4];
 const UNDETECTED: Color = COLORS[1];
-/// A panel shows at most this many dots of a kind; more would overlap.
+/// A panel shows about this many dots of a kind; more would overlap.
 const DOTS: usize = 250;
-/// Multiples of the golden ratio's fraction spread dots of one value evenly.
+/// Fractional part of the golden ratio: its multiples spread dots of one value evenly.
 const GOLDEN: f64 = 0.618_034;
 
-/// Draws the runs of single faults.
+/// Plots the runs with a single fault.
 ///
 /// # Errors
-/// [`PlotError`], when the library refuses.
+/// [`PlotError`] if the plotting library fails.
 pub fn svg(runs: &[Run]) -> Result<String, PlotError> {
     let single: Vec<&Run> = runs.iter().filter(|run| run.faults.len() == 1).collect();
     let title = format!(
@@ -65,7 +65,7 @@ fn panel(
     limit: Option<f64>,
 ) -> Panel<'static> {
     let bottom = Kind::ALL.len() as f64 - 0.5;
-    // Dots of one value lie side by side.
+    // Dots of one value are spread across the kind's row.
     let beside = |n: usize| 0.6 * ((n as f64 * GOLDEN) % 1.0) - 0.3;
     let dots = dots.into_iter().enumerate();
     let dots = dots.map(|(n, (value, kind, color))| (value.min(high).log10(), kind + beside(n), color));

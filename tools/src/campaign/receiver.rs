@@ -1,8 +1,8 @@
-//! This module is an ECU that reads our own yaw messages, of the inertial sensor or of the fibre-optic gyro, and
-//! collects the reports in them.
+//! This module models an ECU that reads the board's yaw messages, of the inertial sensor or of the fibre-optic gyro,
+//! and collects the faults that they report.
 //!
-//! It checks E2E, accepts a set of rate, angle and detail only if all three carry the same sample counter, and treats
-//! silence as a fault.
+//! The ECU checks E2E, accepts a set of rate, angle and detail only if all three carry the same sample counter, and
+//! treats silence as a fault.
 
 use super::fault::Line;
 use super::wire::Message;
@@ -15,9 +15,9 @@ use gyronet::can::slcan::assembler::LineAssembler;
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Quality, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::{DataFrame, slcan};
 
-/// The sender counts as dead after this time without a whole set, microseconds: three periods and a half.
+/// The sender counts as silent after this time without a complete set, microseconds: three and a half periods.
 pub const TIMEOUT_US: u64 = 35_000;
-/// Up to this many missing messages in a row count as loss; more count as disorder.
+/// Up to this many consecutive missing messages count as lost; more count as out of sequence.
 const MAX_DELTA: u8 = 10;
 
 /// Holds the reports of a receiver, one bit each; bits 0 to 7 are the fault byte.
@@ -31,12 +31,12 @@ impl Reports {
     pub const UNUSABLE: Self = Self(1 << 9);
     /// The checksum is wrong, or the bytes are not a frame.
     pub const DAMAGED: Self = Self(1 << 10);
-    /// Messages are missing, come twice, or are out of order.
+    /// Messages are missing, repeated, or out of order.
     pub const SEQUENCE: Self = Self(1 << 11);
-    /// No set came for [`TIMEOUT_US`].
+    /// No set arrived for [`TIMEOUT_US`].
     pub const SILENT: Self = Self(1 << 12);
 
-    /// Returns the reports in this that are not in another.
+    /// Returns the reports of `self` that are not in `other`.
     #[must_use]
     pub const fn beyond(self, other: Self) -> Self {
         Self(self.0 & !other.0)
@@ -53,10 +53,10 @@ impl Reports {
     }
 }
 
-/// Holds a set of messages.
+/// Holds the values of a complete set of messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Set {
-    /// Row of the sample with which it was sent.
+    /// Row of the sample with which the set was sent.
     pub row: usize,
     /// Accumulated yaw, 360 deg / 2^32.
     pub yaw: i32,
@@ -64,14 +64,14 @@ pub struct Set {
     pub sigma: Option<f64>,
 }
 
-/// Holds an observation of the receiver.
+/// An observation by the receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
-    /// The time, microseconds of the board's clock.
+    /// Time of the observation, microseconds of the board's clock.
     pub at: u64,
     /// The reports.
     pub reports: Reports,
-    /// The set, where there is one.
+    /// The set that the observed message completed, if any.
     pub set: Option<Set>,
 }
 
@@ -86,7 +86,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Begins before the first byte, and reads the messages of this part.
+    /// Creates a receiver of the messages that the board sends for this part.
     #[must_use]
     pub fn new(part: Part) -> Self {
         let own = || Config::DEFAULT.settings().yaw.map(|yaw| (yaw.ids, yaw.e2e.profiles()));
@@ -105,14 +105,14 @@ impl Receiver {
         }
     }
 
-    /// Reads a line's bytes and appends the observations.
+    /// Reads bytes from the board's CAN line and appends the observations.
     pub fn receive(&mut self, message: &Message, seen: &mut Vec<Seen>) {
         debug_assert_eq!(message.line, Line::Out);
         self.time(message.at, seen);
         for byte in &message.bytes {
             let Some(line) = self.assembler.receive(*byte) else { continue };
-            // Answers to the wheels' frames are not frames themselves; if a damaged frame looks like an answer, its
-            // counter shows the loss.
+            // The board answers each wheel frame with a line that is not a frame. If a damaged frame looks like an
+            // answer, its counter shows the loss.
             let line = line.map(|line| line.strip_prefix(b"\x07").unwrap_or(line));
             let frame = match line {
                 Ok([b't' | b'T', ..]) => line.ok().and_then(|line| slcan::parse::<DataFrame>(line).ok()),
@@ -126,7 +126,7 @@ impl Receiver {
         }
     }
 
-    /// Lets time pass.
+    /// Advances the time, and reports a silent board.
     pub fn time(&mut self, now: u64, seen: &mut Vec<Seen>) {
         if let Some(last) = self.last
             && now > last + TIMEOUT_US

@@ -1,4 +1,4 @@
-//! This module sums up a campaign: one line for each kind of fault.
+//! This module summarises a campaign, with one line for each kind of fault.
 
 use super::Run;
 use super::exceptions::EXCEPTIONS;
@@ -25,18 +25,18 @@ impl Spread {
     }
 }
 
-/// Sums up the runs of one kind of fault.
+/// Summarises the runs with one kind of fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Line {
-    /// The kind.
+    /// Name of the kind of fault.
     pub name: String,
-    /// Runs.
+    /// Number of runs.
     pub runs: usize,
-    /// Runs in which a receiver had a report.
+    /// Runs in which a receiver reported the fault in time.
     pub reported: usize,
     /// Runs without a report in which yaw did not move by more than the limit.
     pub harmless: usize,
-    /// Harmless runs in which the board counted something.
+    /// Harmless runs in which the board counted an event.
     pub counted: usize,
     /// Undetected runs that an exception covers.
     pub excepted: usize,
@@ -46,13 +46,13 @@ pub struct Line {
     pub panics: usize,
     /// Time from the first effect to the report, s.
     pub reported_after: Spread,
-    /// The most that yaw was moved in a good second before anything was reported, without the excepted runs, rad.
+    /// Largest yaw moved in a good second before the first report, without the excepted runs, rad.
     pub moved: f64,
     /// The largest ratio of that to the limit.
     pub moved_limits: f64,
-    /// The most that the error of a good second has grown after the last report, over the limit.
+    /// Largest growth of a good second's error after the last report, divided by the limit.
     pub grown_limits: f64,
-    /// Runs in which that was more than the limit.
+    /// Runs in which the error grew by more than the limit.
     pub grown: usize,
     /// Largest error against the reference in a good second, rad.
     pub error: f64,
@@ -65,39 +65,39 @@ pub struct Line {
 /// Holds an exception and the runs that it covers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Excepted {
-    /// Its name.
+    /// Name of the exception.
     pub name: &'static str,
     /// The reason why nothing detects it.
     pub why: &'static str,
-    /// Runs.
+    /// Number of runs that it covers.
     pub runs: usize,
-    /// The most that they moved yaw in a good second, rad.
+    /// Largest yaw that they moved in a good second, rad.
     pub moved: f64,
 }
 
 /// Describes an undamaged drive with which every run is compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Undamaged {
-    /// The drive.
+    /// Name of the drive.
     pub drive: String,
-    /// The part.
+    /// Name of the part.
     pub part: &'static str,
-    /// Its errors; `None` where the drive has no reference.
+    /// Errors of the drive; `None` where the drive has no reference.
     pub errors: Option<AgainstTruth>,
 }
 
 /// Describes a run that failed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
-    /// Its number.
+    /// Index of the run.
     pub run: usize,
-    /// The drive.
+    /// Name of the drive.
     pub drive: String,
-    /// The part.
+    /// Name of the part.
     pub part: &'static str,
     /// The faults.
     pub faults: Vec<Fault>,
-    /// The failure in words.
+    /// Description of the failure.
     pub what: String,
 }
 
@@ -117,12 +117,12 @@ pub struct Report {
 }
 
 impl Report {
-    /// Returns the undamaged drives whose errors are beyond their limits.
+    /// Returns the undamaged drives whose errors exceed their limits.
     pub fn out_of_order(&self) -> impl Iterator<Item = &Undamaged> {
         self.undamaged.iter().filter(|drive| drive.errors.is_some_and(|errors| !errors.in_order))
     }
 
-    /// Sums up the runs of some scenes.
+    /// Summarises the runs of these scenes.
     #[must_use]
     pub fn new(seed: u64, scenes: &[Scene<'_>], runs: &[Run]) -> Self {
         let undamaged = scenes.iter().map(|scene| Undamaged {
@@ -200,7 +200,7 @@ impl fmt::Display for Report {
         for Undamaged { drive, part, errors } in &self.undamaged {
             match errors {
                 Some(AgainstTruth { seconds, mean, largest, inside_sigma, in_order }) => {
-                    let mark = if *in_order { "" } else { "NOT IN ORDER " };
+                    let mark = if *in_order { "" } else { "OVER THE LIMITS " };
                     write!(
                         f,
                         "{mark}undamaged: {drive}, {part}: {seconds} s, error {mean:.1e} rad in 1 s, at most {largest:.1e}"

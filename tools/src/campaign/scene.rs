@@ -1,5 +1,5 @@
-//! A scene is an undamaged drive with one part: every run begins at one of its stored states, so that it need not run
-//! the drive up to there, and is compared with it.
+//! A scene is an undamaged run of a drive with one part. Every damaged run begins at one of the scene's stored
+//! states, which saves running the drive up to there, and is compared with the scene.
 
 use super::board::Board;
 use super::drive::{Drive, Reading};
@@ -21,7 +21,7 @@ use std::ops::Range;
 
 /// Runs may begin this many rows apart.
 pub const STATE_EVERY: usize = RATE_HZ as usize;
-/// A wheel frame comes this long before the end of its row, microseconds.
+/// A wheel frame arrives this long before the end of its row, microseconds.
 const WHEEL_BEFORE_US: u64 = 3_000;
 /// The board polls this often, microseconds.
 const TURN_US: u64 = 1_000;
@@ -33,7 +33,7 @@ pub struct Scene<'d> {
     pub drive: &'d Drive,
     /// The part.
     pub part: Part,
-    /// The networks' estimates for it.
+    /// The networks' estimates for the undamaged run.
     pub known: Known,
     /// The messages of the undamaged run.
     pub baseline: Baseline,
@@ -42,7 +42,7 @@ pub struct Scene<'d> {
     states: Vec<(Board, Receiver)>,
 }
 
-/// This configuration makes a window due with every sample.
+/// With this configuration a window is due with every sample.
 const EVERY: PipelineConfig = PipelineConfig {
     compensate: CompensateConfig {
         mode: match Hop::new(1) {
@@ -93,7 +93,7 @@ impl<'d> Scene<'d> {
         self.drive.readings.len()
     }
 
-    /// Runs a stretch with faults; it must begin where a state is kept.
+    /// Runs a span with faults; it must begin at a stored state.
     pub fn run(&self, span: Span, faults: &[Fault], networks: &mut impl Networks) -> Outcome {
         let mut networks = Remembering { networks, known: &self.known };
         let (mut board, mut receiver) = self.states[span.from / STATE_EVERY].clone();
@@ -167,7 +167,7 @@ fn turn<'m>(
     }
 }
 
-/// Returns all messages of some rows, in order of arrival.
+/// Returns all messages of these rows in order of arrival.
 fn messages(readings: &[Reading], first_row: usize, part: Part) -> Vec<Message> {
     let mut messages = Vec::new();
     for (row, reading) in (first_row..).zip(readings) {

@@ -1,11 +1,11 @@
-//! This module runs hours of a simulated drive through the coprocessor, as fast as the host can: bytes of an MTi
-//! and of a DSP-1760 and wheel frames go in, frames come out as SLCAN text, and a receiver reads them. As on the
-//! board, the coprocessor is polled every millisecond, to notice a silent sensor.
+//! This module runs hours of a simulated drive through the coprocessor, as fast as the host can. The input is bytes
+//! of an MTi and of a DSP-1760, and wheel frames. The output is frames as SLCAN text, which a receiver reads. As on
+//! the board, the coprocessor is polled every millisecond, to notice a silent sensor.
 //!
-//! Every clock and counter on the way wraps in it: the part's 10 kHz ticks and the board's
-//! 32-bit microseconds begin half the drive before their end, packet counters and the counters
-//! of the messages wrap, SLCAN's stamps restart each minute, and the accumulated yaw passes a
-//! turn many times. Every input sample is known, so every output can be checked.
+//! Every clock and counter wraps during the drive: the part's 10 kHz ticks and the 32-bit microseconds of the board
+//! and of the gyro start half the drive before they wrap, the counters of packets and messages wrap, SLCAN's stamps
+//! restart each minute, and the accumulated yaw wraps many times. Every input sample is known, so every output can be
+//! checked.
 
 use crate::client::monitor::{Counts, Monitor};
 use crate::drive::wheel_frames;
@@ -27,21 +27,22 @@ use std::fmt;
 const TICKS: u32 = (PERIOD_US / 100) as u32;
 /// The status word of a good sample: self-test passed, filter valid.
 const GOOD: u32 = 3;
-/// A sample makes the first number of frames with the messages of [`Config::DEFAULT`], a step of the fibre-optic gyro
-/// the second.
+/// Number of frames for each sample with the messages of [`Config::DEFAULT`], and for each step of the fibre-optic
+/// gyro.
 const FRAMES: u64 = 6;
 const FOG_FRAMES: u64 = 3;
 /// At most this many steps of the fibre-optic gyro may be lost at the ends of the drive.
 const FOG_ENDS: u64 = 3;
 /// The board polls its inputs every millisecond.
 const LOOK_US: u64 = 1_000;
-/// The first corrected sample comes within this many samples, with a margin.
+/// Largest number of samples before the first corrected one, with a margin.
 const INITIALISED: u32 = 100 * RATE_HZ;
-/// The yaw may be off by this: half a least bit of the angle message, and one of each value that is summed, deg.
+/// Tolerance of the yaw, deg: half a least significant bit of the angle message, and one of each value that is
+/// summed.
 const YAW_TOLERANCE: f64 = 1e-6;
 
-/// The sum of drop-in rates may be off by this: half a least bit of the rate for 10 ms, and the rounding of a sum of
-/// floats, deg.
+/// Tolerance of the sum of drop-in rates, deg: half a least significant bit of the rate for 10 ms, and the rounding
+/// of a sum of floats.
 const DROP_IN_TOLERANCE: f64 = 2.5e-5 + 1e-9;
 
 /// Holds the results of a soak.
@@ -59,18 +60,18 @@ pub struct Soak {
     pub receiver: Counts,
     /// Samples with each status: initialising, degraded, ready.
     pub statuses: [u32; 3],
-    /// Time of the last sample at the pipeline less what it was sent with, us.
+    /// Time of the last sample at the pipeline minus the time that it was sent with, us.
     pub clock_error_us: i64,
-    /// Time of the gyro's last message less what it was sent with, us.
+    /// Time of the gyro's last message minus the time that it was sent with, us.
     pub gyro_clock_error_us: i64,
-    /// Messages of the gyro that its parser says are missing, or that were refused.
+    /// Messages of the gyro that its parser reported missing or refused.
     pub gyro_lost: u32,
-    /// Yaw at the receiver less that of the pipeline, deg.
+    /// Yaw at the receiver minus that of the pipeline, deg.
     pub yaw_error_deg: f64,
-    /// The sum of the drop-in rates at the receiver less that of the rates they were encoded from, deg. The rounding
-    /// error of one is carried to the next, so it stays below half a least bit for 10 ms.
+    /// Sum of the drop-in rates at the receiver minus that of the rates they were encoded from, deg. Each message
+    /// carries the residual of the one before, so the difference stays below half a least significant bit for 10 ms.
     pub drop_in_error_deg: f64,
-    /// Whole turns of the car, in all.
+    /// Total angle that the car turned, left and right added, in turns.
     pub turns: f64,
     /// Times that the part's ticks, the board's and the gyro's 32-bit microseconds wrapped.
     pub wraps: [u32; 3],
@@ -78,10 +79,10 @@ pub struct Soak {
     pub memory_kib: Option<[u64; 2]>,
 }
 
-/// Runs a drive of so many samples. `tick` is called once a minute of it.
+/// Runs a drive of this many samples. `tick` is called once per simulated minute.
 ///
 /// # Panics
-/// When bytes of our own are not understood.
+/// If the parsers reject the module's own bytes.
 pub fn run(samples: u32, network: &mut impl WindowNetwork, mut tick: impl FnMut()) -> Soak {
     let mut drive = Drive::new(samples);
     let mut early = None;
@@ -176,7 +177,7 @@ impl Drive {
             Status::Init => self.statuses[0] += 1,
             Status::Degraded => self.statuses[1] += 1,
             Status::Ready => self.statuses[2] += 1,
-            // The sensor monitor counts it.
+            // The sensor monitor counts any other status.
             _ => {}
         }
         while let Some(sent) = self.coprocessor.next_frame() {
@@ -197,7 +198,7 @@ impl Drive {
     /// Sends the fibre-optic gyro's message: 100 a second with its own 32-bit microseconds.
     fn gyro(&mut self, k: u32, sample: &Sample, now: Micros) {
         let time = self.starts[2].wrapping_add(k.wrapping_mul(PERIOD_US as u32));
-        // A real gyro flickers; equal increments would count as stuck. The mean of three is zero.
+        // A real gyro has noise; equal increments would count as stuck. The noise has mean zero over three samples.
         let flicker = (f64::from(k % 3) - 1.0) * 1e-7;
         let message = Message {
             rotation: sample.reference.map(|rate| (rate / f64::from(RATE_HZ) + flicker) as f32),
@@ -245,7 +246,7 @@ impl Drive {
 }
 
 impl Soak {
-    /// Returns the names of the checks that do not hold.
+    /// Returns the names of the failed checks.
     #[must_use]
     pub fn faults(&self) -> Vec<String> {
         let samples = u64::from(self.samples);
@@ -311,8 +312,12 @@ impl fmt::Display for Soak {
              errors {} us, {} us",
             self.clock_error_us, self.gyro_clock_error_us
         )?;
-        writeln!(f, "yaw at the receiver less the pipeline's: {:.1e} deg", self.yaw_error_deg)?;
-        writeln!(f, "drop-in rates at the receiver less what they say: {:.1e} deg", self.drop_in_error_deg)?;
+        writeln!(f, "yaw at the receiver minus the pipeline's: {:.1e} deg", self.yaw_error_deg)?;
+        writeln!(
+            f,
+            "drop-in rates at the receiver minus the encoded rates: {:.1e} deg",
+            self.drop_in_error_deg
+        )?;
         match self.memory_kib {
             Some([early, late]) => write!(f, "memory: {early} KiB after a tenth, {late} KiB at the end"),
             None => write!(f, "memory: unknown on this system"),
@@ -320,7 +325,7 @@ impl fmt::Display for Soak {
     }
 }
 
-/// Returns the resident memory of this process, where the system reports it as Linux does.
+/// Returns the resident memory of this process, KiB; `None` except on Linux.
 fn resident_kib() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

@@ -1,9 +1,9 @@
-//! This module flips single bits in a weight file: they are refused when it is loaded, or found in the background when
-//! it is in use.
+//! This module flips single bits in a weight file, and checks that the file is refused when it is loaded, or that the
+//! background check finds the bit when the file is in use.
 //!
-//! Weights lie in flash under a CRC-32, which is checked when they are loaded and again, piece by
-//! piece, while they are used ([`gyronet::model::background`]). Until that finds a flipped bit,
-//! the limits of [`gyronet::compensate::CompensateConfig`] are what bounds its effect.
+//! Weights are in flash with a CRC-32, which is checked when they are loaded and again, piece by piece, while they
+//! are used ([`gyronet::model::background`]). Until that check finds a flipped bit, the limits of
+//! [`gyronet::compensate::CompensateConfig`] bound its effect.
 
 use crate::random::Random;
 use gyronet::compensate::CompensateConfig;
@@ -21,7 +21,7 @@ use serde::Serialize;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// The image's idle task checks this many bytes in a millisecond: a pass takes 9.7 s.
+/// Number of bytes that the image's idle task checks in a millisecond: a pass takes 9.7 s.
 pub const PIECE: usize = 13;
 
 /// Holds the effects of flipped bits in a weight file.
@@ -35,11 +35,11 @@ pub struct WeightUpsets {
     pub weight_bits: usize,
     /// Bits of weights that were refused when loaded.
     pub weight_refused: usize,
-    /// The effects of bits that flip after that.
+    /// The effects of bits that flip after loading.
     pub effects: Effects,
-    /// Time from a flip to its report by the background check, median and most, s.
+    /// Time from a flip to its report by the background check, median and largest, s.
     pub found_after: [f64; 2],
-    /// Flips that it has not found in two passes.
+    /// Flips that the background check has not found.
     pub not_found: usize,
 }
 
@@ -64,7 +64,7 @@ impl Memory {
         &bytemuck::cast_slice(&self.words)[..self.bytes]
     }
 
-    /// Returns the weights in use, damaged or not: values read from the header at the start are not read again.
+    /// Returns the weights in use, damaged or not. The header's values are those of `loaded`: it is not read again.
     fn in_use<'m>(&'m self, loaded: &Blob<'m>) -> Option<Blob<'m>> {
         let mut at = first_weight(self.file()) / 4;
         let mut take = |words: usize| {
@@ -97,7 +97,7 @@ impl Memory {
     }
 }
 
-/// Returns the end of the header and its provenance.
+/// Returns the offset of the first weight, after the header and its provenance.
 fn first_weight(file: &[u8]) -> usize {
     let length =
         file.get(24..28).map_or(0, |bytes| bytes.iter().rev().fold(0, |n, byte| n << 8 | usize::from(*byte)));
@@ -105,8 +105,8 @@ fn first_weight(file: &[u8]) -> usize {
 }
 
 impl WeightUpsets {
-    /// Flips every bit of the header, and `bits` of the weights that a seed draws. Each damaged network estimates some
-    /// windows. `tick` is called once for each bit.
+    /// Flips every bit of the header, and `bits` bits of the weights, drawn from a seed. Each damaged network
+    /// estimates the given windows. `tick` is called once for each bit.
     #[must_use]
     pub fn new(
         file: &[u8],
@@ -155,7 +155,7 @@ impl WeightUpsets {
     }
 }
 
-/// Returns whether the estimates are rejected, and by how much a second of the worst of them moves yaw, in rad and in
+/// Returns whether an estimate is rejected, and by how much a second of the worst estimate moves yaw, in rad and in
 /// stated sigmas.
 fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate]) -> (bool, f64, f64) {
     let limits = CompensateConfig::DEFAULT;
@@ -178,15 +178,15 @@ fn effect(blob: &Blob<'_>, windows: &[[Features; WINDOW]], undamaged: &[Estimate
     (reported, moved, sigmas)
 }
 
-/// Returns the milliseconds until the background check reports a flip that happens when it has come to byte `at`;
-/// `None` after two passes.
+/// Returns the milliseconds until the background check reports a flip that happens when the check is at byte `at`;
+/// `None` if the check does not find the flip.
 ///
-/// Only the pass in which the flip is seen needs to be computed, because every pass from that one on has the wrong sum.
+/// Only one pass needs to be computed, because every pass that reads the flipped byte has the wrong checksum.
 fn found_after(damaged: &Blob<'_>, flipped: usize, at: usize) -> Option<usize> {
     let mut check = BackgroundCheck::new(damaged.content, damaged.crc);
     let length = check.len();
     let finds = check.advance(length)?.is_err();
-    // A byte that this pass has checked already is seen in the next one.
+    // A flip in a byte that this pass has already checked is found in the next pass.
     let rest = length.saturating_sub(at);
     let bytes = if flipped >= at { rest } else { rest + length };
     finds.then_some(bytes.div_ceil(PIECE))
@@ -219,7 +219,7 @@ pub struct Effects {
     pub within: usize,
     /// Bits that moved yaw further without a report.
     pub beyond: usize,
-    /// The most that yaw moved in a second without a report, rad.
+    /// Largest yaw moved in a second without a report, rad.
     pub most: f64,
     /// Bits whose arithmetic overflowed; on the board it wraps.
     pub panics: usize,

@@ -3,7 +3,7 @@
 use super::fault::{Fault, Kind, Line};
 use crate::random::Random;
 
-/// Holds bytes that came over a line together.
+/// Holds bytes that arrive over a line together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
     /// The line.
@@ -69,14 +69,14 @@ pub fn damage(messages: &mut Vec<Message>, fault: &Fault) -> Option<u64> {
             }
         }
         Kind::Reordering => {
-            // A message that is hit is delayed behind so many later ones of its line.
+            // A message that is hit is delayed until after `size` later messages of its line.
             let own: Vec<usize> = (0..messages.len()).filter(|n| messages[*n].line == fault.line).collect();
             for (n, place) in own.iter().enumerate() {
                 let behind = own[n..].get(fault.size as usize);
                 if hit(&messages[*place], &mut draw)
                     && let Some(behind) = behind
                 {
-                    // It comes one microsecond after that one.
+                    // It arrives one microsecond after that message.
                     messages[*place].at = messages[*behind].at + 1;
                 }
             }
@@ -94,7 +94,7 @@ pub fn damage(messages: &mut Vec<Message>, fault: &Fault) -> Option<u64> {
                 messages.sort_by_key(|message| message.at);
             }
         }
-        // These faults are of the measurements.
+        // These faults affect the measurements.
         Kind::ClockDrift
         | Kind::ClockJump
         | Kind::Stuck

@@ -1,4 +1,4 @@
-//! A bus carries CAN frames between this computer and a board: an SLCAN line, or an interface of Linux.
+//! A bus carries CAN frames between this computer and a board. It is an SLCAN line or a CAN interface of Linux.
 
 mod slcan;
 #[cfg(target_os = "linux")]
@@ -13,24 +13,24 @@ pub use slcan::{Line, SlcanBus};
 
 /// The longest time for which [`Bus::receive`] waits for a frame.
 pub const WAIT: Duration = Duration::from_millis(20);
-/// This prefix names an interface of Linux.
+/// Prefix of the name of a Linux CAN interface.
 const INTERFACE: &str = "can:";
 
-/// Carries CAN frames.
+/// A connection that carries CAN frames.
 pub trait Bus {
     /// Sends a frame.
     ///
     /// # Errors
-    /// The system's.
+    /// The system's error.
     fn send(&mut self, frame: &DataFrame) -> Result<()>;
 
-    /// Returns the frames that have come; waits for [`WAIT`] at most where there are none.
+    /// Returns the received frames; if there are none, waits for at most [`WAIT`].
     ///
     /// # Errors
-    /// The system's.
+    /// The system's error.
     fn receive(&mut self) -> Result<Vec<DataFrame>>;
 
-    /// Returns the time since any moment.
+    /// Returns the time since an arbitrary but fixed moment.
     fn now(&mut self) -> Duration;
 }
 
@@ -48,7 +48,7 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
     }
 }
 
-/// Opens `can:can0`, an interface of Linux; or an SLCAN line: `host:port`, or a serial port at `baud`.
+/// Opens a Linux CAN interface (`can:can0`) or an SLCAN line (`host:port`, or a serial port at `baud`).
 ///
 /// # Errors
 /// [`ConnectError`].

@@ -1,10 +1,10 @@
-//! A serial line, or a TCP connection in its place: the emulator's, or a serial server's.
+//! A connection is a serial line, or a TCP socket in its place, as the emulator and serial servers have.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// Longest wait for a connection, and for what is written to be taken.
+/// Timeout of connecting and of writing.
 const CONNECT: Duration = Duration::from_secs(5);
 
 /// The error of a connection that cannot be opened.
@@ -20,7 +20,7 @@ pub enum ConnectError {
         source: serialport::Error,
     },
     /// The host does not accept the connection.
-    #[error("{name}: cannot be connected: {source}")]
+    #[error("{name}: cannot connect: {source}")]
     Tcp {
         /// The name as given.
         name: String,
@@ -36,23 +36,23 @@ pub enum ConnectError {
         source: io::Error,
     },
     /// This system has no CAN interfaces.
-    #[error("can:{name}: interfaces can be used on Linux alone")]
+    #[error("can:{name}: CAN interfaces work only on Linux")]
     NoInterfaces {
         /// The name as given.
         name: String,
     },
 }
 
-/// An open line. No read or write lasts longer than what it was opened with.
+/// An open line. Its reads time out after the time that it was opened with.
 pub enum Connection {
-    /// A port of this machine.
+    /// A serial port of this machine.
     Serial(Box<dyn serialport::SerialPort>),
-    /// `host:port`.
+    /// A TCP socket.
     Tcp(TcpStream),
 }
 
 impl Connection {
-    /// Opens `host:port`, or a serial port by its name at `baud`; a read waits for `wait` at most.
+    /// Opens `host:port`, or a serial port by its name at `baud`; a read waits for at most `wait`.
     ///
     /// # Errors
     /// [`ConnectError`].
@@ -66,7 +66,7 @@ impl Connection {
     }
 }
 
-/// `host:port`, but no device and no drive letter.
+/// Returns whether a name is `host:port`, and not a device or a path with a drive letter.
 fn is_address(name: &str) -> bool {
     let address = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
     name.rsplit_once(':').is_some_and(address)
@@ -79,7 +79,7 @@ fn connect(name: &str, wait: Duration) -> io::Result<TcpStream> {
             Ok(stream) => {
                 stream.set_read_timeout(Some(wait))?;
                 stream.set_write_timeout(Some(CONNECT))?;
-                // Questions are short, and the answer is waited for.
+                // Requests are short, and the sender waits for each response.
                 stream.set_nodelay(true)?;
                 return Ok(stream);
             }
@@ -89,7 +89,7 @@ fn connect(name: &str, wait: Duration) -> io::Result<TcpStream> {
     Err(last)
 }
 
-/// Returns whether a read has only timed out.
+/// Returns whether an error of a read only means that no bytes arrived in time.
 #[must_use]
 pub fn is_silence(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)

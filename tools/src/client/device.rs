@@ -1,4 +1,4 @@
-//! A board at the other end of a bus, asked and configured over diagnosis (UDS on ISO-TP, see [`gyronet::uds`]).
+//! A device is a board on a bus that is queried and configured over diagnosis (UDS on ISO-TP, see [`gyronet::uds`]).
 
 mod access;
 pub mod calibration;
@@ -21,11 +21,11 @@ use gyronet::uds::isotp::{TIMEOUT_MS, Transport};
 use gyronet::uds::signature::TRAILER;
 use std::time::Duration;
 
-/// The longest wait for a response: longer than the standard's 50 ms, for lines that are slow or shared.
+/// Timeout of a response: longer than the standard's 50 ms, for lines that are slow or shared.
 const RESPONSE: Duration = Duration::from_millis(TIMEOUT_MS as u64);
-/// The longest wait after "response pending": an erase of a slot at the datasheet's worst takes 4 s.
+/// Timeout after "response pending": erasing a slot takes up to 4 s by the datasheet.
 const PENDING: Duration = Duration::from_secs(8);
-/// Times that a request is sent.
+/// Number of times that a request is sent before it fails.
 const ATTEMPTS: u32 = 3;
 /// First byte of a negative response.
 const NEGATIVE: u8 = 0x7F;
@@ -43,20 +43,20 @@ pub struct Device<B> {
     authority: Authority,
 }
 
-/// Names what a writer shows to a board with a key.
+/// The proof of access that is sent to a board with a key.
 #[derive(Default)]
 pub enum Authority {
-    /// The writer shows nothing, and such a board refuses.
+    /// No proof; a board with a key refuses to be written.
     #[default]
     None,
-    /// The private key.
+    /// The private key, which answers challenges and signs.
     Key(PrivateKey),
-    /// A signature of the one thing that is written.
+    /// A signature of the content that is written.
     Signature([u8; TRAILER]),
 }
 
 impl<B: Bus> Device<B> {
-    /// Addresses the board by these identifiers; `name` stands in errors.
+    /// Creates a device with these CAN identifiers; `name` is the line's name in errors.
     ///
     /// # Errors
     /// [`DeviceError::Identifier`].
@@ -65,15 +65,15 @@ impl<B: Bus> Device<B> {
         Ok(Self { bus, name: name.to_owned(), request, response, authority: Authority::None })
     }
 
-    /// Writes by this authority from now on.
+    /// Sets the proof of access for all later writes.
     pub fn authorise(&mut self, authority: Authority) {
         self.authority = authority;
     }
 
-    /// Sends a request until there is a response, and returns it without its first byte.
+    /// Sends a request, up to three times, and returns the positive response without its first byte.
     ///
     /// # Errors
-    /// [`DeviceError`]; a refusal is one.
+    /// [`DeviceError`]; a refusal is an error too.
     pub fn ask(&mut self, request: &[u8]) -> Result<Vec<u8>, DeviceError> {
         let service = request.first().copied().unwrap_or_default();
         match self.exchange(request)? {
@@ -85,7 +85,7 @@ impl<B: Bus> Device<B> {
         }
     }
 
-    /// Returns the board's own words for the last refusal.
+    /// Returns the board's reason for the last refusal.
     fn refusal(&mut self) -> Result<Option<Refusal>, DeviceError> {
         let [high, low] = REFUSAL;
         let Ok(response) = self.exchange(&[0x22, high, low])? else { return Ok(None) };
@@ -93,7 +93,7 @@ impl<B: Bus> Device<B> {
         postcard::from_bytes(record).map_err(|_| DeviceError::Mismatch)
     }
 
-    /// Returns the positive response or the code of the negative one.
+    /// Returns the positive response, or the code of the negative response.
     fn exchange(&mut self, request: &[u8]) -> Result<Result<Vec<u8>, u8>, DeviceError> {
         for _ in 0..ATTEMPTS {
             if let Some(response) = self.attempt(request)? {
@@ -103,7 +103,7 @@ impl<B: Bus> Device<B> {
         Err(DeviceError::Silence { name: self.name.clone() })
     }
 
-    /// Sends a request once; `None` where no response comes in time.
+    /// Sends a request once; returns `None` if no response arrives in time.
     fn attempt(&mut self, request: &[u8]) -> Result<Option<Result<Vec<u8>, u8>>, DeviceError> {
         let service = request.first().copied().unwrap_or_default();
         let mut transport = Transport::new();
@@ -114,7 +114,7 @@ impl<B: Bus> Device<B> {
         let mut response = None;
         loop {
             let now = self.bus.now();
-            // Wraps around as the transport expects.
+            // The cast wraps, as the transport expects.
             let milliseconds = now.as_millis() as u32;
             while let Some(data) = transport.next_frame(milliseconds) {
                 let frame = DataFrame::new(self.request, &data).ok_or(DeviceError::TooLong)?;
@@ -141,7 +141,7 @@ impl<B: Bus> Device<B> {
                     [first, rest @ ..] if *first == service.wrapping_add(POSITIVE) => {
                         response = Some(Ok(rest.to_vec()));
                     }
-                    // Late, to an earlier request.
+                    // A late response to an earlier request.
                     _ => {}
                 });
             }

@@ -1,7 +1,7 @@
-//! The CAN messages as a receiver sees them: rate, yaw, quality, and every lost message.
+//! Monitors the CAN messages as a receiver sees them: rate, yaw, quality, and every lost message.
 //!
-//! [`mod@line`] reads text, [`source`] opens what it comes from; [`Monitor`] checks the frames as an
-//! ECU would and keeps the accounts.
+//! [`source`] opens a port, socket or log, [`mod@line`] parses its lines, and [`Monitor`] checks the frames as an ECU
+//! would and counts them.
 
 pub mod line;
 pub mod source;
@@ -20,31 +20,31 @@ use gyronet::can::j1939::{VDC2_PGN, Vdc2};
 use gyronet::can::yaw::FOG_IDS;
 use yaw_set::{Part, YawSet};
 
-/// Loss of up to this many messages in a row is counted message by message.
+/// Up to this many consecutive missing messages count as lost; more count as out of sequence.
 const MAX_DELTA: u8 = 10;
-/// Frames are counted for so long, in seconds, to say how many come in one.
+/// Frames are counted over this time to compute their rate, s.
 const PACE_SECONDS: f64 = 1.0;
 
-/// The numbers of messages by what happened to them.
+/// Counts of messages by the result of their check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Counts {
-    /// Frames that are ours, those of a fibre-optic gyro included.
+    /// Frames of the board, those of a fibre-optic gyro included.
     pub frames: u64,
-    /// Frames of others.
+    /// Frames of other senders.
     pub foreign: u64,
-    /// Messages that the counters showed to be missing.
+    /// Messages that are missing according to the counters.
     pub lost: u64,
-    /// Messages that came twice.
+    /// Messages with the same counter as the one before.
     pub repeated: u64,
     /// Messages out of order, or after a longer loss.
     pub out_of_sequence: u64,
-    /// Messages whose checksum did not fit.
+    /// Messages with a wrong checksum, or that cannot be parsed.
     pub damaged: u64,
-    /// Lines that should be frames and are not.
+    /// Lines that begin like a frame and cannot be parsed.
     pub unreadable: u64,
 }
 
-/// Checks and reads our messages.
+/// Checks and decodes the board's messages.
 #[derive(Debug, Clone)]
 pub struct Monitor {
     own_set: Option<YawSet>,
@@ -54,20 +54,21 @@ pub struct Monitor {
     pace: Option<(f64, u32)>,
     frames_per_second: Option<f64>,
     stamp: Option<f64>,
-    /// Accounts.
+    /// Counts of messages.
     pub counts: Counts,
-    /// Newest values of the board's own set.
+    /// Newest values of the inertial sensor's set of messages.
     pub state: State,
-    /// Newest values of a fibre-optic gyro's set, once there was one.
+    /// Newest values of a fibre-optic gyro's set, once it was received.
     pub fog: Option<State>,
-    /// Yaw rate of the drop-in message, deg/s, where its status is good.
+    /// Yaw rate of the drop-in message, deg/s; `None` unless its status is good.
     pub drop_in: Option<f64>,
-    /// Yaw rate of VDC2, deg/s, where it is one.
+    /// Yaw rate of VDC2, deg/s; `None` if not available.
     pub vdc2: Option<f64>,
 }
 
 impl Monitor {
-    /// Expects the messages of a configuration; those of a fibre-optic gyro have the identifiers of [`FOG_IDS`].
+    /// Creates a monitor for the messages of a configuration; those of a fibre-optic gyro have the identifiers of
+    /// [`FOG_IDS`].
     #[must_use]
     pub fn new(config: &Config) -> Self {
         Self {
@@ -85,10 +86,10 @@ impl Monitor {
         }
     }
 
-    /// Reads a line and returns the time, in seconds, where it completed a set of our own messages: the line's own
-    /// where it has one, else `time`.
+    /// Reads a line. If it completes a set of the inertial sensor's messages, returns its time in seconds: the line's
+    /// own time stamp if it has one, otherwise `time`.
     ///
-    /// Answers to commands are passed over; what begins as a frame and is none is counted.
+    /// Answers to commands are skipped; a line that begins like a frame and is none is counted as unreadable.
     pub fn take_line(&mut self, line: &str, time: f64) -> Option<f64> {
         match line::parse_line(line) {
             Ok((stamp, frame)) => {
@@ -103,7 +104,8 @@ impl Monitor {
         }
     }
 
-    /// Checks a frame at a time in seconds and returns whether it completed a set of our own messages.
+    /// Checks a frame received at `time`, in seconds; returns whether it completed a set of the inertial sensor's
+    /// messages.
     pub fn take(&mut self, frame: &impl Frame, time: f64) -> bool {
         self.keep_pace(time);
         let (id, data) = (frame.id(), frame.data());
@@ -127,13 +129,13 @@ impl Monitor {
         false
     }
 
-    /// The newest line's own time, in seconds, where lines have one.
+    /// Returns the newest time stamp of a line, in seconds, if lines have one.
     #[must_use]
     pub fn stamp(&self) -> Option<f64> {
         self.stamp
     }
 
-    /// Frames in a second, ours and others', once a second is over.
+    /// Returns the rate of all frames, 1/s, once a second has passed.
     #[must_use]
     pub fn frames_per_second(&self) -> Option<f64> {
         self.frames_per_second
@@ -153,7 +155,7 @@ impl Monitor {
         self.pace = Some((time, 1));
     }
 
-    /// Counts a verdict; whether the message may be used.
+    /// Counts a verdict and returns whether the message may be used.
     fn account(&mut self, verdict: Result<Verdict, Fault>) -> bool {
         self.counts.frames += 1;
         match verdict {

@@ -1,4 +1,4 @@
-//! `gyronet bench-target`: instructions and modelled cycles of every kernel, network and parser.
+//! `gyronet bench-target` counts instructions and models cycles of every kernel, network and parser.
 
 use super::Common;
 use gyronet_tools::target::bench::{self, Count, Counts};
@@ -9,18 +9,21 @@ use gyronet_tools::target::tasks::{self, Cycles, Tasks};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Count instructions and modelled cycles on the target, in QEMU.
+/// Count instructions and model cycles of the firmware on a Cortex-M4F, in QEMU.
 ///
-/// The command measures every kernel, network and sensor parser on a Cortex-M4F. It needs qemu-system-arm, and a
-/// C compiler for cycles. It prints one line each, `name instructions=N cycles=N cycles_5ws=N stack=BYTES`, then
-/// sizes, then the parsers' cost for a byte and their share of the processor's time. Cycles are modelled, not
-/// measured on silicon: at zero wait states, and on an STM32F405 at 168 MHz, whose flash has five. Then follow all
-/// tasks and interrupts of the flashed image, counted while it runs, and whether each meets its deadline at 168 MHz
-/// and 5 wait states with a quarter of it to spare. The exit status is 1 when the count of a window depends on its
-/// input, or a deadline can be missed.
+/// The command builds the images and runs them. It needs qemu-system-arm, and a C compiler for the cycles. Cycles are
+/// modelled, not measured on silicon: at zero wait states, and on an STM32F405 at 168 MHz with five.
+///
+/// It prints one line for each kernel, network and sensor parser: `name instructions=N cycles=N cycles_5ws=N
+/// stack=BYTES`. Sizes follow, then each parser's cost per byte and its share of the processor's time. A table of all
+/// tasks and interrupts of the flashed image, counted while it runs, ends the output. It says whether each task meets
+/// its deadline at 168 MHz and 5 wait states with a quarter of the deadline to spare.
+///
+/// The exit status is 1 if the instruction count of a network's window depends on its input, or if a task can miss
+/// its deadline.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Print how the cycles depend on policies of the flash accelerator that ST's manual leaves open.
+    /// Print only the cycles under each policy of the flash accelerator that ST's manual leaves open.
     #[arg(long)]
     policies: bool,
 }
@@ -53,9 +56,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     } else {
         print(out, &counts, &coprocessor, tasks.as_ref())
     };
-    // Whether somebody reads it or not.
+    // A failed check is reported even if the output could not be written.
     if !counts.constant() {
-        return Err("the count of a window depends on its input".into());
+        return Err("the instruction count of a window depends on its input".into());
     }
     if tasks.is_some_and(|(_, schedule)| !schedule.met()) {
         return Err("a task of the image can miss its deadline".into());
@@ -63,7 +66,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(written?)
 }
 
-/// Cycles of the networks, the pipeline and the parsers under each policy, a line each.
+/// Prints the cycles of the networks, the pipeline and the parsers under each policy, one region per line.
 fn policies(workspace: &Path, folder: &Path) -> super::Result {
     let out = &mut io::stdout().lock();
     let names = bench::POLICIES.map(|(name, _)| name);
@@ -87,10 +90,10 @@ fn policies(workspace: &Path, folder: &Path) -> super::Result {
     Ok(())
 }
 
-/// The costs of the image's handlers, and their response times.
+/// The costs of the image's handlers, and the schedule with their response times.
 type Timing = (Tasks, Schedule);
 
-/// The tasks of the image that is flashed, counted while it runs with the largest model.
+/// Counts the tasks of the flashed image while it runs the largest model, and computes their response times.
 fn schedule(workspace: &Path, image: &Path, counts: &Counts) -> Result<Timing, Box<dyn std::error::Error>> {
     let plugin = bench::plugin(workspace).ok_or("the instruction counter cannot be built")?;
     let tasks = tasks::measure(image, &plugin)?;
@@ -99,7 +102,7 @@ fn schedule(workspace: &Path, image: &Path, counts: &Counts) -> Result<Timing, B
         Some((count.instructions, cycles))
     });
     let schedule = Schedule::new(&tasks, fognet);
-    let schedule = schedule.ok_or("the image has other tasks than the table of deadlines")?;
+    let schedule = schedule.ok_or("the image has a task that is not in the table of deadlines")?;
     Ok((tasks, schedule))
 }
 

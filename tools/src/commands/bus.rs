@@ -1,4 +1,4 @@
-//! `gyronet bus`: the CAN messages and the bus load.
+//! `gyronet bus` prints the CAN messages and the bus load.
 
 use super::{Common, print_json};
 use embedded_can::Id;
@@ -8,18 +8,19 @@ use gyronet::can::load::{Periodic, per_mille};
 use gyronet::can::yaw::FOG_IDS;
 use std::io::{self, Write};
 
-/// Print the CAN messages and the bus load.
+/// Print the CAN messages that a board sends, and the bus load.
 ///
-/// For each configuration that comes with the library the command prints identifiers, periods (ms), the load of
-/// the bus with the most stuff bits possible, and that of SLCAN lines. The messages of a fibre-optic gyro are sent
-/// once its first data arrive, or from the start where one is configured.
+/// For each of four configurations the command prints the identifier, period (ms) and worst-case length (bits) of
+/// every message. It also prints the load of the CAN bus with the most stuff bits possible, and the load of SLCAN
+/// lines. A board sends the messages of a fibre-optic gyro once the gyro's first data arrive, or from the start if
+/// such a gyro is configured.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {}
 
-/// Rates of serial lines, bit/s.
+/// Baud rates of the serial lines, bit/s.
 const LINES: [u32; 3] = [115_200, 460_800, 921_600];
 
-/// Messages that are sent together.
+/// The messages of one configuration, which share a bus.
 struct Traffic {
     name: &'static str,
     messages: Vec<Periodic>,
@@ -47,7 +48,7 @@ pub fn run(_: &Args, common: Common) -> super::Result {
     let all = Config::new(Settings { vdc2, ..Settings::DEFAULT })?;
     let traffics = [
         Traffic::new("default", &Config::DEFAULT, &[]),
-        Traffic::new("default, a fibre-optic gyro heard", &Config::DEFAULT, &FogEncoder::messages(FOG_IDS)),
+        Traffic::new("default, with a fibre-optic gyro", &Config::DEFAULT, &FogEncoder::messages(FOG_IDS)),
         Traffic::new("for SLCAN at 115200 bit/s", &Config::SLCAN_115200, &[]),
         Traffic::new("default and J1939 VDC2", &all, &[]),
     ];

@@ -1,4 +1,4 @@
-//! `gyronet calibrate`: gain and mounting of a unit's gyro, from drives with a reference of their heading.
+//! `gyronet calibrate` fits gain and mounting of a unit's gyro to drives with a reference yaw rate or course.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress, read_drive};
@@ -11,25 +11,28 @@ use gyronet_tools::drive::wheel_frames::WheelFrames;
 use std::io::{Write, stdout};
 use std::path::PathBuf;
 
-/// Find gain and mounting of a unit's gyro.
+/// Find the gain and mounting errors of a unit's gyro from recorded drives.
 ///
-/// Each drive runs through the pipeline with the weights that the board runs. What the corrected yaw rate then lacks
-/// of the reference (a yaw rate, ref_gyr_z, or a course, ref_yaw) is put down to the gyro's gain and to how the unit is mounted: shares of the yaw, roll and pitch
-/// rate, each with its sigma. A share that the drives do not show (no turns, no tilt) is refused and left at zero. The
-/// file is for `gyronet device calibrate unit` and for `gyronet evaluate --calibration`, and belongs to these weights.
+/// The command runs each drive through the pipeline, with the weights that the board runs. It compares the corrected
+/// yaw rate with the reference (a yaw rate, ref_gyr_z, or a course, ref_yaw). It fits the remaining error to shares
+/// of the yaw rate (gain) and of the roll and pitch rates (mounting), and prints each share with its sigma. A share
+/// that the drives do not show (no turns, no tilt) is refused and left at zero.
+///
+/// With --out it writes a calibration file for `gyronet device calibrate unit` and `gyronet evaluate --calibration`.
+/// The file is valid only with the same weights.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet calibrate drive1.csv drive2.csv --out unit.json
   gyronet evaluate drive3.csv --calibration unit.json")]
 pub struct Args {
-    /// Recorded drives of the unit, with ref_gyr_z or ref_yaw.
+    /// Drives recorded with the unit, with ref_gyr_z or ref_yaw.
     #[arg(required = true, value_name = "DRIVE")]
     files: Vec<PathBuf>,
     /// Write the calibration to this file.
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
-    /// Weight file [default: the one that comes with the library].
+    /// Weight file [default: the library's default model].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
 }
@@ -72,7 +75,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         let degrees_per_hour = drive.yaw_rate_bias_rad_per_s.to_degrees() * 3_600.0;
         writeln!(
             out,
-            "{}: bias left {degrees_per_hour:+.1} deg/h, spans within {:.6} rad",
+            "{}: remaining bias {degrees_per_hour:+.1} deg/h, spans within {:.6} rad",
             drive.name, drive.deviation_rad
         )?;
     }

@@ -1,4 +1,4 @@
-//! `gyronet campaign`: fault injection.
+//! `gyronet campaign` injects faults into drives.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress, read_drive};
@@ -15,19 +15,23 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Damage drives on purpose and count which faults a receiver sees.
+/// Inject faults into drives and count which ones a receiver detects.
 ///
-/// The bundled simulated drive and the given recordings go through the bytes of four parts and through SLCAN. A
-/// seed draws faults, single and in pairs. The exit status is 1 when a fault goes undetected that is not on the
-/// named list, or anything panics.
+/// The input is the bundled simulated drive and the given recordings, encoded as the bytes of four sensors and of
+/// SLCAN lines. A seed draws faults, single and in pairs. A simulated receiver checks the board's CAN messages. The
+/// command prints one line for each kind of fault.
+///
+/// The exit status is 1 if a fault that is not on the list of exceptions goes undetected, if anything panics, or if
+/// an undamaged drive exceeds its error limits. With --upsets it is 1 if a damaged weight file is loaded, or a bit
+/// that flips in use is not found.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet campaign --quick                              # half a minute
-  gyronet campaign trial08_100hz.csv --plot faults.svg  # 20,000 runs, a recording beside the simulated drive
-  gyronet campaign --upsets                             # flipped bits of the weights instead")]
+  gyronet campaign trial08_100hz.csv --plot faults.svg  # 20,000 runs
+  gyronet campaign --upsets                             # flip bits of the weights")]
 pub struct Args {
-    /// Recordings to damage beside the simulated drive.
+    /// Recordings to use in addition to the simulated drive.
     #[arg(value_name = "DRIVE.csv")]
     drives: Vec<PathBuf>,
     /// Number of runs, each of 8 s at most.
@@ -36,13 +40,14 @@ pub struct Args {
     /// Seed; the same seed gives the same runs.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Run a small part: 320 runs.
+    /// Do 320 runs only.
     #[arg(long)]
     quick: bool,
-    /// Flip bits of the weight file instead: every bit of its header, and this many bits of the weights.
+    /// Flip bits of the weight file instead of damaging drives: every bit of its header, and this many bits of the
+    /// weights.
     #[arg(long, value_name = "BITS", num_args = 0..=1, default_missing_value = "100000")]
     upsets: Option<usize>,
-    /// Write a picture of the runs of single faults to this file.
+    /// Plot the runs with a single fault to this file.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
@@ -78,12 +83,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     match (report.failures.len(), report.out_of_order().count()) {
         (0, 0) => Ok(()),
-        (0, drives) => Err(format!("{drives} undamaged drives are beyond their limits").into()),
-        (count, _) => Err(format!("{count} of {} runs must not be", plan.runs).into()),
+        (0, drives) => Err(format!("{drives} undamaged drives exceed their error limits").into()),
+        (count, _) => Err(format!("{count} of {} runs failed", plan.runs).into()),
     }
 }
 
-/// Windows that each damaged network is asked about.
+/// Number of windows that each damaged network estimates.
 const WINDOWS: usize = 2;
 
 fn upset(bits: usize, args: &Args, drive: &Drive, common: Common) -> super::Result {
@@ -105,9 +110,11 @@ fn upset(bits: usize, args: &Args, drive: &Drive, common: Common) -> super::Resu
     let accepted =
         weights.header_bits - weights.header_refused + weights.weight_bits - weights.weight_refused;
     if accepted + weights.not_found > 0 {
-        return Err(
-            format!("{accepted} damaged files were loaded, {} not found in use", weights.not_found).into()
-        );
+        return Err(format!(
+            "{accepted} damaged files were loaded, {} flips were not found in use",
+            weights.not_found
+        )
+        .into());
     }
     Ok(())
 }

@@ -1,22 +1,22 @@
-//! `gyronet completions`: completions of the arguments for a shell.
+//! `gyronet completions` prints a completion script for a shell.
 
 use clap_complete::Shell;
 use std::io::Write;
 
-/// Print completions for a shell.
+/// Print a script that completes gyronet's arguments in a shell.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  source <(gyronet completions bash)                                # this session
-  gyronet completions zsh > ~/.zfunc/_gyronet                       # a folder in fpath
+  source <(gyronet completions bash)                                # for this session
+  gyronet completions zsh > ~/.zfunc/_gyronet                       # a folder of fpath
   gyronet completions fish > ~/.config/fish/completions/gyronet.fish")]
 pub struct Args {
-    /// The shell.
+    /// Shell that runs the script.
     #[arg(value_enum, value_name = "SHELL")]
     shell: Shell,
 }
 
-/// Runs the subcommand. `command` is the whole command line.
+/// Runs the subcommand. `command` describes the complete command line.
 pub fn run(args: &Args, mut command: clap::Command) -> super::Result {
     let name = command.get_name().to_owned();
     let mut script = Vec::new();

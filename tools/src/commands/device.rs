@@ -1,4 +1,4 @@
-//! `gyronet device`: state and configuration of a board, over diagnosis.
+//! `gyronet device` reads and changes the state and configuration of a board over diagnosis.
 
 mod calibration;
 mod settings;
@@ -20,9 +20,10 @@ use std::path::PathBuf;
 
 /// Query and configure a board over diagnosis (UDS).
 ///
-/// It goes over the service line, any SLCAN adapter, or a CAN interface.
+/// The command connects to the board over its service line, any SLCAN adapter, or a CAN interface (--port).
 ///
-/// A new configuration or new weights take effect after a restart (`device restart`).
+/// New settings, wheel frames, calibration files and weights take effect after a restart (`device restart`). The exit
+/// status is 1 if the board does not respond or refuses a request.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -31,19 +32,19 @@ Examples:
   gyronet device --port /dev/ttyUSB1 calibrate static --store
   gyronet device --port localhost:4000 weights gyronet.blob      # then: restart")]
 pub struct Args {
-    /// Serial port or host:port with SLCAN, or can:INTERFACE of Linux; required.
+    /// Serial port or host:port of an SLCAN line, or can:INTERFACE for a CAN interface of Linux; required.
     #[arg(long, global = true, value_name = "PORT|HOST:PORT|can:INTERFACE")]
     port: Option<String>,
-    /// Bit rate of a serial port.
+    /// Baud rate of a serial port.
     #[arg(long, global = true, default_value_t = 115_200)]
     baud: u32,
-    /// Identifiers of requests and responses, where they are not 7E0,7E8; eight digits are 29 bits.
+    /// CAN identifiers of requests and responses, if they are not 7E0,7E8; eight digits mean 29 bits.
     #[arg(long, global = true, value_name = "REQUEST,RESPONSE", value_parser = identifiers)]
     ids: Option<DiagnosisIds>,
-    /// Private key of those who may write, for a board that has its public part.
+    /// Private key, to write to a board that stores its public key.
     #[arg(long, global = true, value_name = "NAME.key", conflicts_with = "signature")]
     key: Option<PathBuf>,
-    /// Signature of what is written (`gyronet sign`), for a board with a key.
+    /// Signature of the written file (from `gyronet sign`), for a board that stores a key.
     #[arg(long, global = true, value_name = "FILE.sig")]
     signature: Option<PathBuf>,
     #[command(subcommand)]
@@ -56,42 +57,43 @@ enum Action {
     Info,
     /// Print the configuration.
     Get,
-    /// Change the configuration: NAME=VALUE as `get` prints them, or a whole file; or the wheel frames (a .toml file).
+    /// Change settings (NAME=VALUE as `get` prints them), or write a configuration or wheel frames from a file.
     Set {
-        /// Settings, for example `latitude_deg=48.1 mounting.roll_deg=1.5`; values are as in JSON.
+        /// Settings, for example `latitude_deg=48.1 mounting.roll_deg=1.5`; values are JSON.
         settings: Vec<String>,
-        /// A whole configuration, as `get --json` prints it; or wheel frames, as `gyronet wheels` and `wheels` print them.
+        /// Complete configuration, as `get --json` prints it; or wheel frames (.toml), as `gyronet wheels` and
+        /// `device wheels` print them.
         #[arg(long, value_name = "FILE.json|FILE.toml")]
         file: Option<PathBuf>,
     },
-    /// Print the wheel frames that the board receives, as a file for `set --file`.
+    /// Print the settings of the wheel frames that the board receives, as a file for `set --file`.
     Wheels,
     /// Calibrate the sensor while the vehicle stands still (3 s), and print the result.
     Calibrate {
-        /// The task, or `show` for the calibration that is stored.
+        /// What to calibrate, or another action; `show` only prints the calibration.
         #[arg(value_enum)]
         task: calibration::What,
-        /// The file of `gyronet calibrate`, for `unit`.
+        /// Calibration file from `gyronet calibrate`, for `unit`.
         #[arg(long, value_name = "FILE.json")]
         file: Option<PathBuf>,
         /// Store the result, so that it survives a restart.
         #[arg(long)]
         store: bool,
     },
-    /// Print the events since the start.
+    /// Print the events since the board started.
     Log,
-    /// Print all counters.
+    /// Print all counters since the board started.
     Counters,
-    /// Upload a weight file of GyroNet or FoGNet; the board checks it, and uses it after a restart.
+    /// Upload a weight file of GyroNet or FoGNet; the board checks it and uses it after a restart.
     Weights {
         /// Weight file, as `gyronet quantize` writes it.
         file: PathBuf,
     },
-    /// Print who may write: whether a key is stored, the newest counter, and the serial number.
+    /// Print who may write: whether a key is stored, the newest signature counter, and the serial number.
     Access,
-    /// Store the public key of those who may write from now on, or `none` to remove it.
+    /// Store the public key that controls who may write; `none` removes it.
     SetKey {
-        /// `NAME.pub` of `gyronet keys`, or `none`.
+        /// NAME.pub from `gyronet keys`, or `none`.
         key: PathBuf,
     },
     /// Restart the board.
@@ -100,33 +102,33 @@ enum Action {
 
 type Board = Device<Box<dyn Bus>>;
 
-/// Holds what `access` prints.
+/// The output of `access`.
 #[derive(Serialize)]
 struct Access {
     #[serde(flatten)]
     access: AccessState,
-    /// Requests refused for want of access since the start.
+    /// Requests refused for lack of access since the board started.
     refused: AccessCounters,
 }
 
-/// Reads two hexadecimal identifiers.
+/// Parses two hexadecimal identifiers, REQUEST,RESPONSE.
 fn identifiers(text: &str) -> Result<DiagnosisIds, String> {
     let (request, response) = text.split_once(',').ok_or("not REQUEST,RESPONSE")?;
     let number = |text: &str| u32::from_str_radix(text, 16).map_err(|error| format!("{text}: {error}"));
     let ids = DiagnosisIds {
         extended: request.len() > 3,
         request: number(request)?,
-        // Nothing is sent to it.
+        // No functional requests are sent.
         functional: 0,
         response: number(response)?,
     };
-    ids.ids().map(|_| ids).map_err(|id| format!("{id:X} has too many bits, or is there twice"))
+    ids.ids().map(|_| ids).map_err(|id| format!("{id:X} has too many bits, or is given twice"))
 }
 
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let Some(port) = args.port.as_deref() else {
-        let why = "which board? Name its line: --port /dev/ttyUSB1, --port host:port, or --port can:can0\n";
+        let why = "no board is given: use --port /dev/ttyUSB1, --port host:port, or --port can:can0\n";
         clap::Error::raw(clap::error::ErrorKind::MissingRequiredArgument, why).exit();
     };
     let ids = args.ids.unwrap_or(DiagnosisIds::DEFAULT);
@@ -165,11 +167,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Action::SetKey { key } => {
             let public = if key.as_os_str() == "none" { [0; 32] } else { signing::read_public(key)? };
             device.set_key(&public)?;
-            done(json, "stored; it holds from now on")?;
+            done(json, "stored; it is in force now")?;
         }
         Action::Restart => {
             device.restart()?;
-            done(json, "the board restarts")?;
+            done(json, "the board is restarting")?;
         }
     }
     Ok(())
@@ -184,7 +186,7 @@ fn print_json(value: &impl Serialize) -> super::Result {
     super::print_json(&mut io::stdout().lock(), value)
 }
 
-/// JSON, or a line for each value.
+/// Prints a record as JSON, or as one line for each value.
 fn print_value(value: &impl Serialize, json: bool) -> super::Result {
     if json {
         return print_json(value);
@@ -203,12 +205,12 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     writeln!(out, "firmware      {major}.{minor}.{patch}, protocol {}", info.protocol)?;
     match identity.device_id {
         Some(id) => writeln!(out, "part          {:#05x} revision {:#06x}", id & 0xFFF, id >> 16)?,
-        None => writeln!(out, "part          does not say (the emulator)")?,
+        None => writeln!(out, "part          unknown (emulator)")?,
     }
     writeln!(out, "clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6)?;
     let bus = match identity.can_fault {
         None => "CAN, SLCAN".to_owned(),
-        Some(fault) => format!("SLCAN alone: {fault}"),
+        Some(fault) => format!("SLCAN only: {fault}"),
     };
     writeln!(out, "bus           {bus}")?;
     writeln!(out, "started by    {}", identity.reset)?;
@@ -219,7 +221,7 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     if let Some(fault) = info.sensor {
         writeln!(out, "sensor        {fault}")?;
     }
-    let writable = if info.writable { "" } else { ", no controller: nothing can be stored" };
+    let writable = if info.writable { "" } else { ", no flash controller: nothing can be stored" };
     writeln!(out, "flash         {}{writable}", info.flash)?;
     let open = if access == "open" { ": no key is stored, anyone may write at standstill" } else { "" };
     writeln!(out, "access        {access}{open}")?;
@@ -246,7 +248,7 @@ fn log(device: &mut Board, json: bool) -> super::Result {
     loop {
         let page = device.log(after)?;
         lost += page.lost;
-        // A page that brings nothing new is the end.
+        // A page without new events is the end.
         let Some(last) = page.events.last().filter(|last| last.number > after) else { break };
         after = last.number;
         events.extend(page.events);
@@ -256,7 +258,7 @@ fn log(device: &mut Board, json: bool) -> super::Result {
     }
     let out = &mut io::stdout().lock();
     if lost > 0 {
-        writeln!(out, "{lost} older events are lost")?;
+        writeln!(out, "{lost} older events were lost")?;
     }
     for event in events {
         writeln!(out, "{:6} {:9.2} s  {}", event.number, f64::from(event.tick) / 100.0, event.kind)?;
@@ -266,7 +268,7 @@ fn log(device: &mut Board, json: bool) -> super::Result {
 
 fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Common) -> super::Result {
     let file = std::fs::read(path).map_err(super::WriteError::to(path))?;
-    // The same check as the board's, before its flash is erased.
+    // Run the board's own check here, before the board erases its flash.
     let words: Vec<u32> = file.chunks(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes)).collect();
     let words = bytemuck::cast_slice(&words);
     let is_fognet = file.get(6..8) == Some(&FOGNET.to_le_bytes()[..]);
@@ -283,6 +285,6 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
         print_json(&serde_json::json!({ "place": uploaded.place, "crc": uploaded.crc }))
     } else {
         let (place, crc) = (uploaded.place, uploaded.crc);
-        Ok(writeln!(io::stdout(), "{place} holds file {crc:08x}; it is used after a restart")?)
+        Ok(writeln!(io::stdout(), "{place} holds file {crc:08x}; the board uses it after a restart")?)
     }
 }

@@ -1,4 +1,4 @@
-//! `gyronet doctor`: one page on a recording before anyone trusts it.
+//! `gyronet doctor` checks a recording and writes a page about it.
 
 use super::{Common, WriteError, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
@@ -13,11 +13,14 @@ use gyronet_tools::evaluate::report::DriveErrors;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Examine a recording before anyone trusts it.
+/// Check whether a recording is good enough to evaluate, calibrate and train on.
 ///
-/// The page has rate and gaps, saturation, noise with its random walk and bias instability, standstills, mounting by
-/// gravity, forward by wheels and accelerometer, wheels against gyro, the reference, what can and cannot be judged on the
-/// recording, and what a calibration and a training could gain. The exit status is 1 where something is to be cured first.
+/// The input is a drive. The command prints its findings and writes them to an HTML page with plots: sample rate and
+/// gaps, saturation, noise (random walk and bias instability), standstills, mounting by gravity, forward direction by
+/// wheels and accelerometer, wheels against gyro, and the reference. It also says what can and cannot be judged on
+/// the recording, and what calibration and training could gain.
+///
+/// The exit status is 1 if a finding must be fixed before the recording is used.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -27,7 +30,7 @@ pub struct Args {
     /// Recorded drive.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Page [default: the recording's name, .doctor.html].
+    /// Write the page to this file [default: the recording's name with .doctor.html].
     #[arg(long, value_name = "FILE.html")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -65,15 +68,15 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         writeln!(out, "page: {}", path.display())?;
     }
     let bad = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad).count();
-    if bad > 0 { Err(format!("{bad} findings are to be cured first").into()) } else { Ok(()) }
+    if bad > 0 { Err(format!("{bad} findings must be fixed first").into()) } else { Ok(()) }
 }
 
-/// Says what calibration and training would gain on this drive, or why that cannot be known.
+/// Returns what calibration and training would gain on this drive, or why that is unknown.
 fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
     let refused = |error: &dyn std::fmt::Display| {
         let reason = error.to_string();
         let reason = reason.strip_prefix(&format!("{}: ", args.file.display())).unwrap_or(&reason);
-        format!("Cannot be said: {reason}.")
+        format!("Unknown: {reason}.")
     };
     let recording = match read_drive(&args.file, common) {
         Ok(recording) => recording,
@@ -84,7 +87,7 @@ fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
     vec![("gyronet calibrate", calibration), ("training", training)]
 }
 
-/// The shares of a unit by this drive alone.
+/// Returns the shares of a unit's calibration, fitted to this drive alone.
 fn unit(args: &Args, recording: &Recording, common: Common) -> Result<String, Box<dyn std::error::Error>> {
     let weights = args.networks.weights()?;
     let blob = weights.blob()?;
@@ -95,9 +98,9 @@ fn unit(args: &Args, recording: &Recording, common: Common) -> Result<String, Bo
     let unit = calibrate(&[Drive { recording, replay: replay? }], blob.crc)?;
     let shares = unit.shares.iter().map(|Share { name, value, sigma, refused }| match refused {
         None if value.abs() > 2.0 * sigma => {
-            format!("{name} {value:+.4} (sigma {sigma:.4}): worth taking off")
+            format!("{name} {value:+.4} (sigma {sigma:.4}): significant")
         }
-        None => format!("{name} {value:+.4} (sigma {sigma:.4}): not told from zero"),
+        None => format!("{name} {value:+.4} (sigma {sigma:.4}): not significant"),
         Some(reason) => format!("{name}: {reason}"),
     });
     Ok(format!(
@@ -106,8 +109,8 @@ fn unit(args: &Args, recording: &Recording, common: Common) -> Result<String, Bo
     ))
 }
 
-/// The error of what is sent over that of static initialisation, by the weights in use: the figure that a training would
-/// have to lower.
+/// Returns the error of the sent rates with the weights in use, relative to static initialisation. Training must
+/// lower this ratio.
 fn trained(args: &Args, recording: &Recording, common: Common) -> Result<String, Box<dyn std::error::Error>> {
     let rates = args.networks.rates(recording, common)?;
     let errors = DriveErrors::new(recording, &rates)?;
@@ -116,9 +119,9 @@ fn trained(args: &Args, recording: &Recording, common: Common) -> Result<String,
         error.mean_1s_rad.or(error.rms_rad)
     };
     let named = if errors.methods[Method::STATIC].error.mean_1s_rad.is_some() {
-        "The heading is off by so much after 1 s, on average"
+        "Mean heading error after 1 s"
     } else {
-        "The heading is off by so much over the drive, RMS"
+        "RMS heading error over the drive"
     };
     let (Some(still), Some(updated), Some(sent), Some(linear)) = (
         figure(Method::STATIC),
@@ -129,9 +132,9 @@ fn trained(args: &Args, recording: &Recording, common: Common) -> Result<String,
         return Err("the drive has no figure that compares methods".into());
     };
     Ok(format!(
-        "{named}: {still:.6} rad by static initialisation alone; {:.2} of that with zero-rate updates, {:.2} as sent with \
-         the weights in use, {:.2} by the library's linear window. Training would have to lower these; by how much is not \
-         known from one drive: it takes several of one vehicle, one of them kept apart.",
+        "{named}: {still:.6} rad with static initialisation alone; {:.2} of that with zero-rate updates, {:.2} as sent with \
+         the weights in use, {:.2} with the library's linear window. Training must lower these ratios. One drive does not \
+         show by how much: that takes several drives of one vehicle, one of them held out.",
         updated / still,
         sent / still,
         linear / still

@@ -1,4 +1,4 @@
-//! The errors of any number of drives: on all cores, with as many drives in memory as there are cores.
+//! Computes the errors of many drives on all cores, with at most one drive per core in memory.
 
 use super::{Common, progress};
 use gyronet_tools::evaluate::report::DriveErrors;
@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 type Judged = Result<DriveErrors, Box<dyn Error + Send + Sync>>;
 
-/// Judges each file and returns the results in the order of the files, or the error of the first one that has one among
-/// those begun: after an error no other drive is begun.
+/// Judges each file and returns the results in the order of the files. After an error no further file is begun; the
+/// error of the first failed file in that order is returned.
 pub fn errors(
     files: &[PathBuf],
     common: Common,

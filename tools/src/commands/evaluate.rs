@@ -1,4 +1,4 @@
-//! `gyronet evaluate`: heading errors of each method on recorded drives.
+//! `gyronet evaluate` computes the heading errors of each method on recorded drives.
 
 use super::{Common, drives, paint, print_json, progress, remark_vehicle, weights};
 use gyronet::model::GyroNet;
@@ -13,35 +13,39 @@ use std::path::{Path, PathBuf};
 
 /// Measure the heading error of every method on recorded drives.
 ///
-/// The reference is a yaw rate (ref_gyr_z), or a course (ref_yaw), which judges a minute and more. For each drive, and as
-/// a mean of each folder, the command prints first the error of the rate for navigation over that of the best classical
-/// method with the same inputs and no more delay: the raw gyro, static initialisation, zero-rate updates, a low pass of
-/// linear phase, VQF. Then for each method the error over 1 s, 10 s, 60 s and the drive (rad; RMS and at the end), its
-/// ratio to static initialisation's (1 s, or RMS against a course), the mean of what it takes off beyond static
-/// initialisation and zero-rate updates, its multiplications per sample, and its delay. GyroNet and the linear window
-/// are settled estimates after static initialisation. The last two rows are the rates that the board sends: with the
-/// sample (Bosch TX1, J1939 VDC2), and in its own yaw messages some samples later. The wheels of a drive replace the
-/// vehicle's bus. A drive with a course that starts moving gets a simulated standstill, and the output says so.
+/// The input is drives with a reference: a yaw rate (ref_gyr_z), or a course (ref_yaw), which can judge only errors
+/// over a minute and more. Wheel rates in a drive replace the wheel frames of the vehicle's bus. A drive with a
+/// course that starts moving gets a simulated standstill, and the output says so.
+///
+/// For each drive, and as a mean of each folder, the command first prints the error of the navigation rate, relative
+/// to that of the best classical method with the same inputs and no more delay. The classical methods are the raw
+/// gyro, static initialisation, zero-rate updates, a linear-phase low pass, and VQF.
+///
+/// One row for each method follows: the error over 1 s, 10 s, 60 s and the drive (rad; RMS and at the end), its ratio
+/// to that of static initialisation (1 s, or RMS against a course), the mean correction beyond static initialisation
+/// and zero-rate updates, multiplications per sample, and delay. GyroNet and the linear window are settled estimates
+/// after static initialisation. The last two rows are the rates that the board sends: the prompt rate, with the
+/// sample (Bosch TX1, J1939 VDC2), and the navigation rate, some samples later in its own yaw messages.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet evaluate trial09.csv trial11.csv
-  gyronet evaluate */*.csv --json               # every drive of every folder, and the means
+  gyronet evaluate */*.csv --json               # all drives, and the mean of each folder
   gyronet evaluate drive.csv --weights mine.blob --json
-  gyronet evaluate drive.csv --ablation         # what each part is worth")]
+  gyronet evaluate drive.csv --ablation         # what each part contributes")]
 pub struct Args {
     /// Recorded drives with ref_gyr_z or ref_yaw.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Compare configurations: the error without each part of the compensation, how often errors stay inside one, two
-    /// and three sigma, and what the reference shows at standstill.
+    /// Compare configurations: print the error without each part of the compensation, the share of errors inside one,
+    /// two and three sigma, and the reference's own error at standstill.
     #[arg(long, conflicts_with = "lags")]
     ablation: bool,
-    /// Print the error of the rate for navigation at every lag from 0 to 110 ms (the board's default is 70).
+    /// Print the error of the navigation rate at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
-    /// Calibration of the unit, from `gyronet calibrate`: every method gets the calibrated gyro. The map
-    /// holds what the weights leave of gain and mounting, so a classical method gets that alone.
+    /// Calibration file from `gyronet calibrate`, applied to the gyro of every method. It corrects only the gain and
+    /// mounting errors that remain after the weights' correction, for the classical methods too.
     #[arg(long, value_name = "FILE.json")]
     calibration: Option<PathBuf>,
     #[command(flatten)]
@@ -49,7 +53,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// Reads a drive, calibrated if that is asked for.
+    /// Reads a drive, and applies the calibration if one is given.
     fn recording(&self, file: &Path, common: Common) -> Result<Recording, Box<dyn Error + Send + Sync>> {
         let mut recording = Recording::read(file)?;
         remark_vehicle(&recording, common)?;
@@ -84,7 +88,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(write!(out, "{}", paint::report(&report))?)
 }
 
-/// The scores of one drive.
+/// The scores of one drive, as in the JSON.
 #[derive(serde::Serialize)]
 struct Scored {
     name: String,

@@ -1,4 +1,4 @@
-//! `gyronet import`: logs of other tools, or a sequence of a data set, converted to one drive.
+//! `gyronet import` converts logs of other tools, or a sequence of a data set, to one drive.
 
 use super::{Common, WriteError, print_json, progress, remark};
 use clap::ValueEnum;
@@ -17,19 +17,20 @@ use std::time::Instant;
 
 /// Convert logs of other tools, or a sequence of a data set, to one drive.
 ///
-/// The other subcommands read the CSV. Logs are ROS 1 bags, MCAP (ROS 1 and 2), PX4 ULog, candump, Vector ASC and BLF,
-/// PEAK TRC, Xsens MT text and CSV. The first channel with a gyro, an odometry and a GNSS position is found by its type;
-/// where several fit, name one. What a log cannot say (mounting, wheels, columns, the DBC file) stands in a vehicle file:
-/// `drive.toml` beside the first log `drive.bag`, or `vehicle.toml`, unless --vehicle names another. It is written beside the drive, as drive.toml, where
-/// every command that reads the drive finds it.
+/// The input is one or more logs: ROS 1 bags, MCAP (ROS 1 and 2), PX4 ULog, candump, Vector ASC and BLF, PEAK TRC,
+/// Xsens MT text and CSV. The command prints what it found and the number of unusable records. With --out it writes
+/// the drive, a CSV file at 100 Hz that the other commands read.
 ///
-/// The clocks of several files are laid on each other by the yaw rates that they have in common. Records that cannot be
-/// used are counted and reported.
+/// The channels of the gyro, the odometry and the GNSS position are found by their type; if several fit, name one. A
+/// vehicle file holds what a log does not contain: mounting, wheels, columns, the DBC file. It is `drive.toml` beside
+/// the first log `drive.bag`, or `vehicle.toml`, unless --vehicle names another. A copy is written beside the drive,
+/// with the drive's name and .toml; every command that reads the drive uses it. The clocks of several files are
+/// aligned by the yaw rates that the files have in common.
 ///
-/// A sequence of KAIST Urban or NCLT is named by its layout and its folder. KAIST has
+/// A sequence of KAIST Urban or NCLT is given by its layout and its folder. KAIST has
 /// sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and global_pose.csv; NCLT has ms25.csv,
-/// kvh.csv, wheels.csv and groundtruth_*.csv. Missing files, wrong columns, text for numbers and time that goes backwards
-/// are errors. Rows with NaN, repeated stamps, gaps and encoder resets are counted and reported.
+/// kvh.csv, wheels.csv and groundtruth_*.csv. Missing files, wrong columns, fields that are not numbers, and time
+/// that goes backwards are errors. Rows with NaN, repeated stamps, gaps and encoder resets are counted and reported.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -41,35 +42,36 @@ pub struct Args {
     /// Logs of one drive; or `kaist` or `nclt` and the folder of a sequence.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Write the drive, at 100 Hz, to this file.
+    /// Write the drive to this file, at 100 Hz.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
-    /// Vehicle file [default: that of the first log's name, or vehicle.toml, beside it].
+    /// Vehicle file [default: the first log's name with .toml, or vehicle.toml, beside that log].
     #[arg(long, value_name = "FILE.toml")]
     vehicle: Option<PathBuf>,
-    /// Names and signals of the CAN frames.
+    /// DBC file with the messages and signals of the CAN frames.
     #[arg(long, value_name = "FILE.dbc")]
     dbc: Option<PathBuf>,
     /// Channel of the gyro and the accelerometer.
     #[arg(long, value_name = "CHANNEL")]
     imu: Option<String>,
-    /// Channel whose speed stands in for the wheels; `none` takes none.
+    /// Channel whose speed replaces the wheels; `none` for no odometry.
     #[arg(long, value_name = "CHANNEL")]
     odometry: Option<String>,
-    /// Channel of the GNSS position; `none` takes none.
+    /// Channel of the GNSS position; `none` for no position.
     #[arg(long, value_name = "CHANNEL")]
     position: Option<String>,
-    /// The files have one clock: their stamps are used as they are.
+    /// Use the time stamps as they are: the files have one clock.
     #[arg(long)]
     same_clock: bool,
-    /// Leave out this many seconds at the start.
+    /// Skip this many seconds at the start.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     from: f64,
-    /// Write a drive to train with, of a sequence: without the steps in a gap of any file, and with the fibre-optic gyro
-    /// less the Earth's rate and its bias, as FoGNet receives it. One that starts moving is an error.
+    /// Write a training drive from a sequence: without the steps in a gap of any file, and with the Earth's rate and
+    /// the bias subtracted from the fibre-optic gyro, as FoGNet receives it. A sequence that starts moving is an
+    /// error.
     #[arg(long, requires = "out")]
     training: bool,
-    /// Write a picture of the times between stamps of each file of a sequence (the paper's Fig. 11).
+    /// Plot the time between stamps in each file of a sequence to this file (the paper's Fig. 11).
     #[arg(long, value_name = "FILE.svg")]
     stamps: Option<PathBuf>,
 }
@@ -87,13 +89,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 /// Imports logs.
 fn run_logs(args: &Args, common: Common) -> super::Result {
     if args.stamps.is_some() {
-        return Err("--stamps draws the files of a sequence of KAIST Urban or NCLT".into());
+        return Err("--stamps is for sequences of KAIST Urban or NCLT".into());
     }
     if args.training {
         return Err("--training is for sequences of KAIST Urban or NCLT".into());
     }
     if !(0.0..1e6).contains(&args.from) {
-        return Err("--from should be seconds from the first sample on".into());
+        return Err("--from must be a number of seconds after the first sample, 0 or more".into());
     }
     let vehicle = vehicle(args)?;
     let request = Request {
@@ -110,7 +112,7 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
         drive.write_csv(BufWriter::new(File::create(path).map_err(&error)?)).map_err(&error)?;
         let beside = write_vehicle(vehicle, path)?;
         report.push(format!("{}: {rows} rows; {} beside it", path.display(), beside.display()));
-        // Read as all others will read it, so that its faults are known now.
+        // Check the drive as other commands read it, to report its faults now.
         if let Err(error) = Recording::check(path) {
             report.push(format!("other commands will refuse it: {error}"));
         }
@@ -129,7 +131,7 @@ fn run_logs(args: &Args, common: Common) -> super::Result {
     Ok(())
 }
 
-/// Writes the vehicle file of a drive whose rows are in the vehicle's axes, and returns its place.
+/// Writes the vehicle file of a drive whose rows are in the vehicle's axes, and returns the file's path.
 fn write_vehicle(mut vehicle: Vehicle, drive: &Path) -> Result<PathBuf, Box<dyn std::error::Error>> {
     vehicle.mounting.applied = true;
     let beside = Vehicle::beside(drive);
@@ -137,7 +139,7 @@ fn write_vehicle(mut vehicle: Vehicle, drive: &Path) -> Result<PathBuf, Box<dyn 
     Ok(beside)
 }
 
-/// The vehicle file, and what the arguments put in its place.
+/// Returns the vehicle file's content, in which arguments replace what the file gives.
 fn vehicle(args: &Args) -> Result<Vehicle, Box<dyn std::error::Error>> {
     let first = args.files.first();
     let own = first.map(|file| Vehicle::beside(file)).filter(|path| args.vehicle.is_none() && path.is_file());
@@ -146,7 +148,8 @@ fn vehicle(args: &Args) -> Result<Vehicle, Box<dyn std::error::Error>> {
         Some(path) => Vehicle::read(path)?,
         None => Vehicle::default(),
     };
-    // Whether the rows are turned is known of a drive by its own file alone, whose names are those of the logs before it.
+    // Only a drive's own file says that its rows are rotated already. Its channel names are those of the original
+    // logs.
     vehicle.mounting.applied &= own.is_some();
     if vehicle.mounting.applied {
         vehicle = vehicle.without_names();
@@ -160,7 +163,7 @@ fn vehicle(args: &Args) -> Result<Vehicle, Box<dyn std::error::Error>> {
         );
     }
     let dbc = args.dbc.as_ref().or(vehicle.bus.dbc.as_ref());
-    // The copy beside the drive may lie elsewhere than the DBC file.
+    // The copy beside the drive may be in another folder than the DBC file.
     vehicle.bus.dbc = dbc.map(std::path::absolute).transpose()?;
     for (name, argument) in [
         (&mut vehicle.signals.imu, &args.imu),
@@ -208,7 +211,7 @@ fn run_sequence(args: &Args, layout: Layout, folder: &Path, common: Common) -> s
     Ok(remark(common, format_args!("{:.2} s", started.elapsed().as_secs_f64()))?)
 }
 
-/// The files that are asked for.
+/// Writes the requested files.
 fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
     if let Some(path) = &args.out {
         sequence.needs_gyro()?;
@@ -235,7 +238,7 @@ fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
     Ok(())
 }
 
-/// Reads a sequence under a progress bar.
+/// Reads a sequence and shows a progress bar.
 pub(super) fn read(folder: &Path, common: Common) -> Result<Sequence, DataError> {
     let bar = progress::bar(common, sequence::size(folder) as usize, &folder.display().to_string());
     let sequence = Sequence::read(folder, |bytes| bar.set_position(bytes));

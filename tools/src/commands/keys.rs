@@ -1,19 +1,20 @@
-//! `gyronet keys`: a key pair for those who may write to boards.
+//! `gyronet keys` creates a key pair for writing to boards.
 
 use super::Common;
 use gyronet_tools::signing::{PrivateKey, hex};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Make a key pair for signing files.
+/// Create a key pair for writing to boards and for signing files.
 ///
-/// NAME.key stays with whoever signs, NAME.pub goes onto boards (`device set-key`).
+/// The command writes two files. Keep the private key NAME.key secret, and store the public key NAME.pub on boards
+/// (`device set-key`). Such a board then accepts writes only with the private key, or a signature made with it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet keys fleet                # fleet.key and fleet.pub")]
 pub struct Args {
-    /// Begin of both files' names; neither may be there.
+    /// Name of both files without the ending; neither may exist.
     #[arg(value_name = "NAME")]
     name: PathBuf,
 }
@@ -29,7 +30,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     writeln!(
         out,
-        "{}: keep it secret; who has it can write to every board with this key",
+        "{}: keep this file secret; anyone who has it can write to every board with this key",
         private.display()
     )?;
     Ok(writeln!(out, "{}: gyronet device --port PORT set-key {}", public.display(), public.display())?)

@@ -1,4 +1,4 @@
-//! `gyronet monitor`: the CAN messages as a receiver sees them.
+//! `gyronet monitor` shows the CAN messages as a receiver sees them.
 
 use super::{Common, WriteError};
 use console::Term;
@@ -12,20 +12,23 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time between two views on a terminal, and between two lines elsewhere.
+/// Time between two redraws on a terminal, and between two lines elsewhere.
 const REDRAW: Duration = Duration::from_millis(100);
 const LINE: Duration = Duration::from_secs(1);
-/// --once gives up after so long.
+/// Timeout of --once.
 const ONCE: Duration = Duration::from_secs(10);
 
 /// Show the CAN messages of a board as a receiver sees them.
 ///
-/// The command checks the messages as an ECU would. It shows yaw rate, yaw, source, quality, faults, and the numbers
-/// of lost, repeated and damaged messages. On a terminal it draws a live view; elsewhere, and with --json, it prints
-/// a line each second. A log is read to its end and then summarised. Ctrl-C ends with the summary and exit status 0.
-/// The messages of a fibre-optic gyro make a second block, and `fog` in JSON; the table of --csv leaves them out.
-/// Identifiers and protection are those of the default configuration. Times are the input's own where it has some,
-/// otherwise they count from the start.
+/// The input is an SLCAN line or a candump log. The command checks the messages as an ECU would. It shows yaw rate,
+/// yaw, source, quality, faults, and the numbers of lost, repeated and damaged messages. On a terminal it draws a
+/// live view; elsewhere, and with --json, it prints one line each second. A log is read to its end and then
+/// summarised. Ctrl-C ends with the summary and exit status 0. The exit status is 1 if a log has no CAN frame, or if
+/// --once finds no messages.
+///
+/// The messages of a fibre-optic gyro are a second block, and `fog` in JSON; the table of --csv leaves them out.
+/// Identifiers and E2E protection are those of the default configuration. Times are the input's own time stamps if it
+/// has any; otherwise they count from the start.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -37,13 +40,13 @@ pub struct Args {
     /// candump log.
     #[arg(value_name = "PORT|HOST:PORT|FILE")]
     source: String,
-    /// Rate of a serial port, bit/s.
+    /// Baud rate of a serial port.
     #[arg(long, value_name = "BIT/S", default_value_t = 921_600)]
     baud: u32,
-    /// Write each set of messages as a line of a table to this file.
+    /// Write each set of messages to this CSV file, one line per set.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Show the first whole set of messages and end; fail if none comes within 10 s.
+    /// Show the first complete set of messages and end; fail if none arrives within 10 s.
     #[arg(long)]
     once: bool,
     /// End after this many seconds.
@@ -59,9 +62,9 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// The error of a source without messages.
 #[derive(Debug, thiserror::Error)]
 enum MonitorError {
-    #[error("{0}: no whole set of messages (rate, angle, detail)")]
+    #[error("{0}: no complete set of messages (rate, angle, detail)")]
     Nothing(String),
-    #[error("{0}: no CAN frame in it; a candump log has lines as (1.000000) can0 174#0080004B008000D1")]
+    #[error("{0}: no CAN frame in it; a candump log has lines such as (1.000000) can0 174#0080004B008000D1")]
     NoLog(String),
 }
 
@@ -104,13 +107,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         return Err(MonitorError::Nothing(args.source.clone()).into());
     }
     table.map_or(Ok(()), Table::finish)?;
-    // A log is read in a moment: its own time says how long it is.
+    // A log is read faster than it was recorded, so use its own time stamps.
     let time = monitor.stamp().unwrap_or_else(|| start.elapsed().as_secs_f64());
     view.finish(&monitor, time)?;
     Ok(())
 }
 
-/// The file of --csv.
+/// The CSV file of --csv.
 struct Table {
     path: PathBuf,
     out: BufWriter<File>,
@@ -133,7 +136,7 @@ impl Table {
     }
 }
 
-/// The display while frames come and at the end.
+/// The display while frames arrive, and the summary at the end.
 struct View {
     term: Option<Term>,
     silent: bool,
@@ -143,7 +146,7 @@ struct View {
 }
 
 impl View {
-    /// A log is over before anybody could watch it: it has its summary only.
+    /// Creates the display. A silent one prints only the summary: a log is read too fast to watch.
     fn new(silent: bool, json: bool) -> Self {
         let term = Term::stdout();
         let live = term.is_term() && !json;
@@ -158,8 +161,8 @@ impl View {
         self.last = Instant::now();
         match &self.term {
             Some(term) => {
-                // One write, so that nothing flickers. A narrow window would wrap lines and
-                // spoil the count of them.
+                // One write avoids flicker. Lines are cut to the terminal's width, because wrapped lines would make
+                // the line count wrong.
                 let width = usize::from(term.size().1);
                 let picture = monitor.to_string();
                 let lines: Vec<String> = picture.lines().map(|l| l.chars().take(width).collect()).collect();

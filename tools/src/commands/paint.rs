@@ -1,10 +1,10 @@
-//! Bold text and colours for tables on a terminal; plain text elsewhere and with NO_COLOR.
+//! Formats tables with bold text and colours on a terminal, and as plain text elsewhere and with NO_COLOR.
 
 use console::style;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::report::{COLUMNS, Report};
 
-/// A report with its headings and what the board sends standing out.
+/// Returns a report with its headings and the navigation rate highlighted.
 pub fn report(report: &Report) -> String {
     let mut text = String::new();
     for line in report.to_string().lines() {

@@ -1,4 +1,4 @@
-//! `gyronet paper`: the paper's whole evaluation, from the data sets' files to its tables.
+//! `gyronet paper` repeats the paper's complete evaluation, from the data sets' files to its tables.
 
 use super::{Common, WriteError, print_json, remark};
 use gyronet_tools::paper::rerun::plan::{Effort, Program, plan};
@@ -14,43 +14,44 @@ use std::process::{Command, Stdio};
 
 /// Repeat the paper's evaluation: train, test and compare on its data sets.
 ///
-/// The command finds the paper's sequences by name (KAIST_ROOT/urban06 to urban37, NCLT_ROOT/2012-01-08 to 2013-04-05),
-/// splits them as the paper does, trains GyroNet and FoGNet, quantises them, trains and runs the rivals lwoi and RINS-W, and
-/// makes all tables and figures. It says which sequences are missing, and which were left out and why.
+/// The command finds the paper's sequences by name (KAIST_ROOT/urban06 to urban37, NCLT_ROOT/2012-01-08 to
+/// 2013-04-05) and splits them as the paper does. It trains and quantises GyroNet and FoGNet, trains and runs the
+/// rivals lwoi and RINS-W, and computes all tables and figures. DIR/report.md has the results; it lists the sequences
+/// that are missing and those that were left out, with the reason. The exit status is 1 if a step failed.
 ///
-/// Run it again to go on where it stopped: each step leaves a marker with what it was made from, and is repeated only if
-/// that has changed. Commands, logs and times lie below DIR.
+/// Run the command again to continue where it stopped: each finished step leaves a marker that records its inputs,
+/// and is repeated only if they have changed. Commands, logs and times are below DIR.
 ///
-/// Training wants a Python with tools/train/requirements.txt.
+/// Training needs a Python with the packages of tools/train/requirements.txt.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet paper KAIST NCLT --out REPORT --python .venv/bin/python
-  gyronet paper KAIST --out TRIAL --quick      # every step, nothing trained well")]
+  gyronet paper KAIST --out TRIAL --quick      # tries every step, trains nothing well")]
 pub struct Args {
-    /// Folder of the sequences of KAIST Urban.
+    /// Folder with the sequences of KAIST Urban.
     #[arg(value_name = "KAIST_ROOT")]
     kaist: PathBuf,
-    /// Folder of the sequences of NCLT.
+    /// Folder with the sequences of NCLT.
     #[arg(value_name = "NCLT_ROOT")]
     nclt: Option<PathBuf>,
     /// Write everything to this folder; report.md is the report.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Python that trains [default: GYRONET_PYTHON, or python3].
+    /// Python for training [default: GYRONET_PYTHON, or python3].
     #[arg(long, value_name = "FILE")]
     python: Option<String>,
-    /// Train for a moment only, to try every step; the report says so.
+    /// Train only briefly, to try every step; the report says so.
     #[arg(long)]
     quick: bool,
-    /// Train lwoi on one of so many windows [default: 2]: its memory grows with their square.
+    /// Train lwoi on every Nth window [default: 2]; its memory grows with the square of the number of windows.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     lwoi_every: Option<u32>,
 }
 
 /// The folder of the Python code.
 const TRAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/train");
-/// The packages that it wants.
+/// The Python packages that training needs.
 const PACKAGES: &str = "torch, numpy, safetensors, scipy, gpytorch, tqdm";
 
 /// Runs the subcommand.
@@ -73,7 +74,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         let steps = plan(&split, effort, &out, sequence::files);
         let steps = run::run(&steps, &out, &mut runner, |number, name| {
-            // The line is for people who wait; nothing is lost where nobody can read it.
+            // The line only shows progress, so an error of standard error is ignored.
             let _ = remark(common, format_args!("step {} of {}: {name}", number + 1, steps.len()));
         });
         report.sets.push(Set { split, steps: steps.map_err(WriteError::to(&out))? });
@@ -90,7 +91,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if report.is_whole() { Ok(()) } else { Err(format!("some steps failed: see {}", path.display()).into()) }
 }
 
-/// Runs the steps as processes.
+/// A [`Runner`] that runs the steps as processes.
 struct Processes {
     gyronet: String,
     python: String,
@@ -134,7 +135,7 @@ impl Runner for Processes {
 
     fn files(&self, program: Program) -> Vec<PathBuf> {
         match program {
-            // A new build of this command would repeat days of training.
+            // Otherwise a new build of this command would repeat days of training.
             Program::Gyronet => Vec::new(),
             Program::Python => self.code.clone(),
         }
@@ -146,7 +147,8 @@ impl Runner for Processes {
 }
 
 impl Processes {
-    /// Runs a process; what it prints goes into the log, and what it remarks also to our standard error.
+    /// Runs a process. Its output is written to the log, and Python's output and all remarks also to our standard
+    /// error.
     fn process(&self, program: Program, command: &[String], log: &Path) -> super::Result {
         let error = WriteError::to(log);
         let mut file = File::create(log).map_err(&error)?;
@@ -168,7 +170,7 @@ impl Processes {
         let mut last = String::new();
         for line in BufReader::new(reader).lines() {
             let line = line?;
-            // What a step of ours remarks is no part of its result.
+            // The remarks of a gyronet step are not part of its result.
             if program == Program::Python {
                 writeln!(file, "{line}").map_err(&error)?;
             }

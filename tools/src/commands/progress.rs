@@ -1,4 +1,4 @@
-//! A progress bar on stderr, where that is a terminal.
+//! Shows progress bars on stderr if that is a terminal.
 
 use super::Common;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -8,12 +8,12 @@ fn target(common: Common) -> ProgressDrawTarget {
     if common.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() }
 }
 
-/// Bars below each other, for [`bar`]s of several threads.
+/// Returns a group of bars, one below the other, for the [`bar`]s of several threads.
 pub fn bars(common: Common) -> MultiProgress {
     MultiProgress::with_draw_target(target(common))
 }
 
-/// A bar of so many samples; invisible with `--quiet` and where nobody watches.
+/// Returns a bar with a length in samples; it is invisible with `--quiet` and without a terminal.
 pub fn bar(common: Common, samples: usize, doing: &str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} [{bar:40}] {percent}% {eta}");
     let bar = ProgressBar::with_draw_target(Some(samples as u64), target(common))
@@ -22,7 +22,7 @@ pub fn bar(common: Common, samples: usize, doing: &str) -> ProgressBar {
     bar
 }
 
-/// A moving sign that something of unknown length goes on; invisible as the bar is.
+/// Returns a spinner for work of unknown length; it is invisible with `--quiet` and without a terminal.
 pub fn waiting(common: Common, doing: &str) -> ProgressBar {
     let bar = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
     bar.set_message(doing.to_owned());

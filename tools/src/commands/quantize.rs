@@ -1,4 +1,4 @@
-//! `gyronet quantize`: an f32 checkpoint becomes a weight file for the integer kernels.
+//! `gyronet quantize` converts an f32 checkpoint to a weight file for the integer kernels.
 
 use super::{Common, WriteError, print_json, read_drive};
 use gyronet::fog::FogConfig;
@@ -18,13 +18,14 @@ use std::fmt;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Turn an f32 checkpoint into a weight file for the board.
+/// Convert an f32 checkpoint to an int8 weight file for the board.
 ///
-/// The checkpoint (safetensors, from tools/train) determines the network. The weight file has int8 rows, packed in
-/// the order in which the kernels read them, with its provenance and a CRC-32.
+/// The input is a checkpoint of GyroNet or FoGNet (safetensors, from tools/train). The weight file has int8 rows,
+/// packed in the order in which the kernels read them, with its provenance and a CRC-32.
 ///
-/// The command prints the error that quantisation adds: the RMS of integer less f32 output over the RMS of the f32
-/// output, on the given drives, or for GyroNet on the simulated drive that comes with the tools.
+/// The command also prints the error that quantisation adds: the RMS of the difference between integer and f32
+/// output, divided by the RMS of the f32 output. It is measured on the given drives; for GyroNet the default is the
+/// simulated drive that comes with the tools.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +37,7 @@ pub struct Args {
     /// Weight file to write.
     #[arg(long, short, value_name = "BLOB")]
     out: PathBuf,
-    /// Recordings on which the error is measured; for FoGNet folders in the layout of KAIST or NCLT.
+    /// Drives on which the error is measured; for FoGNet, folders in the layout of KAIST or NCLT.
     #[arg(long, num_args = 1.., value_name = "PATH")]
     drives: Vec<PathBuf>,
 }
@@ -47,7 +48,7 @@ struct Added {
     drive: String,
     windows: u64,
     relative_rms: f64,
-    /// GyroNet alone has one.
+    /// Relative error of the scale output; only GyroNet has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     scale_rms: Option<f64>,
     clamped_inputs: u64,
@@ -86,7 +87,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(writeln!(out, "{}: {bytes} bytes", args.out.display())?)
 }
 
-/// A weight file, how it was made, and what that adds.
+/// The bytes of a weight file, the quantisation's report, and the error that it adds on each drive.
 type Made = Result<(Vec<u8>, Report, Vec<Added>), Box<dyn std::error::Error>>;
 
 fn gyronet(args: &Args, common: Common) -> Made {

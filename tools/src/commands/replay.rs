@@ -1,4 +1,4 @@
-//! `gyronet replay`: the CAN log of a recording that runs through the integer pipeline.
+//! `gyronet replay` runs a recording through the integer pipeline and writes its CAN log.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress, read_drive};
@@ -15,15 +15,16 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Write the CAN log of a recorded drive.
+/// Write the CAN messages that a board would send on a recorded drive.
 ///
-/// The drive runs through the pipeline that is flashed. The log has the format of `candump -L` and the recording's
-/// own time stamps; can-utils' canplayer and python-can can play it. It goes to standard output unless --out names a
-/// file, or --mcap, --csv or --tum is given. The summary goes to standard error, or with --json to standard output if the log does not.
+/// The command runs the drive through the pipeline that is flashed. The log has the format of `candump -L` and the
+/// recording's time stamps; can-utils' canplayer and python-can can play it. It is written to standard output, unless
+/// --out names a file or --mcap, --csv or --tum is given. The summary is written to standard error; with --json it is
+/// written to standard output if the log is not.
 ///
-/// With --via the samples go through the bytes of a part first: they are encoded as the part would send them and
-/// read back by the parser that the board runs. The summary then has the difference of the corrected yaw from that
-/// of the direct replay, next to the bound that follows from the part's rounding. The exit status is 1 beyond it.
+/// With --via the samples are first encoded as the part would send them, and parsed by the board's parser. The
+/// summary then has the difference in corrected yaw from the direct replay, and the bound that follows from the
+/// part's rounding. The exit status is 1 if the difference exceeds the bound.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -39,19 +40,19 @@ pub struct Args {
     /// Write the log to this file [default: standard output].
     #[arg(long, value_name = "FILE.log")]
     out: Option<PathBuf>,
-    /// Write inputs, rates, heading, states and frames for Foxglove to this file, and a layout beside it.
+    /// Write inputs, rates, heading, states and frames to this file for Foxglove, and a layout beside it.
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "via")]
     mcap: Option<PathBuf>,
-    /// Write the rates, the yaw and its expected error to this table, a line a sample.
+    /// Write the rates, the yaw and its expected error to this table, one line per sample.
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Write the path by the wheels and the yaw sent for navigation to this file, in TUM's format, which evo reads.
+    /// Write the path computed from the wheels and the navigation yaw to this file, in the TUM format that evo reads.
     #[arg(long, value_name = "FILE.tum")]
     tum: Option<PathBuf>,
-    /// Weight file [default: the one that comes with the library].
+    /// Weight file [default: the library's default model].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
-    /// Send the samples through the bytes of this part.
+    /// Encode the samples as the bytes of this part, and parse them again.
     #[arg(long, value_name = "PART")]
     via: Option<Part>,
 }
@@ -121,7 +122,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
 }
 
-/// The drive, through a part's bytes where one is named, and what they did to it.
+/// Replays the drive, through a part's bytes if one is named, and compares that with the direct replay.
 fn replay(
     recording: &Recording,
     part: Option<Part>,
@@ -138,7 +139,7 @@ fn replay(
     Ok((drive, Some(Detour { part, via, difference, bound })))
 }
 
-/// A recording's way through a part, and what came of it.
+/// A replay through a part's bytes, its difference from the direct replay, and the bound of that difference.
 struct Detour {
     part: Part,
     via: Via,

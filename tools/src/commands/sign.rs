@@ -1,4 +1,4 @@
-//! `gyronet sign`: a signature for what a board with a key is to accept.
+//! `gyronet sign` signs a file for a board that stores a public key.
 
 use super::Common;
 use clap::ValueEnum;
@@ -10,29 +10,30 @@ use gyronet_tools::wheels::WheelFile;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Sign a file for boards that have the key.
+/// Sign a file for boards that store your public key.
 ///
-/// Such a board accepts the file from anyone, once (`device ... --signature`).
+/// The command writes a signature. A board with the public key then accepts the file once, from anyone
+/// (`device ... --signature`).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet sign new.blob --target weights --key fleet.key --counter 7 --out new.sig")]
 pub struct Args {
-    /// Weight file, whole configuration (`device get --json`), wheel frames (.toml), unit file, or public key.
+    /// Weight file, complete configuration (`device get --json`), wheel frames (.toml), unit file, or public key.
     file: PathBuf,
-    /// Names the kind of the file.
+    /// Kind of the file.
     #[arg(long, value_enum)]
     target: Target,
-    /// Private key (`gyronet keys`).
+    /// Private key, from `gyronet keys`.
     #[arg(long, value_name = "NAME.key")]
     key: PathBuf,
-    /// Number of this signature: greater than that of every one that the board has accepted (`device access`).
+    /// Counter of this signature; it must be greater than all that the board has accepted (`device access`).
     #[arg(long)]
     counter: u32,
-    /// Serial number of the one board that may accept it (`device access`); any with the key, where none is given.
+    /// Serial number of the only board that may accept the file (`device access`) [default: any with the key].
     #[arg(long, value_name = "HEX")]
     serial: Option<String>,
-    /// The signature.
+    /// Write the signature to this file.
     #[arg(long, value_name = "FILE.sig")]
     out: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! `gyronet simulate`: simulated drives and sequences.
+//! `gyronet simulate` writes simulated drives and sequences.
 
 use super::{Common, WriteError, print_json, progress, remark};
 use gyronet_tools::simulate::layout::{self, Layout, Set, Spec};
@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 
 /// Write a simulated drive whose sensor errors are known.
 ///
-/// A car stands, pulls away, follows bends, turns and stops; a MEMS part with known errors measures it.
+/// A car stands, pulls away, follows bends, turns and stops; a MEMS sensor with known errors measures its motion.
 ///
-/// Without --layout the command writes one CSV with the columns that the other subcommands read, with the true rates
-/// in ref_gyr_*. With --layout it writes whole sequences of a drive through a town, in the folders and formats of
-/// KAIST Complex Urban or NCLT, with a fibre-optic gyro and wheels; a file simulated.json marks them as simulated.
-/// The same seed gives the same files on every machine.
+/// Without --layout the command writes one CSV file with the columns that the other commands read, and the true rates
+/// in ref_gyr_*. With --layout it writes sequences of a drive through a town, in the folders and formats of KAIST
+/// Complex Urban or NCLT, with a fibre-optic gyro and wheels; a file simulated.json marks them as simulated. The same
+/// seed gives the same files on every machine.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet simulate --seconds 600 --seed 7 --out drive.csv
-  gyronet simulate --layout kaist --set test --out sequences      # four of 20 min")]
+  gyronet simulate --layout kaist --set test --out sequences      # four sequences of 20 min")]
 pub struct Args {
     /// Write the drive to this file, or with --layout to this folder.
     #[arg(long, value_name = "PATH")]
@@ -34,14 +34,14 @@ pub struct Args {
     /// Write a sequence in the layout of this data set.
     #[arg(long)]
     layout: Option<Layout>,
-    /// Write all sequences of this set, each into a folder of its own; train and test share their devices, transfer
-    /// has others.
+    /// Write all sequences of this set, each into its own folder. train and test share their devices; transfer has
+    /// others.
     #[arg(long, requires = "layout", conflicts_with_all = ["seed", "minutes", "device"])]
     set: Option<Set>,
     /// Length of a sequence, min (1 to 600).
     #[arg(long, default_value_t = 20, requires = "layout", value_parser = clap::value_parser!(u32).range(1..=600))]
     minutes: u32,
-    /// Seed of the parts: scale, misalignment, lasting bias.
+    /// Seed of the sensors: gain, misalignment, and constant bias of the fibre-optic gyro.
     #[arg(long, default_value_t = 1, requires = "layout")]
     device: u64,
 }

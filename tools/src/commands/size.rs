@@ -1,4 +1,4 @@
-//! `gyronet size`: the sizes of the firmware image against their budgets.
+//! `gyronet size` compares the sizes of the firmware image with their budgets.
 
 use super::Common;
 use gyronet_tools::target::bench;
@@ -7,14 +7,15 @@ use gyronet_tools::target::stack::{Handler, ImageStack, Way};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Measure flash, static RAM and the worst stack of the firmware image, bytes.
+/// Measure flash, static RAM and worst-case stack of the firmware image.
 ///
-/// Static RAM is SRAM: statics, and the code that runs from there, which counts as flash too. The stack is an upper
-/// bound from the machine code, with handlers of all priorities one inside the other. The exit status is 1 when a
-/// budget is exceeded.
+/// The command builds the image, or reads --elf, and prints each size and its budget in bytes. Static RAM is the SRAM
+/// of statics and of code that runs from RAM; that code counts as flash too. The stack is an upper bound from the
+/// machine code, with nested handlers of all priorities. The deepest call chains follow, with the stack of each
+/// function. The exit status is 1 if a budget is exceeded.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Measure this ELF file [default: the image is built].
+    /// Measure this ELF file [default: build the image].
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
 }
@@ -38,7 +39,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     };
     let over = rows.iter().filter(|((_, bytes), budget)| bytes > budget);
     let over: Vec<_> = over.map(|((name, _), _)| *name).collect();
-    // Whether somebody reads it or not.
+    // A failed check is reported even if the output could not be written.
     if over.is_empty() { Ok(written?) } else { Err(format!("over budget: {}", over.join(", ")).into()) }
 }
 
@@ -71,7 +72,7 @@ fn print_sizes(out: &mut impl Write, rows: &[Row], stack: &ImageStack) -> io::Re
         let name = priority.map_or(String::from("fault"), |priority| format!("priority {priority}"));
         print(out, &name, *bytes, deepest)?;
     }
-    writeln!(out, "calls through a register: {}", stack.indirect_calls)
+    writeln!(out, "indirect calls: {}", stack.indirect_calls)
 }
 
 fn print(out: &mut impl Write, name: &str, bytes: u32, deepest: &Way) -> io::Result<()> {

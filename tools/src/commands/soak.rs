@@ -1,4 +1,4 @@
-//! `gyronet soak`: hours of a drive in which every clock and counter wraps.
+//! `gyronet soak` runs hours of a simulated drive in which every clock and counter wraps.
 
 use super::weights::Weights;
 use super::{Common, print_json, progress};
@@ -7,14 +7,15 @@ use gyronet::sample::RATE_HZ;
 use gyronet_tools::campaign::soak;
 use std::io::Write;
 
-/// Run hours of a simulated drive, in which every clock and counter wraps.
+/// Run hours of a simulated drive in which every clock and counter wraps.
 ///
-/// The drive goes from a part's bytes to a receiver of the CAN frames. The command prints all counters. The exit
-/// status is 1 where a sample or frame is lost, a clock or the yaw drifts, or memory grows.
+/// The command encodes the drive as sensor bytes, runs them through the board's code, and checks the CAN frames with
+/// a receiver. It prints all counters. The exit status is 1 if a sample or frame is lost, a clock or the yaw drifts,
+/// or memory grows.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet soak                  # 24 hours, in minutes
+  gyronet soak                  # 24 simulated hours; runs for minutes
   gyronet soak --hours 2 --json")]
 pub struct Args {
     /// Length of the drive, hours (1 to 200).
@@ -37,6 +38,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     } else {
         writeln!(out, "{soak}").map_err(Into::into)
     };
-    // Whether somebody reads it or not.
+    // A failed check is reported even if the output could not be written.
     if faults.is_empty() { written } else { Err(faults.join("; ").into()) }
 }

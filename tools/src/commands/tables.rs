@@ -1,4 +1,4 @@
-//! `gyronet tables`: the paper's evaluation on given sequences.
+//! `gyronet tables` computes the paper's tables and figures on given sequences.
 
 use super::weights::Weights;
 use super::{Common, WriteError, import, print_json, progress, remark};
@@ -19,17 +19,17 @@ use std::path::PathBuf;
 
 /// Compute the paper's tables and figures on sequences of KAIST Urban or NCLT.
 ///
-/// The command prints tables I to VII, as far as the sequences have figures for them, beside the
-/// paper's own figures, and draws Figs. 6, 7, 9, 10 and 11.
+/// The input is sequences: folders in the layout of KAIST Complex Urban or NCLT, recorded or written by `gyronet
+/// simulate --layout`. The command prints Tables I to VII beside the paper's own results, except tables that these
+/// sequences have no results for. With --out it also draws Figs. 6, 7, 9, 10 and 11. Results of simulated sequences
+/// are marked. If the vehicle does not stand still for the first 3 s, methods that need static initialisation are
+/// left out, and the reason is printed.
 ///
-/// Sequences are folders in the layout of KAIST Complex Urban or NCLT, real ones or those of `gyronet simulate
-/// --layout`; figures of simulated ones are marked. Where the vehicle does not stand still for the first 3 s, methods
-/// that need static initialisation are left out, and the reason is printed.
-///
-/// --method puts another program's method beside ours: a folder of trajectories in the format of TUM's RGB-D benchmark
-/// (rows of time x y z qx qy qz qw, as evo has them), one for each sequence, named SEQUENCE.txt. A trajectory starts from
-/// the true pose, in the truth's frame and on the clock of the sequence's files, and reaches to within 1 s of the end. One
-/// that is missing or cannot be compared is left out; the tables say how many were, and why.
+/// --method adds another program's method: a folder of trajectories in the format of TUM's RGB-D benchmark (rows of
+/// time x y z qx qy qz qw, as evo writes them), one for each sequence, named SEQUENCE.txt. A trajectory starts from
+/// the true pose, in the truth's frame and on the clock of the sequence's files, and ends within 1 s of the
+/// sequence's end. A trajectory that is missing or cannot be compared is left out; the tables say how many were left
+/// out, and why.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -37,23 +37,23 @@ Examples:
   gyronet tables urban14 urban15 --json
   gyronet tables sequences --method lwoi=OUT/model --method mine=trajectories")]
 pub struct Args {
-    /// Sequences, or folders that hold sequences.
+    /// Folders of sequences, or folders that contain such folders.
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
     /// Write report.html (one page with all tables and pictures) and each picture as SVG to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Fit the fibre-optic gyro and the wheels to these sequences, or to those of these folders, and show them as a method;
-    /// for more folders give it again.
+    /// Fit the fibre-optic gyro and the wheels to this sequence, or to the sequences in this folder, and show the fit
+    /// as a method. May be repeated.
     #[arg(long, value_name = "DIR")]
     train: Vec<PathBuf>,
-    /// Put the trajectories of a folder into the tables under this name; for more methods give it again.
+    /// Add the trajectories of a folder to the tables under this name. May be repeated.
     #[arg(long = "method", value_name = "NAME=FOLDER")]
     methods: Vec<Given>,
-    /// Weight file of GyroNet [default: the one that comes with the library].
+    /// Weight file of GyroNet [default: the library's].
     #[arg(long, value_name = "BLOB")]
     weights: Option<PathBuf>,
-    /// Weight file of FoGNet [default: the one that comes with the library].
+    /// Weight file of FoGNet [default: the library's].
     #[arg(long, value_name = "BLOB")]
     fog_weights: Option<PathBuf>,
     /// Weight file of a FoGNet that was trained on GyroNet's rate, for pseudo_fog [default: that of --fog-weights].
@@ -61,7 +61,7 @@ pub struct Args {
     pseudo_fog_weights: Option<PathBuf>,
 }
 
-/// Name of a sequence's pictures: folders of different data sets may have the same name.
+/// Returns a unique name for a sequence's pictures: folders of different data sets may have the same name.
 fn title(sequence: &Sequence, number: usize) -> String {
     let layout = match sequence.layout {
         Layout::Kaist => "kaist",
@@ -86,7 +86,7 @@ fn fit(folders: &[PathBuf], common: Common) -> Result<Vec<(Layout, Joint)>, Box<
     }
     let solved =
         fits.into_iter().map(|(layout, fit)| Some((layout, fit.solve()?))).collect::<Option<Vec<_>>>();
-    solved.ok_or_else(|| "--train: these sequences turn or move too little to fit anything".into())
+    solved.ok_or_else(|| "--train: these sequences turn or move too little for a fit".into())
 }
 
 /// Runs the subcommand.
@@ -95,7 +95,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         if args.methods[..k].iter().any(|other| other.method == given.method) {
             return Err(format!("--method {}: this name is given twice", given.method.name).into());
         }
-        // A folder without a sequence's trajectory is no error, a folder that is not there is.
+        // A trajectory that is missing from the folder is not an error; a missing folder is.
         fs::read_dir(&given.folder).map_err(|source| DataError::open(given.folder.display(), source))?;
     }
     let weights = Weights::of_the_paper(args.weights.as_deref())?;

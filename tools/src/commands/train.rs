@@ -1,4 +1,4 @@
-//! `gyronet train`: weights of a folder of drives, and what they gain.
+//! `gyronet train` trains weights on a folder of drives, and measures what they gain.
 
 use super::weights::Files;
 use super::{Common, WriteError, drives, print_json, remark};
@@ -20,13 +20,16 @@ use std::process::{Command, Stdio};
 
 /// Train weights on a folder of drives, and show what they gain.
 ///
-/// The drives of FOLDER (CSV, any name, with ref_gyr_z) train GyroNet in PyTorch, which is installed into .venv of the
-/// workspace the first time. Of the drives in the order of their names the last quarter is held out, and the one before
-/// it chooses the epoch; --hold-out and --validate choose others. Then come the weight file, the error on the drives held
-/// out over that of static initialisation and of the best classical method, with the spread between drives, and a page.
-/// A drive that cannot be used is left out with the reason, and a folder that cannot carry a training is refused.
+/// The input is a folder of drives (CSV files of any name, with ref_gyr_z). They train GyroNet in PyTorch, which is
+/// installed into .venv of the workspace the first time. Drives are sorted by name: the last quarter is held out, and
+/// the drive before it chooses the epoch. --hold-out and --validate select others. A drive that cannot be used is
+/// left out, and the reason is printed; a folder with too little data is an error.
 ///
-/// A training that was stopped or killed goes on when the same command is given again.
+/// The output is a weight file, a checkpoint and an HTML page. The command also prints the error on the held-out
+/// drives, relative to that of static initialisation and of the best classical method, with the spread between
+/// drives.
+///
+/// To continue a training that was stopped or killed, run the same command again.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -38,31 +41,32 @@ pub struct Args {
     /// Folder of drives.
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
-    /// Folder for gyronet.blob, gyronet.safetensors, train.html and the state to go on from [default: target/train].
+    /// Folder for gyronet.blob, gyronet.safetensors, train.html and the training state [default: target/train].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Drives that are judged at the end and choose nothing, by name or an unmistakable part of it.
+    /// Drives that are held out for the final evaluation, by name or a unique part of it.
     #[arg(long, num_args = 1.., value_name = "NAME")]
     hold_out: Vec<String>,
-    /// Drive that chooses epoch and seed.
+    /// Drive that chooses the best epoch and seed.
     #[arg(long, value_name = "NAME")]
     validate: Option<String>,
-    /// Passes over the training drives, at most.
+    /// Largest number of passes over the training drives.
     #[arg(long, default_value_t = 20, value_name = "N")]
     epochs: u32,
-    /// Stop after so many epochs without a better one.
+    /// Stop after this many epochs without improvement.
     #[arg(long, default_value_t = 6, value_name = "N")]
     patience: u32,
-    /// Seeds; the best on the drive that chooses is kept.
+    /// Seeds to train with; the best on the validation drive is kept.
     #[arg(long, num_args = 1.., default_values_t = [1], value_name = "N")]
     seeds: Vec<u64>,
-    /// Train on the Parquet shards of this folder; FOLDER's drives validate and are held out.
+    /// Train on the Parquet shards of this folder; the drives of FOLDER only validate or are held out.
     #[arg(long, value_name = "DIR")]
     shards: Option<PathBuf>,
-    /// Processes that train together on this machine.
+    /// Number of processes that train together on this machine.
     #[arg(long, default_value_t = 1, value_name = "N")]
     processes: u32,
-    /// Python with the packages of tools/train/requirements.txt [default: .venv of the workspace, made if need be].
+    /// Python with the packages of tools/train/requirements.txt [default: .venv of the workspace, created if
+    /// missing].
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
 }
@@ -118,23 +122,23 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         });
         return print_json(&mut stdout, &json);
     }
-    writeln!(stdout, "1 s error over static initialisation's on {}:", held_out.drives.join(", "))?;
+    writeln!(stdout, "1 s error relative to static initialisation on {}:", held_out.drives.join(", "))?;
     for ratio in &held_out.over_static {
         writeln!(stdout, "  {:<26}{}", ratio.method, ratio.all)?;
     }
     if let Some(ours) = held_out.over_best_classical {
-        writeln!(stdout, "sent for navigation, over the best classical method: {ours}")?;
+        writeln!(stdout, "navigation rate, relative to the best classical method: {ours}")?;
     }
     writeln!(
         stdout,
-        "weights: {} ({} bytes; `gyronet device weights` sends them to a board)",
+        "weights: {} ({} bytes; `gyronet device weights` uploads them to a board)",
         blob.display(),
         bytes.len()
     )?;
     Ok(writeln!(stdout, "page: {}", report.display())?)
 }
 
-/// Trains in Python. Its progress bar and lines go to standard error.
+/// Trains in Python, whose progress bar and lines are shown on standard error.
 fn python_training(args: &Args, common: Common, roles: &Roles, out: &Path) -> super::Result {
     let (environment, source) = (bench::workspace().join(".venv"), bench::workspace().join("tools/train"));
     let mut packages = vec!["torch", "numpy", "safetensors", "tqdm"];
@@ -166,11 +170,11 @@ fn python_training(args: &Args, common: Common, roles: &Roles, out: &Path) -> su
     if status.success() {
         Ok(())
     } else {
-        Err(format!("training stopped ({status}); the reason stands above").into())
+        Err(format!("training stopped ({status}); the reason is printed above").into())
     }
 }
 
-/// Returns what the weights gain on some drives.
+/// Computes what the weights gain on some drives.
 fn gain(drives: &[Examined], networks: &Files, common: Common) -> Result<Gain, Box<dyn Error>> {
     let files: Vec<PathBuf> = drives.iter().map(|drive| drive.path.clone()).collect();
     let errors = drives::errors(&files, common, |file, bar| {

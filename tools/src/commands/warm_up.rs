@@ -1,4 +1,4 @@
-//! `gyronet warm-up`: the heading while the sensor warms up and the vehicle does not stop.
+//! `gyronet warm-up` compares headings while the sensor warms up and the vehicle does not stop.
 
 use super::weights::Weights;
 use super::{Common, WriteError, print_json, progress};
@@ -7,15 +7,15 @@ use gyronet_tools::warm_up::{self, plot};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Compare headings while the sensor warms up on half an hour without a stop.
+/// Compare heading errors while a sensor warms up on a drive without a stop.
 ///
-/// Each device first drives through a town on six days, where the board fills its bias curve at standstills. Then it
-/// drives half an hour without a stop, in which the sensor warms up by 10 K and its bias drifts by 0.01 deg/s per hour
-/// besides. Everything is simulated.
+/// Everything is simulated. Each device first drives through a town on six days, and the board fills its bias curve
+/// at standstills. Then it drives half an hour without a stop: the sensor warms up by 10 K, and its bias also drifts
+/// by 0.01 deg/s per hour. The command prints the RMS and the worst heading error of each method.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet warm-up                        # 16 devices, in a minute or two
+  gyronet warm-up                        # 16 devices; runs for a minute or two
   gyronet warm-up --devices 2 --plot warm_up.svg")]
 pub struct Args {
     /// Number of devices (1 to 1000).
@@ -24,7 +24,7 @@ pub struct Args {
     /// Seed of the first device.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Write bias, sigma and heading error of the first device to this picture.
+    /// Plot bias, sigma and heading error of the first device to this file.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }

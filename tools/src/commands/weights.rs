@@ -1,4 +1,4 @@
-//! The choice of weights: the bundled ones, or a file; and the rates of every method with them.
+//! Chooses the weights, bundled or from a file, and computes the rates of every method with them.
 
 use super::{Common, progress};
 use gyronet::model::{self, Blob, weights};
@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Weights of the integer network.
+/// The weights of the integer network.
 pub struct Weights {
     file: Option<WeightFile>,
     built_in: &'static [u8],
@@ -30,7 +30,7 @@ impl Weights {
         Ok(Self { built_in: &weights::GYRONET.0, ..Self::open(path)? })
     }
 
-    /// The checked weights.
+    /// Checks the weights and returns them.
     pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
         match &self.file {
             Some(file) => file.blob(),
@@ -43,26 +43,27 @@ impl Weights {
 /// The networks to compare.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Files {
-    /// Weight file of the rates that are sent [default: the one that comes with the library].
+    /// Weight file for the rates that the board sends [default: the library's default model].
     #[arg(long, value_name = "BLOB")]
     pub weights: Option<PathBuf>,
-    /// Checkpoint of the f32 network, safetensors [default: the one that comes with the tools].
+    /// Checkpoint of the f32 network (safetensors) [default: the one that comes with the tools].
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
 }
 
 impl Files {
-    /// The integer network's weights.
+    /// Opens the integer network's weights.
     pub fn weights(&self) -> Result<Weights, WeightFileError> {
         Weights::open(self.weights.as_deref())
     }
 
-    /// The f32 network's weights.
+    /// Reads the f32 network's weights.
     fn checkpoint(&self) -> Result<Checkpoint<GyroNet>, CheckpointError> {
         self.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read)
     }
 
-    /// The rates of a drive by every method. GyroNet and the linear part are those of the library, whatever is sent.
+    /// Computes the rates of a drive by every method, with a progress bar. GyroNet and the linear part always have
+    /// the library's weights; only the sent rates have the chosen ones.
     pub fn rates(&self, recording: &Recording, common: Common) -> Result<Rates, Box<dyn Error>> {
         let bar = progress::bar(common, 0, recording.name());
         let rates = self.rates_with(recording, &bar);
@@ -70,7 +71,7 @@ impl Files {
         rates.map_err(|error| -> Box<dyn Error> { error })
     }
 
-    /// The same with a bar of the caller's, for a thread.
+    /// Computes the rates as [`Self::rates`] does, with the caller's progress bar, for use in a thread.
     pub fn rates_with(
         &self,
         recording: &Recording,

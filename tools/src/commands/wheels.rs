@@ -1,18 +1,19 @@
-//! `gyronet wheels`: the wheel frames of a vehicle, from its DBC file.
+//! `gyronet wheels` creates and checks the settings of a vehicle's wheel frames.
 
 use super::{Common, WriteError, print_json};
 use gyronet_tools::wheels::{WheelFile, from_dbc};
 use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 
-/// Make or check the settings of a vehicle's wheel frames.
+/// Create or check the settings of a vehicle's wheel frames.
 ///
-/// The board receives the wheel speeds of one maker's cars (identifier 0xAA). For another vehicle, make a file of settings
-/// and give it to the board: `gyronet device set --file wheels.toml`.
+/// By default the board receives the wheel speeds of one maker's cars (identifier 0xAA). For another vehicle, create
+/// a settings file (.toml) and write it to the board: `gyronet device set --file wheels.toml`. The exit status is 1
+/// if the board would refuse the settings.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet wheels from-dbc car.dbc --front-left FL --front-right FR --rear-left RL --rear-right RR --out wheels.toml
+  gyronet wheels from-dbc car.dbc --rear-left RL --rear-right RR --out wheels.toml
   gyronet wheels check wheels.toml
   gyronet device --port /dev/ttyUSB1 set --file wheels.toml")]
 pub struct Args {
@@ -22,10 +23,10 @@ pub struct Args {
 
 #[derive(Debug, Clone, clap::Subcommand)]
 enum Action {
-    /// Make a file of settings from a DBC file and the names of the signals.
+    /// Create a settings file from a DBC file and the names of its signals.
     ///
-    /// A DBC file does not say how a frame is protected: add checksum and counter by hand. What else can be set stands in
-    /// the page of the tools.
+    /// Two wheels of one axle are enough. A DBC file does not say how a frame is protected: add checksum and counter
+    /// by hand. tools/README.md lists all settings.
     #[command(after_help = "\
 Examples:
   gyronet wheels from-dbc car.dbc --front-left WHL_SPD_FL --front-right WHL_SPD_FR \\
@@ -49,9 +50,9 @@ Examples:
         #[arg(long, value_name = "FILE.toml")]
         out: Option<PathBuf>,
     },
-    /// Check a file of settings as the board does.
+    /// Check a settings file as the board does.
     Check {
-        /// File of settings.
+        /// Settings file (.toml).
         file: PathBuf,
     },
 }

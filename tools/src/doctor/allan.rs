@@ -1,42 +1,42 @@
-//! This module computes the Allan deviation of a gyro at rest, and the two figures that are read off it.
+//! This module computes a gyro's Allan deviation at rest, angular random walk and bias instability.
 //!
-//! Averages of neighbouring spans of length tau differ by white noise, which falls as one over the root of tau (its value at
-//! 1 s is the angular random walk), and by what does not average out: the flat bottom of the curve, over 0.664, is the
-//! bias instability (IEEE Std 952).
+//! Averages of neighbouring spans of length tau differ by white noise and by bias changes. White noise falls as one
+//! over the root of tau; its value at 1 s is the angular random walk. Bias changes do not average out: the flat
+//! bottom of the curve, over 0.664, is the bias instability (IEEE Std 952).
 
 use super::finding::Finding;
 use super::recording::{Rows, sorted};
 use crate::drive::DT;
 use std::ops::Range;
 
-/// Fewest pairs of spans behind a point: below, it scatters by more than a third.
+/// Fewest pairs of spans for a point; a point from fewer scatters by more than a third.
 const LEAST_PAIRS: usize = 9;
 /// Points of the curve in each decade.
 const PER_DECADE: f64 = 8.0;
-/// The flat part of 1/f noise lies at this times its coefficient.
+/// The flat part of the curve of 1/f noise, in units of the noise coefficient.
 const FLAT: f64 = 0.664;
-/// Standstill that a noise figure needs, s.
+/// Shortest standstill for a noise figure, s.
 const LEAST_S: f64 = 10.0;
 
-/// Holds the deviation over averaging times.
+/// The Allan deviation over the averaging time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Allan {
     /// Averaging time, s, and deviation, rad/s.
     pub points: Vec<(f64, f64)>,
 }
 
-/// Holds the figures of a gyro.
+/// The noise figures of a gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Angular random walk, rad/s/sqrt(Hz) or, the same number, rad/sqrt(s).
     pub random_walk: f64,
-    /// Bias instability, rad/s, with the averaging time of the bottom, s; `None` where the standstill is too short to
-    /// have one.
+    /// Bias instability, rad/s, with the averaging time of the curve's minimum, s; `None` if the standstill is too
+    /// short.
     pub instability: Option<(f64, f64)>,
 }
 
 impl Allan {
-    /// Returns the deviation of rates at 100 Hz by overlapping spans; fewer than 18 rates have no point.
+    /// Computes the deviation of rates at 100 Hz from overlapping spans; fewer than 10 rates give no point.
     #[must_use]
     pub fn new(rates: &[f64]) -> Self {
         let mut angle = Vec::with_capacity(rates.len() + 1);
@@ -65,7 +65,7 @@ impl Allan {
         Self { points }
     }
 
-    /// Reads the figures off the curve; `None` for less than a second.
+    /// Returns the noise figures of the curve; `None` for less than a second.
     #[must_use]
     pub fn noise(&self) -> Option<Noise> {
         // Below 0.1 s a sensor's own filter hides the noise.
@@ -73,14 +73,14 @@ impl Allan {
         let walks = sorted(white.map(|(tau, deviation)| deviation * tau.sqrt()));
         let random_walk = *walks.get(walks.len() / 2)?;
         let bottom = self.points.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        // A curve that still falls at its end has not reached the bottom.
+        // A curve that still falls at its end has not reached its minimum.
         let instability = bottom.filter(|(at, _)| at + 2 < self.points.len());
         let instability = instability.map(|(_, (tau, deviation))| (deviation / FLAT, *tau));
         Some(Noise { random_walk, instability })
     }
 }
 
-/// Returns the curves about x, y and z; `None` where the standstill is too short.
+/// Returns the curves about x, y and z; `None` if the standstill is too short.
 pub fn at_rest(rows: &Rows, standstill: Option<&Range<usize>>) -> Option<[Allan; 3]> {
     let span = standstill.filter(|span| span.len() as f64 * DT >= LEAST_S)?.clone();
     let rates = |axis: usize| rows.rate[span.clone()].iter().map(|rate| rate[axis]).collect::<Vec<f64>>();
@@ -92,7 +92,9 @@ pub fn finding(noise: Option<&[Option<Noise>; 3]>, standstill: Option<&Range<usi
         let seconds = standstill.map_or(0.0, |span| span.len() as f64 * DT);
         return Finding::note(
             "gyro noise",
-            format!("Not read off: the longest standstill has {seconds:.0} s, it takes {LEAST_S:.0}."),
+            format!(
+                "Not computed: the longest standstill has {seconds:.0} s; at least {LEAST_S:.0} s are needed."
+            ),
         );
     };
     let walk = random_walk.to_degrees() * 60.0;
@@ -100,12 +102,14 @@ pub fn finding(noise: Option<&[Option<Noise>; 3]>, standstill: Option<&Range<usi
         Some((rate, tau)) => {
             format!("bias instability {:.2} deg/h at {tau:.0} s", rate.to_degrees() * 3_600.0)
         }
-        None => "no bottom yet, so no bias instability: it takes a longer standstill".to_owned(),
+        None => {
+            "the Allan deviation still falls, so the bias instability needs a longer standstill".to_owned()
+        }
     };
     Finding::note(
         "gyro noise",
         format!(
-            "About z: angular random walk {walk:.3} deg/sqrt(h), {bottom}; what shakes a standing vehicle included."
+            "About z: angular random walk {walk:.3} deg/sqrt(h), {bottom}; includes vibration of the standing vehicle."
         ),
     )
 }

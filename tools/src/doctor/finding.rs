@@ -1,34 +1,34 @@
-//! A finding is one sentence about one subject of a recording, and says how it is meant.
+//! A finding is one sentence about one subject of a recording, with a verdict.
 
-/// Says how a finding is meant.
+/// The verdict on a subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The subject is as it should be.
     Good,
-    /// The finding is worth knowing.
+    /// The finding is information; it may limit the use of the recording.
     Note,
-    /// The subject must be cured before results are trusted.
+    /// The defect must be fixed before results are trusted.
     Bad,
 }
 
 impl Verdict {
-    /// Returns the word that users see.
+    /// Returns the word for the page, the terminal and JSON.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
             Self::Good => "good",
             Self::Note => "note",
-            Self::Bad => "cure",
+            Self::Bad => "fix",
         }
     }
 }
 
-/// Holds one finding.
+/// One finding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// The subject.
     pub what: &'static str,
-    /// Says how it is meant.
+    /// The verdict on the subject.
     pub verdict: Verdict,
     /// One sentence with its numbers.
     pub text: String,

@@ -1,4 +1,4 @@
-//! This module computes where forward is by the library's estimator, from the wheels' speed at their radius.
+//! This module finds the sensor's forward direction with the library's estimator, from wheels and accelerometer.
 
 use super::Mounting;
 use super::finding::Finding;
@@ -7,11 +7,11 @@ use gyronet::mounting::{Forward, ForwardEstimator, Rotation};
 use gyronet::sample::{ImuSample, Standstill, Validity, WheelSample};
 use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
 
-/// A wrong yaw of the mounting by more costs accuracy, and a larger sigma shows nothing, degrees.
+/// Mounting yaw that costs accuracy, and sigma from which an estimate is unusable, degrees.
 const WRONG: f32 = 25.0;
 const VAGUE: f32 = 10.0;
 
-/// Computes the finding; the mounting shows where up is.
+/// Returns the finding; `mounting` gives the vertical.
 pub fn finding(rows: &Rows, mounting: Option<&Mounting>) -> Finding {
     let what = "forward";
     let found = mounting.and_then(|mounting| {
@@ -20,7 +20,7 @@ pub fn finding(rows: &Rows, mounting: Option<&Mounting>) -> Finding {
         Some([forward.yaw(&Rotation::IDENTITY, rest), forward.sigma].map(f32::to_degrees))
     });
     let Some([yaw, sigma]) = found.filter(|[_, sigma]| *sigma <= VAGUE) else {
-        return Finding::note(what, "Wheels and accelerometer do not show where forward is.");
+        return Finding::note(what, "Wheels and accelerometer do not show the forward direction.");
     };
     let text = format!("{yaw:+.0} +- {sigma:.0} deg to the left of x, by wheels and accelerometer");
     if yaw.abs() <= WRONG {
@@ -31,7 +31,7 @@ pub fn finding(rows: &Rows, mounting: Option<&Mounting>) -> Finding {
         Finding::note(
             what,
             format!(
-                "{text}: x is not forward. Train and drive with the same mounting, or name yaw_deg = {named:.0} in the vehicle file."
+                "{text}: x is not forward. Train and drive with the same mounting, or set yaw_deg = {named:.0} in the vehicle file."
             ),
         )
     }

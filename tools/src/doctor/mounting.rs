@@ -1,27 +1,27 @@
-//! This module computes how the sensor is mounted, by gravity at rest.
+//! This module computes the roll and pitch of the sensor's mounting from gravity at rest.
 
 use super::finding::Finding;
 
 /// Standard gravity, m/s^2.
 const GRAVITY: f64 = 9.806_65;
-/// A tilt beyond the first is worth naming, one beyond the second is a sensor on its side, degrees.
+/// Tilt beyond which the mounting should be configured, and beyond which it must be, degrees.
 const TILT: (f64, f64) = (15.0, 60.0);
 
-/// Holds the mounting as gravity shows it.
+/// The mounting, by gravity at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mounting {
-    /// Degrees.
+    /// Roll, degrees.
     pub roll_deg: f64,
-    /// Degrees.
+    /// Pitch, degrees.
     pub pitch_deg: f64,
-    /// Length of the specific force, m/s^2.
+    /// Magnitude of the specific force, m/s^2.
     pub force: f64,
-    /// The specific force, m/s^2.
+    /// Mean specific force at rest, m/s^2.
     pub rest: [f64; 3],
 }
 
 impl Mounting {
-    /// Computes it from the specific force at rest; `None` without any force.
+    /// Computes the mounting from the specific force at rest; `None` if there is no force.
     pub(super) fn at_rest(force: &[[f64; 3]]) -> Option<Self> {
         let mean = |axis: usize| force.iter().map(|force| force[axis]).sum::<f64>() / force.len() as f64;
         let [x, y, z] = [0, 1, 2].map(mean);
@@ -38,7 +38,7 @@ impl Mounting {
 pub fn finding(mounting: Option<&Mounting>) -> Finding {
     let what = "mounting";
     let Some(Mounting { roll_deg, pitch_deg, force, .. }) = mounting else {
-        return Finding::note(what, "No standstill to see gravity at.");
+        return Finding::note(what, "No standstill in which to measure gravity.");
     };
     let excess = force / GRAVITY - 1.0;
     let tilt = roll_deg.abs().max(pitch_deg.abs());
@@ -49,11 +49,14 @@ pub fn finding(mounting: Option<&Mounting>) -> Finding {
     if excess.abs() > 0.1 {
         Finding::bad(what, format!("{angles}: the unit of the accelerometer is not m/s^2."))
     } else if tilt > TILT.1 {
-        Finding::bad(what, format!("{angles}: z is not up; name the mounting in the vehicle file."))
+        Finding::bad(what, format!("{angles}: z is not up; set the mounting in the vehicle file."))
     } else if tilt > TILT.0 {
         Finding::note(
             what,
-            format!("{angles}: beyond {} deg the board levels by itself, better name it.", TILT.0),
+            format!(
+                "{angles}: the board levels a tilt beyond {} deg by itself, but it is better to set it in the vehicle file.",
+                TILT.0
+            ),
         )
     } else {
         Finding::good(what, format!("{angles}."))

@@ -1,17 +1,17 @@
-//! This module writes the page of an examined recording.
+//! This module writes the page about an examined recording.
 
 use super::{Allan, Doctor, Noise, Verdict};
 use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{HINT, document, escaped, table};
 
-/// Classes of the axes' curves in the style sheet.
+/// Class of each axis's curve in the style sheet, and the name of the axis.
 const AXES: [(&str, &str); 3] = [("static", "x"), ("prompt", "y"), ("default", "z")];
 
-/// Returns the page; `gains` are what calibration and training would gain, or why that is not known.
+/// Returns the page; `gains` says what calibration and training would gain, or why that is not known.
 #[must_use]
 pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
     let mut body = format!(
-        "<h1>{}</h1>\n<p class=\"lead\">A recording of {:.0} s examined before anyone trusts it. Written by <code>gyronet \
+        "<h1>{}</h1>\n<p class=\"lead\">Examination of a recording of {:.0} s. Written by <code>gyronet \
          doctor</code> {}.</p>\n",
         escaped(&doctor.name),
         doctor.seconds,
@@ -22,7 +22,7 @@ pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
     let (class, word) = if bad == 0 { ("agrees", "none".to_owned()) } else { ("differs", bad.to_string()) };
     let still: f64 = doctor.standstills.iter().map(|(from, to)| to - from).sum();
     body += &format!(
-        "<dl class=\"facts\">\n<div><dt>to be cured</dt><dd><span class=\"{class}\">{word}</span></dd></div>\n\
+        "<dl class=\"facts\">\n<div><dt>to be fixed</dt><dd><span class=\"{class}\">{word}</span></dd></div>\n\
          <div><dt>length</dt><dd>{:.0} <small>s</small></dd></div>\n<div><dt>at rest</dt><dd>{still:.0} <small>s</small></dd></div>\n{}</dl>\n",
         doctor.seconds,
         noise_facts(doctor)
@@ -82,7 +82,7 @@ fn rates(doctor: &Doctor) -> String {
         points,
         in_scale: true,
     };
-    // The reference is in front: a gyro that shakes would hide it.
+    // The reference is drawn in front, since a noisy gyro curve would hide it.
     let mut curves = vec![curve("static", "gyro", degrees(gyro))];
     if !reference.is_empty() {
         curves.push(curve("reference", "reference", degrees(reference)));
@@ -119,7 +119,7 @@ fn allan_section(allan: &[Allan; 3], noise: &[Option<Noise>; 3]) -> String {
         ["axis", "angular random walk, deg/√h", "bias instability, deg/h", "at an averaging time of, s"];
     chart.log_html()
         + &table("methods", "", &header, rows)
-        + "<p class=\"note\">By the longest standstill. The random walk is the deviation at 1 s as the falling part of the curve \
-           has it, the bias instability its lowest point over 0.664 (IEEE Std 952); a dash where the curve still falls at its \
-           end. What shakes a standing vehicle is in both.</p>\n"
+        + "<p class=\"note\">Measured in the longest standstill. The random walk is the deviation at 1 s on the falling part of the \
+           curve. The bias instability is the minimum of the curve over 0.664 (IEEE Std 952), or a dash if the curve still \
+           falls at its end. Both include the vibration of the standing vehicle.</p>\n"
 }

@@ -1,11 +1,11 @@
-//! This module examines the readings themselves: those at the limit of a sensor, and those that repeat.
+//! This module finds saturated readings and stuck readings.
 
 use super::finding::Finding;
 use super::recording::Rows;
 
-/// Samples at the very same extreme in a row that look like a limit.
+/// Consecutive samples at the same extreme value that count as saturated.
 const CLIPPED_RUN: usize = 3;
-/// Equal samples in a row on all axes that look stuck.
+/// Consecutive samples that are equal on all axes and count as stuck.
 const STUCK_RUN: usize = 5;
 
 pub fn findings(rows: &Rows) -> Vec<Finding> {
@@ -17,14 +17,13 @@ pub fn findings(rows: &Rows) -> Vec<Finding> {
     let both: Vec<_> = rows.rate.iter().zip(&rows.force).collect();
     let stuck = in_runs(&both, |a, b| a == b, STUCK_RUN);
     if stuck > 0 {
-        let text =
-            format!("{stuck} samples repeat the one before on all six axes, {STUCK_RUN} or more in a row.");
+        let text = format!("{stuck} samples repeat on all six axes, {STUCK_RUN} or more in a row.");
         findings.push(Finding::bad("stuck samples", text));
     }
     findings
 }
 
-/// Looks for readings at the limit of a sensor, whose values `scale` brings to the unit that is shown.
+/// Finds saturated readings; `scale` converts the values to the unit that is shown.
 fn limit(what: &'static str, values: &[[f64; 3]], unit: &str, scale: f64) -> Finding {
     let largest = values.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     let shown = scale * largest;
@@ -34,17 +33,17 @@ fn limit(what: &'static str, values: &[[f64; 3]], unit: &str, scale: f64) -> Fin
         }
     };
     match (0..3).map(|axis| in_runs(values, clipped(axis), CLIPPED_RUN)).sum::<usize>() {
-        0 => Finding::good(what, format!("At most {shown:.1} {unit}, no run at a limit.")),
+        0 => Finding::good(what, format!("Largest reading {shown:.1} {unit}; no sign of saturation.")),
         count => Finding::bad(
             what,
             format!(
-                "{count} samples at the limit of {shown:.1} {unit}, several in a row: the range is too small."
+                "{count} samples at the limit of {shown:.1} {unit}, several in a row: the sensor saturates."
             ),
         ),
     }
 }
 
-/// Counts the elements in runs of at least so many that are alike.
+/// Counts the elements in runs of at least `least` alike elements.
 fn in_runs<T>(values: &[T], alike: impl Fn(&T, &T) -> bool, least: usize) -> usize {
     values.chunk_by(|a, b| alike(a, b)).filter(|run| run.len() >= least).map(<[T]>::len).sum()
 }

@@ -1,4 +1,4 @@
-//! The rows of a recording as they are, with those that cannot be read counted.
+//! This module reads the rows of a recording unchecked; rows that cannot be read are counted.
 
 use crate::drive::error::DataError;
 use crate::drive::recording::{Reader, Row, WHEELS};
@@ -7,12 +7,12 @@ use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 
-/// Rows of a second.
+/// Rows per second.
 pub const SECOND: usize = 100;
-/// Rows kept: a day at 100 Hz.
+/// Most rows that are kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
 
-/// Counts what a recording holds.
+/// The columns of a recording.
 #[derive(Debug)]
 pub struct Rows {
     pub name: String,
@@ -24,12 +24,12 @@ pub struct Rows {
     /// True yaw rate, rad/s, and course, rad.
     pub reference: Vec<Option<f64>>,
     pub course: Vec<Option<f64>>,
-    /// rad/s.
+    /// Rate of each wheel, rad/s.
     pub wheels: [Vec<Option<f64>>; WHEELS],
-    /// Rows that could not be read, and why the first one could not.
+    /// Number of rows that were not used, and why the first one could not be read.
     pub bad: u64,
     pub first_bad: Option<String>,
-    /// The vehicle file beside it holds these.
+    /// Contents of the vehicle file beside the recording.
     pub vehicle: Vehicle,
 }
 
@@ -37,7 +37,7 @@ impl Rows {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`DataError`]: no file, or no drive's header.
+    /// [`DataError`]: the file cannot be opened, or has no header of a drive.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let shown = path.display().to_string();
         let file = File::open(path).map_err(|source| DataError::open(&shown, source))?;
@@ -94,7 +94,7 @@ impl Rows {
         self.seconds.len()
     }
 
-    /// Returns a value of each row, with its time, where it is known.
+    /// Returns the time and the value of each row for which `of` gives a value.
     pub fn series(&self, of: impl Fn(usize) -> Option<f64>) -> Vec<(f64, f64)> {
         (0..self.len()).filter_map(|row| Some((self.seconds[row], of(row)?))).collect()
     }
@@ -106,7 +106,7 @@ impl Rows {
     }
 }
 
-/// Returns values from the least to the greatest.
+/// Returns the values in ascending order.
 pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_unstable_by(f64::total_cmp);

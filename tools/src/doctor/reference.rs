@@ -1,4 +1,4 @@
-//! This module examines the reference: a true yaw rate, or a course.
+//! This module examines the reference, a true yaw rate or a course.
 
 use super::finding::{Finding, Verdict};
 use super::recording::{Rows, SECOND};
@@ -8,11 +8,11 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 const WHAT: &str = "reference";
-/// A yaw rate and a course may be late by this much, s.
+/// Largest offset of a good reference from the gyro, s: of a yaw rate, and of a course.
 const LATE: (f64, f64) = (0.015, 0.5);
-/// A scatter takes this many seconds at rest.
+/// Fewest seconds at rest from which the scatter is computed.
 const LEAST_AT_REST: usize = 5;
-/// Two courses further apart than this give no yaw rate, s.
+/// Two courses this far apart or further give no yaw rate, s.
 const COURSE_GAP: f64 = 2.0;
 
 pub fn finding(rows: &Rows, standstill: Option<&Range<usize>>) -> Finding {
@@ -25,7 +25,7 @@ pub fn finding(rows: &Rows, standstill: Option<&Range<usize>>) -> Finding {
     } else if !course.is_empty() {
         of_course(&gyro, &course)
     } else {
-        Finding::note(WHAT, "None: nothing can be judged on it, and nothing trained.")
+        Finding::note(WHAT, "None: the recording can neither judge a method nor train a network.")
     }
 }
 
@@ -41,13 +41,13 @@ fn of_rate(gyro: &align::Rate, rate: &align::Rate, percent: f64, noise: &str) ->
     }
 }
 
-/// Says how late a reference is whose clock is to be moved so far.
+/// Returns the text for a clock offset: by how much the reference is early or late.
 fn delay(seconds: f64) -> String {
     let word = if seconds > 0.0 { "early" } else { "late" };
     format!("{:.1} ms {word}", 1e3 * seconds.abs())
 }
 
-/// Says by how much the reference's angles of one second scatter at rest.
+/// Returns the text for the scatter of the reference's 1 s angles at rest; empty if the rest is too short.
 fn scatter(reference: &[Option<f64>]) -> String {
     let angles: Vec<f64> =
         reference.chunks_exact(SECOND).map(|second| second.iter().flatten().sum::<f64>() * DT).collect();
@@ -56,7 +56,10 @@ fn scatter(reference: &[Option<f64>]) -> String {
     }
     let mean = angles.iter().sum::<f64>() / angles.len() as f64;
     let variance = angles.iter().map(|angle| (angle - mean).powi(2)).sum::<f64>() / angles.len() as f64;
-    format!("; at rest it scatters by {:.6} rad in 1 s: smaller errors cannot be seen", variance.sqrt())
+    format!(
+        "; at rest it scatters by {:.6} rad in 1 s, so smaller errors cannot be measured",
+        variance.sqrt()
+    )
 }
 
 fn of_course(gyro: &align::Rate, course: &align::Rate) -> Finding {
@@ -76,6 +79,6 @@ fn of_course(gyro: &align::Rate, course: &align::Rate) -> Finding {
                 delay(seconds)
             ),
         },
-        Err(reason) => Finding::note(WHAT, format!("{values}; not laid on the gyro: {reason}.")),
+        Err(reason) => Finding::note(WHAT, format!("{values}; cannot be aligned with the gyro: {reason}.")),
     }
 }

@@ -1,4 +1,4 @@
-//! This module examines the time stamps: the rate, the gaps, and the rows that cannot be read.
+//! This module examines the sample rate, the gaps, and the rows that cannot be read.
 
 use super::finding::{Finding, Verdict};
 use super::recording::{Rows, sorted};
@@ -6,20 +6,20 @@ use crate::drive::DT;
 
 /// A longer period than this is a gap, s.
 const GAP: f64 = 0.015;
-/// Other commands refuse a rate that is further from 100 Hz, Hz.
+/// Difference from 100 Hz beyond which other commands reject the rate, Hz.
 const OFF: f64 = 20.0;
 
 pub fn findings(rows: &Rows) -> Vec<Finding> {
     let mut findings = Vec::new();
     let periods = sorted(rows.seconds.windows(2).map(|pair| pair[1] - pair[0]));
     match periods.get(periods.len() / 2) {
-        None => findings.push(Finding::bad("rate", "No two rows can be read.")),
+        None => findings.push(Finding::bad("rate", "Fewer than two rows can be read.")),
         Some(median) => {
             let hz = 1.0 / median;
             if (hz - 100.0).abs() > OFF {
                 findings.push(Finding::bad(
                     "rate",
-                    format!("{hz:.2} Hz by the median period: other commands refuse it, `gyronet import` brings any rate to 100 Hz."),
+                    format!("{hz:.2} Hz by the median period: other commands reject this rate; `gyronet import` resamples to 100 Hz."),
                 ));
             } else {
                 findings.push(Finding::good("rate", format!("{hz:.2} Hz by the median period.")));
@@ -28,7 +28,7 @@ pub fn findings(rows: &Rows) -> Vec<Finding> {
         }
     }
     if rows.bad > 0 {
-        let first = rows.first_bad.as_deref().unwrap_or("more than a day");
+        let first = rows.first_bad.as_deref().unwrap_or("the recording is longer than a day");
         findings.push(Finding::bad("unreadable rows", format!("{}; the first: {first}.", rows.bad)));
     }
     findings

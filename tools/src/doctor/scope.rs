@@ -1,4 +1,4 @@
-//! This module says what can and cannot be judged on a recording, by its turns, stops and length.
+//! This module reports what a recording can and cannot judge, by its turns, stops and length.
 
 use super::finding::Finding;
 use super::recording::{Rows, SECOND};
@@ -6,11 +6,11 @@ use crate::drive::DT;
 use gyronet::bias::STATIC_SAMPLES;
 use std::ops::Range;
 
-/// A turn of more than this counts, rad.
+/// Least angle that counts as a turn, rad.
 const TURN: f64 = std::f64::consts::FRAC_PI_4;
 /// A second that turns by less than this ends a turn, rad.
 const STRAIGHT: f64 = 0.02;
-/// Gain and mounting show in so many radians turned, the drift in so many seconds.
+/// Radians turned from which gain and mounting show, and seconds from which the drift shows.
 const NEEDED: (f64, f64) = (6.0, 300.0);
 
 pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
@@ -21,7 +21,7 @@ pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
     let lacks = [
         (turned < NEEDED.0, "gain and mounting (few turns)"),
         (stops == 0, "zero-rate updates (no later stop)"),
-        (seconds < NEEDED.1, "drift over minutes (too short)"),
+        (seconds < NEEDED.1, "drift over minutes (recording too short)"),
         (rows.reference.iter().all(Option::is_none), "errors of 1 s and 10 s (no reference rate)"),
     ];
     let lacks: Vec<&str> = lacks.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
@@ -34,12 +34,12 @@ pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
     )
 }
 
-/// Returns the number of turns and all angles together, rad; a turn goes on while its direction does.
+/// Returns the number of turns and the sum of all angles, rad. A turn ends when its direction changes.
 fn turns(rows: &Rows, bias: f64) -> (usize, f64) {
     let (mut turned, mut turns, mut angle, mut last) = (0.0, 0, 0.0f64, 0.0f64);
     for second in rows.rate.chunks(SECOND) {
         let step = second.iter().map(|rate| rate[2] - bias).sum::<f64>() * DT;
-        // A standing gyro's noise is no turn.
+        // The noise of a gyro at rest is not a turn.
         turned += if step.abs() < STRAIGHT { 0.0 } else { step.abs() };
         if step.abs() < STRAIGHT || step * last < 0.0 {
             turns += usize::from(angle.abs() > TURN);

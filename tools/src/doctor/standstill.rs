@@ -1,5 +1,5 @@
-//! This module finds the standstills of a recording: whole seconds that are quiet by the gyro, and by the wheels where
-//! there are any.
+//! This module finds the standstills of a recording: whole seconds with a quiet gyro and, if recorded, standing
+//! wheels.
 
 use super::finding::Finding;
 use super::recording::{Rows, SECOND, sorted};
@@ -7,10 +7,10 @@ use crate::drive::DT;
 use crate::drive::recording::WHEEL_STANDS;
 use std::ops::Range;
 
-/// A second is at rest where its gyro scatters by less than this many times its quietest second, and by at most as much,
-/// rad/s, as static initialisation takes on three axes.
+/// Largest spread of the gyro in a second at rest: this multiple of the quietest seconds' spread, and the limit of
+/// static initialisation on three axes together, rad/s.
 const QUIET: (f64, f64) = (2.5, 0.0866);
-/// The mean yaw rate of a second at rest may differ from that of most quiet seconds by this, rad/s.
+/// The mean yaw rate of a second at rest may differ by this much from the median of all quiet seconds, rad/s.
 const RESTING_RATE: f64 = 0.01;
 
 /// Returns the standstills as ranges of rows.
@@ -24,7 +24,7 @@ pub fn find(rows: &Rows) -> Vec<Range<usize>> {
         seconds().zip(&spreads).filter(|(second, spread)| **spread <= limit && wheels_rest(rows, second));
     let quiet: Vec<(Range<usize>, f64)> =
         quiet.map(|(second, _)| (second.clone(), rows.mean_yaw_rate(second))).collect();
-    // A slow turn is as quiet as a rest: its mean is not that of most quiet seconds.
+    // A slow turn is as quiet as a standstill, but its mean rate differs from the median of the quiet seconds.
     let means = sorted(quiet.iter().map(|(_, mean)| *mean));
     let bias = means.get(means.len() / 2).copied().unwrap_or_default();
     let mut standstills: Vec<Range<usize>> = Vec::new();
@@ -37,7 +37,7 @@ pub fn find(rows: &Rows) -> Vec<Range<usize>> {
     standstills
 }
 
-/// Returns the root of the three axes' variances together.
+/// Returns the root of the sum of the three axes' variances.
 fn spread(rates: &[[f64; 3]]) -> f64 {
     let variance = |axis: usize| {
         let mean = rates.iter().map(|rate| rate[axis]).sum::<f64>() / rates.len() as f64;
@@ -59,7 +59,7 @@ pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
         [lengths().sum(), lengths().max().unwrap_or_default()].map(|rows: usize| rows as f64 * DT);
     let by =
         if rows.wheels.iter().flatten().any(Option::is_some) { "gyro and wheels" } else { "the gyro alone" };
-    let text = format!("{} by {by}, {total:.0} s together, the longest {longest:.0} s.", standstills.len());
+    let text = format!("{} by {by}, {total:.0} s in total, the longest {longest:.0} s.", standstills.len());
     if standstills.is_empty() {
         Finding::note("standstills", text)
     } else {

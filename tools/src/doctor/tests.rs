@@ -1,4 +1,4 @@
-//! These tests make recordings with one defect each.
+//! These tests create recordings with one defect each.
 
 use super::*;
 use crate::drive::recording::Reader;
@@ -7,8 +7,8 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use std::fmt::Write;
 
-/// A car at rest for 20 s, in turns for 40 s, at rest again for 20 s; `edit` changes a row's time, force, rate, wheels
-/// 2 and 4, and reference.
+/// Examines a drive of a car that rests for 20 s, turns for 40 s and rests for 20 s. `edit` changes a row's time,
+/// force, rate, wheels 2 and 4, and reference; it returns false to drop the row.
 fn doctor(edit: impl Fn(usize, &mut [f64; 10]) -> bool) -> Doctor {
     let (mut random, normal) = (ChaCha8Rng::seed_from_u64(1), Normal::new(0.0, 0.002).unwrap());
     let mut text =

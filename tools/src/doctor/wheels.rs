@@ -1,20 +1,20 @@
-//! The wheels against the gyro: the difference of left and right, over the track, is the yaw rate.
+//! This module compares wheels and gyro: the speed difference of right and left, over the track, is the yaw rate.
 
 use super::finding::Finding;
 use super::recording::{Rows, SECOND};
 
-/// Least seconds of turning that say something.
+/// Fewest seconds of turning for a comparison.
 const LEAST_TURNING_S: usize = 5;
-/// A second turns from this rate on, rad/s.
+/// Mean yaw rate above which a second counts as turning, rad/s.
 const TURNS: f64 = 0.05;
 
-/// Holds the line through the differences of a pair of wheels over the yaw rates.
+/// The fitted line of a wheel pair's rate difference over the yaw rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Pair {
-    /// Difference, rad/s, of one rad/s of yaw rate: the track over the radius.
+    /// Rate difference, rad/s, per rad/s of yaw rate: the track over the radius.
     slope: f64,
     correlation: f64,
-    /// Difference without a yaw rate, rad/s.
+    /// Rate difference without a turn, rad/s.
     offset: f64,
 }
 
@@ -22,13 +22,13 @@ pub fn finding(rows: &Rows) -> Finding {
     let what = "wheels";
     let known = rows.wheels.iter().filter(|wheel| wheel.iter().any(Option::is_some)).count();
     if known == 0 {
-        return Finding::note(what, "None: no zero-rate updates by wheels, no speed.");
+        return Finding::note(what, "None: no standstill by the wheels, and no speed.");
     }
     let Some(Pair { slope, correlation, offset }) = compare(rows) else {
         return Finding::note(
             what,
             format!(
-                "{known} recorded; no axle has both of its wheels, at two speeds, in enough turns to be held against the gyro."
+                "{known} recorded; no axle has both wheels, at different speeds, in enough turns to compare them with the gyro."
             ),
         );
     };
@@ -36,7 +36,7 @@ pub fn finding(rows: &Rows) -> Finding {
     let track = slope * radius;
     let named = rows.vehicle.wheels.track_m.map(|track| format!(" ({track} m in the vehicle file)"));
     let text = format!(
-        "{known} recorded; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {radius} m{}, {offset:+.3} rad/s apart without a turn",
+        "{known} recorded; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {radius} m{}, {offset:+.3} rad/s apart when driving straight",
         named.unwrap_or_default()
     );
     if correlation > 0.9 && (0.2..4.0).contains(&track) {
@@ -44,12 +44,12 @@ pub fn finding(rows: &Rows) -> Finding {
     } else if correlation < -0.9 {
         Finding::bad(what, format!("{text}: left and right are swapped, or z is down."))
     } else {
-        Finding::note(what, format!("{text}: good for standstill and speed, not for the yaw rate."))
+        Finding::note(what, format!("{text}: usable for standstill and speed, not for the yaw rate."))
     }
 }
 
-/// Compares means over seconds; wheels 1 and 2 are right, 3 and 4 left, 1 and 3 at the front. `None` where no axle has both
-/// wheels or the drive hardly turns.
+/// Compares means over seconds. Wheels 1 and 2 are right, 3 and 4 left, 1 and 3 at the front. Returns `None` if no
+/// axle has both wheels or the drive hardly turns.
 fn compare(rows: &Rows) -> Option<Pair> {
     for (right, left) in [(1, 3), (0, 2)] {
         let (right, left) = (&rows.wheels[right], &rows.wheels[left]);

@@ -1,5 +1,5 @@
-//! This module writes CAN frames as text, one on each line, in the format that can-utils' `candump -L` logs and that
-//! `canplayer` and python-can read: `(seconds.micros) interface ID#DATA`.
+//! This module writes CAN frames as text, one per line, in the format of can-utils' `candump -L`, which `canplayer`
+//! and python-can read: `(seconds.micros) interface ID#DATA`.
 
 use embedded_can::{Frame, Id};
 use gyronet::units::Micros;
@@ -8,7 +8,7 @@ use std::io::{self, Write};
 /// Interface name in the log.
 pub const INTERFACE: &str = "can0";
 
-/// Writes frames to a log.
+/// A writer of CAN frames in candump format.
 #[derive(Debug)]
 pub struct Log<W> {
     out: W,

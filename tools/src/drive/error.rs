@@ -1,14 +1,13 @@
-//! These are the errors of recorded drives and of data sets. They name the file and, where there is one, line and
-//! column, so that a user finds the place.
+//! The errors of recorded drives and of data sets. They name the file and, if known, the line and the column.
 
 use std::fmt;
 
-/// Describes an error in one file: its place, and the fault.
+/// An error in a file: where it is, and what is wrong.
 #[derive(Debug)]
 pub struct DataError {
-    /// The file or folder.
+    /// The path of the file or folder.
     pub path: String,
-    /// The line, the first one being 1.
+    /// The line number, from 1.
     pub line: Option<u64>,
     /// The name or the number of the column.
     pub column: Option<String>,
@@ -17,19 +16,19 @@ pub struct DataError {
 }
 
 impl DataError {
-    /// Returns an error of a whole file.
+    /// Returns an error that concerns a whole file.
     #[must_use]
     pub fn of(path: impl fmt::Display, fault: DataFault) -> Self {
         Self { path: path.to_string(), line: None, column: None, fault }
     }
 
-    /// Returns an error of one line.
+    /// Returns an error that concerns one line.
     #[must_use]
     pub fn at(path: impl fmt::Display, line: u64, fault: DataFault) -> Self {
         Self { line: Some(line), ..Self::of(path, fault) }
     }
 
-    /// Returns an error of one field.
+    /// Returns an error that concerns one field.
     #[must_use]
     pub fn value(
         path: impl fmt::Display,
@@ -64,7 +63,7 @@ impl fmt::Display for DataError {
     }
 }
 
-/// Names the fault of a file.
+/// What is wrong with a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each fault names its fields")]
@@ -75,7 +74,7 @@ pub enum DataFault {
     /// The file is not a CSV in UTF-8.
     #[error(transparent)]
     Csv(#[from] csv::Error),
-    /// A file that the data set has does not exist.
+    /// A file that the data set needs does not exist.
     #[error("missing")]
     Missing,
     /// The folder belongs to neither data set.
@@ -92,21 +91,21 @@ pub enum DataFault {
     /// A row has more or fewer fields than the header.
     #[error("{found} fields, the header has {expected}")]
     Fields { found: usize, expected: usize },
-    /// A row has more or fewer columns than the data set.
+    /// A row has more or fewer columns than the data set defines.
     #[error("{found} columns, expected {expected}")]
     Columns { found: usize, expected: usize },
-    /// A field is not what its column needs.
+    /// A field is not a valid value of its column.
     #[error("{text:?} is {error}")]
     Value { text: String, error: ValueError },
     /// Time does not increase.
     #[error("time goes {} from {last_s:.4} s to {at_s:.4} s",
         if at_s < last_s { "backwards" } else { "nowhere" })]
     Time { last_s: f64, at_s: f64 },
-    /// A stamp is earlier than the one before.
+    /// A time stamp is earlier than the previous one.
     #[error("time goes backwards from {last} to {at}")]
     Backwards { last: i64, at: i64 },
-    /// The file has so long a gap that the rows after it are another drive.
-    #[error("silent for {seconds:.0} s before it, at most {most} s are one drive")]
+    /// The gap before a row is so long that the rows after it belong to another drive.
+    #[error("silent for {seconds:.0} s before this row; a gap of a drive is at most {most} s long")]
     Silent { seconds: f64, most: f64 },
     /// The recording is too short for static initialisation.
     #[error("is {seconds:.2} s long, static initialisation alone needs {needed} s")]
@@ -121,53 +120,55 @@ pub enum DataFault {
     #[error("starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s")]
     Moving { line: u64, wheel: usize, rate: f64 },
     /// The wheels of a sequence turn during static initialisation.
-    #[error("starts moving: its wheels roll {metres:.2} m in the first 3 s, at most {most} m are standing")]
+    #[error(
+        "starts moving: its wheels roll {metres:.2} m in the first 3 s; at most {most} m count as standing"
+    )]
     Rolling { metres: f64, most: f64 },
     /// The calibration lacks a parameter, or the parameter is not a positive number.
     #[error("no usable parameter {0:?}")]
     Parameter(&'static str),
-    /// The four numbers of an attitude are no unit quaternion.
+    /// The four numbers of an attitude are not a unit quaternion.
     #[error("a quaternion of norm {norm:.3}, which is no attitude")]
     Quaternion { norm: f64 },
     /// Two poses of a trajectory are too far apart to interpolate between them.
-    #[error("{seconds:.2} s after the pose before, at most {most} s can be interpolated")]
+    #[error("{seconds:.2} s after the previous pose; at most {most} s can be interpolated")]
     FarApart { seconds: f64, most: f64 },
-    /// A trajectory does not cover what is compared.
+    /// A trajectory does not cover the time that is compared.
     #[error(
-        "has poses from {from_s:.2} to {to_s:.2} s, needed are {begin_s:.2} to {end_s:.2} s: its length or its clock is another's"
+        "has poses from {from_s:.2} to {to_s:.2} s, but {begin_s:.2} to {end_s:.2} s are needed: wrong length or clock"
     )]
     Span { from_s: f64, to_s: f64, begin_s: f64, end_s: f64 },
     /// A trajectory does not start from the true pose.
-    #[error("{metres:.2} m and {degrees:.1} deg from the truth at the start: its frame is another's")]
+    #[error("{metres:.2} m and {degrees:.1} deg from the truth at the start: the frames differ")]
     Frame { metres: f64, degrees: f64 },
     /// A trajectory is further from the truth than the vehicle can have driven.
     #[error("{metres:.0} m from the truth, where at most {most:.0} m are possible: it has diverged")]
     Diverged { metres: f64, most: f64 },
-    /// The request needs an inertial sensor, and the sequence has none.
+    /// An inertial sensor is needed, but the sequence has none.
     #[error("xsens_imu.csv has 8 columns: no gyro and no accelerometer")]
     NoGyro,
     /// The vehicle file cannot be used.
-    #[error("no vehicle file: {reason}")]
+    #[error("not a valid vehicle file: {reason}")]
     Vehicle { reason: String },
-    /// The note that a sequence is simulated cannot be parsed.
+    /// A JSON file cannot be parsed: the marker of a simulated sequence, or the history of a training.
     #[error(transparent)]
     Marker(#[from] serde_json::Error),
 }
 
-/// Names the fault of one field.
+/// What is wrong with one field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
     /// The field is empty.
     #[error("empty")]
     Empty,
-    /// The field is text.
+    /// The field is not a number.
     #[error("not a number")]
     NotANumber,
     /// The field is NaN or an infinity.
     #[error("not finite")]
     NotFinite,
-    /// The value is larger than a part of this kind can measure, or the time is before zero.
+    /// The value is larger than such a sensor can measure, or the time is negative.
     #[error("out of range")]
     OutOfRange,
 }

@@ -1,4 +1,4 @@
-//! This module writes what a replayed drive gives for other programs: a table of its rates, and its path in TUM's format.
+//! This module exports a replayed drive for other programs: a table of its rates, and its path in TUM format.
 
 use super::DT;
 use super::recording::Recording;
@@ -8,9 +8,9 @@ use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
 use std::io::{self, Write};
 
-/// Writes a line for each sample from the end of static initialisation on: time, s; the gyro's yaw rate, the one sent at
-/// once, the one sent for navigation some samples later, and the expected error of the latter, rad/s; its yaw, rad, and
-/// its status. An empty field is not known.
+/// Writes a line for each sample after static initialisation: time, s; the yaw rate of the gyro, the prompt rate, the
+/// navigation rate and its expected error, rad/s; the yaw of the navigation rate, rad; and the status of the prompt
+/// rate. An empty field is unknown.
 ///
 /// # Errors
 /// The writer's.
@@ -35,8 +35,8 @@ pub fn csv(recording: &Recording, replay: &Replay, mut out: impl Write) -> io::R
     out.flush()
 }
 
-/// Writes the poses by dead reckoning with the navigation rate, from the end of static initialisation on: time of the
-/// recording, s, x forward and y left of the first pose, m, and the heading as a quaternion.
+/// Writes the poses from dead reckoning with the navigation rate, from the end of static initialisation on: time of
+/// the recording, s, x forward and y left of the first pose, m, and the heading as a quaternion.
 ///
 /// # Errors
 /// The writer's.
@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(path.poses.len(), rows.len() - unknown);
         let (pose, row) = (path.poses.last().unwrap(), &rows[path.poses.len() - 1]);
         assert!((pose.time - row[0].parse::<f64>().unwrap()).abs() < 1e-9);
-        // The table's yaw counts whole samples from the same start; the drive turns by more than a radian on the way.
+        // Both yaws start at the same sample.
         assert!((pose.yaw - row[5].parse::<f64>().unwrap()).abs() < 1e-3, "{} {row:?}", pose.yaw);
         let reach =
             path.poses.iter().map(|pose| pose.position[0].hypot(pose.position[1])).fold(0.0, f64::max);

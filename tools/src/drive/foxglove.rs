@@ -1,7 +1,8 @@
-//! A replayed drive as an MCAP that Foxglove opens: inputs, rates, heading, states and CAN frames, as JSON with schemas.
+//! This module writes a replayed drive as an MCAP file for Foxglove: inputs, rates, heading, states, CAN frames
+//! (JSON).
 //!
-//! The heading is a `foxglove.PoseInFrame` and a change of state a `foxglove.Log`, which have panels of their own; the
-//! others are plots of numbers. Times are those of the recording.
+//! The heading is a `foxglove.PoseInFrame` and a change of state a `foxglove.Log`; Foxglove has panels for both. The
+//! other messages are numbers to plot. Times are those of the recording.
 
 use super::recording::Recording;
 use super::replay::{Replay, Step};
@@ -20,10 +21,10 @@ use std::io::{Seek, Write};
 const INFO: u8 = 2;
 const WARNING: u8 = 3;
 
-/// The layout for Foxglove, to be imported beside the file.
+/// The Foxglove layout that goes with the file.
 pub const LAYOUT: &str = include_str!("foxglove/layout.json");
 
-/// The channels of a file.
+/// Identifiers of a file's channels.
 struct Channels {
     input: u16,
     rate: u16,
@@ -114,7 +115,7 @@ pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> 
     Ok(file.messages)
 }
 
-/// Holds what is sent with a sample, and its inputs.
+/// Returns the message with the rates of a step and the reference.
 fn rate(step: &Step, reference: Option<f64>) -> Value {
     let (prompt, navigation) = (&step.vehicle.prompt, step.navigation);
     json!({

@@ -1,19 +1,18 @@
 //! A recorded drive is a CSV file with a header and one row for each 10 ms.
 //!
-//! Columns are found by name, in any order; unknown ones are skipped.
+//! Columns are found by name, in any order; unknown columns are skipped.
 //!
 //! | column | unit | |
 //! |---|---|---|
 //! | `t_s` | s | device time, rising |
 //! | `acc_x`, `acc_y`, `acc_z` | m/s^2 | specific force: x forward, y left, z up |
 //! | `gyr_x`, `gyr_y`, `gyr_z` | rad/s | angular rate |
-//! | `ref_gyr_z` | rad/s | optional: the true yaw rate; an empty field is a value not known |
-//! | `ref_yaw` | rad | optional: the true course, to the left; an empty field is a value not known |
-//! | `wheel1_rate` .. `wheel4_rate` | rad/s | optional: an empty field is a value not recorded |
+//! | `ref_gyr_z` | rad/s | optional: the true yaw rate; empty if unknown |
+//! | `ref_yaw` | rad | optional: the true course, to the left; empty if unknown |
+//! | `wheel1_rate` .. `wheel4_rate` | rad/s | optional: rate of a wheel; empty if not recorded |
 //!
-//! Values become the codes of [`gyronet::units`] by way of f32 and time by way of 10 kHz ticks,
-//! as they do on the sensor's own wire: a recording read from here and the same recording
-//! parsed from MTData2 bytes are the same samples to the last bit.
+//! Values are converted to the codes of [`gyronet::units`] through f32, and times through 10 kHz ticks, as the sensor
+//! sends them. So a recording read here and the same recording parsed from MTData2 bytes are bit-identical samples.
 
 mod reader;
 
@@ -26,20 +25,19 @@ use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ};
 use std::fs::File;
 use std::path::Path;
 
-/// A recording can have this many wheels.
+/// Number of wheel columns of a recording.
 pub const WHEELS: usize = 4;
-/// A wheel that turns faster than this, on average over a second of static initialisation, is
-/// rolling, rad/s. A rate sensor on a standing wheel shows up to 0.04.
+/// Largest mean rate of a standing wheel over a second, rad/s. A rate sensor on a standing wheel reads up to 0.04.
 pub const WHEEL_STANDS: f64 = 0.3;
-/// The median sample period may differ from 10 ms by at most this, microseconds.
+/// Largest difference of the median sample period from 10 ms, microseconds.
 const PERIOD_TOLERANCE_US: u64 = 2_000;
-/// This many rows tell whether a drive of any length can begin: ten seconds.
+/// Rows of the beginning that [`Recording::check`] keeps in memory: ten seconds.
 const BEGINNING: usize = 1_000;
 
-/// Holds one row of a recording.
+/// One row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Line of the file, the header being line 1.
+    /// Line number in the file; the header is line 1.
     pub line: u64,
     /// The sample of the sensor.
     pub sample: ImuSample,
@@ -51,17 +49,16 @@ pub struct Row {
     pub wheels: [Option<f64>; WHEELS],
 }
 
-/// Holds a whole drive that can be run: at least 3 s long, at 100 Hz, with its wheels, if it has any, at rest in the
-/// first 3 s.
+/// A complete drive that can be replayed: at least 3 s long, at 100 Hz, with any wheels at rest in the first 3 s.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// The file, for messages.
+    /// The path of the file, for messages.
     pub path: String,
     /// The rows in order of time.
     pub rows: Vec<Row>,
-    /// Rows that are missing between others.
+    /// Number of rows that are missing in gaps.
     pub missing: u64,
-    /// The vehicle file beside it holds these; the rows are in the vehicle's axes.
+    /// Contents of the vehicle file beside the recording; the rows are in the vehicle's axes.
     pub vehicle: Vehicle,
 }
 
@@ -76,7 +73,7 @@ impl Recording {
         Self::of(&name, file, Vehicle::of_drive(path)?)
     }
 
-    /// Checks a file of any length, with its beginning alone in memory.
+    /// Checks a file of any length; only its beginning is kept in memory.
     ///
     /// # Errors
     /// As [`Recording::read`].
@@ -90,7 +87,7 @@ impl Recording {
         rows.try_for_each(|row| row.map(drop))
     }
 
-    /// Parses any input; errors name it `path`.
+    /// Parses a recording from any reader; `path` is its name in errors.
     ///
     /// # Errors
     /// [`DataError`] with that path.
@@ -156,8 +153,8 @@ impl Recording {
         Ok(())
     }
 
-    /// Checks that the wheels stand in each of the first three seconds, so that a car which pulls away late in them is
-    /// found too.
+    /// Checks that the wheels stand in each of the first three seconds. Each second is checked on its own, so that a
+    /// car that pulls away in the last one is found.
     fn check_wheels(&self) -> Result<(), DataError> {
         let still = self.rows.get(..STATIC_SAMPLES as usize).unwrap_or(&self.rows);
         for second in still.chunks(RATE_HZ as usize) {
@@ -168,7 +165,7 @@ impl Recording {
                     continue;
                 }
                 let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
-                // Some rate is above the limit, or the mean would not be.
+                // At least one rate is above the limit, since the mean is.
                 let line = second.iter().find(turns).map_or(0, |row| row.line);
                 let fault = DataFault::Moving { line, wheel: wheel + 1, rate: mean };
                 return Err(DataError::of(&self.path, fault));

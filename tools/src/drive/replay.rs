@@ -1,4 +1,4 @@
-//! This module runs a recorded drive through the coprocessor as the board does: the same code, so the frames are those
+//! This module runs a recorded drive through the coprocessor. The board runs the same code, so the frames are those
 //! that the board would send.
 
 use crate::drive::candump::Log;
@@ -15,12 +15,13 @@ use gyronet::units::{AngularRate, Micros, Yaw};
 use std::io::{self, Write};
 use std::ops::Range;
 
-/// The replayed board polls its inputs every millisecond.
+/// Period at which the replayed board polls its inputs, microseconds.
 const LOOK_US: u64 = 1_000;
-/// The board's messages of a silent sensor are replayed for this long in a gap, microseconds; beyond it time jumps.
+/// Longest part of a gap in which the board's messages about a silent sensor are replayed, microseconds; the rest of
+/// the gap is skipped.
 const SILENCE_US: u64 = 60_000_000;
 
-/// The reason why a recording gives no corrected rate.
+/// The reason why a recording cannot be replayed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
@@ -29,12 +30,12 @@ pub enum ReplayError {
     StartsMoving {
         /// The recording.
         path: String,
-        /// The line at which the three seconds were over.
+        /// The line at which the three seconds ended.
         line: u64,
         /// The check that failed.
         source: StaticError,
     },
-    /// The recording ends before three seconds without a gap were seen.
+    /// The recording has no three seconds without a gap.
     #[error("{path}: never holds 3 s without a gap, so static initialisation cannot finish")]
     NeverInitialised {
         /// The recording.
@@ -42,28 +43,28 @@ pub enum ReplayError {
     },
 }
 
-/// Holds the results of one row.
+/// The results of one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Index of the row in the recording.
     pub row: usize,
     /// The sample's time stamp.
     pub time: Micros,
-    /// Says whether the vehicle stands, by its wheels.
+    /// Whether the vehicle stands, by its wheels.
     pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
-    /// The navigation rate of this row's sample, which was sent some samples later; `None` before static initialisation
-    /// is over, and for the last samples, for which the drive ended too early.
+    /// The navigation rate of this row's sample, which is sent some samples later; `None` during static
+    /// initialisation and for the last samples of the drive.
     pub navigation: Option<YawEstimate>,
-    /// Gyro less static bias less the best estimate of the network, known some samples later; the prompt rate where
-    /// there is none.
+    /// The gyro less static bias less the network's settled estimate, which is known some samples later; the prompt
+    /// rate if there is no settled estimate.
     pub settled: AngularRate,
     /// The frames that were sent with this row, and those sent while the sensor was silent after it.
     pub frames: Vec<TimedFrame>,
 }
 
-/// Holds a drive with its corrected yaw rate.
+/// A drive with its corrected yaw rates.
 #[derive(Debug, Clone)]
 pub struct Replay {
     /// One step for each row that has a place on the grid.
@@ -72,20 +73,20 @@ pub struct Replay {
     pub start: usize,
     /// The gyro's static bias.
     pub gyro_bias: [AngularRate; 3],
-    /// The yaw that the navigation rates still carry at the end.
+    /// The carry of the navigation rates at the end: yaw that has not been sent yet.
     pub owed: Yaw,
     /// The event counters of the pipeline.
     pub counters: Counters,
-    /// Messages that reported "failed" because a value did not fit its signal.
+    /// Number of messages that reported "failed" because a value did not fit its signal.
     pub out_of_range: u32,
 }
 
 impl Replay {
-    /// Runs a recording; every window's estimate is delivered at once. `tick` is called once for each row. `wheels` are
-    /// used in place of the vehicle's bus.
+    /// Replays a recording; the estimate of each window is delivered without delay. `tick` is called for each row.
+    /// `wheels` replaces the vehicle's bus.
     ///
     /// # Errors
-    /// [`ReplayError`], when static initialisation does not succeed at its first attempt.
+    /// [`ReplayError`], if static initialisation does not succeed at its first attempt.
     pub fn run(
         recording: &Recording,
         config: &PipelineConfig,
@@ -107,17 +108,17 @@ impl Replay {
             if let Some(last) = steps.last_mut() {
                 let until = time.0.min(now.0 + SILENCE_US);
                 for look in (now.0 + LOOK_US..until).step_by(LOOK_US as usize) {
-                    // Time passes up to this row: a silent sensor is reported, and those messages precede this row's.
+                    // Time advances to this row; messages about a silent sensor precede the messages of this row.
                     let _ = coprocessor.poll(Micros(look));
                     last.frames.extend(std::iter::from_fn(|| coprocessor.next_frame()));
                 }
             }
             now = now.max(time);
             if let Some(frame) = wheels.as_mut().and_then(|wheels| wheels.next(row)) {
-                // A speed that no frame can hold is not valid, and counted.
+                // A speed that does not fit the frame is counted as not valid.
                 let _ = coprocessor.can(&frame, now);
             }
-            // A row whose time stamp has no place on the grid gives no frame, and is counted.
+            // A row whose time stamp does not fit the grid gives no frame and is counted.
             let Ok(observation) = coprocessor.imu(row.sample, now) else { continue };
             if let Some(source) = observation.refused {
                 let path = recording.path.clone();
@@ -168,7 +169,7 @@ impl Replay {
         self.steps[self.compared()].iter().filter_map(|step| step.navigation)
     }
 
-    /// Returns, for the compared steps, the gyro less static bias less the network's best estimate.
+    /// Returns the settled rates of the compared steps ([`Step::settled`]).
     pub fn settled(&self) -> impl Iterator<Item = AngularRate> {
         self.steps[self.compared()].iter().map(|step| step.settled)
     }
@@ -199,7 +200,7 @@ impl Replay {
     }
 }
 
-/// Finds the step of a sample, at most a few back.
+/// Returns the step of a recent sample.
 fn earlier(steps: &mut [Step], tick: u32) -> Option<&mut Step> {
     steps.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
 }
@@ -211,7 +212,7 @@ mod tests {
     use gyronet::model::{Estimate, SCALE_MIN};
     use std::fmt::Write;
 
-    /// Estimates that the gyro is always off by 100 codes.
+    /// A network that always estimates a gyro error of 100 codes.
     struct Constant;
 
     impl WindowNetwork for Constant {
@@ -224,7 +225,7 @@ mod tests {
         let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
         for k in 0..rows {
             let time = 0.01 * (k + usize::from(k >= gap_at)) as f64;
-            // Every axis flickers as a sensor does, with mean zero over three rows: equal readings are stuck ones.
+            // Every axis varies as a sensor's does, with mean zero over three rows: equal readings count as stuck.
             let noise = ((k % 3) as f64 - 1.0) / 8_192.0;
             let yaw_rate = yaw_rate(k) + noise;
             writeln!(text, "{time:.2},{noise},{noise},{},{noise},{noise},{yaw_rate}", 9.8 + 10.0 * noise)
@@ -237,15 +238,15 @@ mod tests {
     fn the_first_three_seconds_initialise() {
         let recording = recording(1_000, |_| 0.01, usize::MAX);
         let mut ticks = 0;
-        // Nothing ever moves here: zero-rate updates would undo the correction.
+        // The vehicle never moves, so zero-rate updates would undo the correction.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
         let drive = Replay::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
         assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
         assert_eq!(drive.gyro_bias[2], recording.rows[1].sample.angular_rate[2]);
-        // The corrections are freed of their constant part.
+        // The constant part of the corrections is removed.
         let sent: i64 = drive.navigation().map(|rate| i64::from(rate.rate.0)).sum();
         assert_eq!((drive.compared(), sent), (300..993, 0));
-        // The rest is the flicker of the last seven samples.
+        // What remains is the variation of the last seven samples.
         assert_eq!(drive.owed, Yaw(-(1 << 14)));
         let [(_, init), (_, degraded), (_, ready), (_, clipped)] = drive.status_counts();
         assert_eq!((init, clipped), (300, 0));
@@ -262,7 +263,8 @@ mod tests {
 
     #[test]
     fn silence_in_a_gap_is_reported_as_the_board_does() {
-        // Row 700 comes 100 ms late: sets without a rate from 25 ms after the last sample on, one each 10 ms.
+        // Row 700 arrives 100 ms after row 699: message sets without a rate from 25 ms after the last sample on,
+        // every 10 ms.
         let mut recording = recording(1_000, |_| 0.01, usize::MAX);
         for row in &mut recording.rows[700..] {
             row.sample.time.0 += 90_000;

@@ -1,19 +1,19 @@
-//! A vehicle file is a small TOML file that says how the sensor is mounted, what the wheels are, and which channels of the
-//! logs are which. `gyronet import` reads one and writes it beside the drive, as `drive.toml` beside `drive.csv`, where
-//! every command that reads the drive finds it.
+//! A vehicle file is a small TOML file with the mounting of the sensor, the dimensions of the wheels, and the names
+//! of the logs' channels. `gyronet import` reads one and writes it beside the drive, as `drive.toml` beside
+//! `drive.csv`, where every command that reads the drive finds it.
 //!
 //! ```toml
 //! [mounting]          # of the IMU: degrees about its axes, roll first
 //! yaw_deg = 90.0
-//! applied = false     # true: the rows of the drive are in the vehicle's axes already
+//! applied = false     # true: the rows of the drive are already in the vehicle's axes
 //! [wheels]
 //! radius_m = 0.31     # rolling radius
 //! track_m = 1.52      # distance between left and right
 //! front_left = "WHEELS.FL"
-//! [signals]           # where several channels fit
+//! [signals]           # needed if several channels fit
 //! imu = "/imu/data"
 //! position = "/gps/fix"
-//! [columns]           # of a text table: our name = theirs, with a unit
+//! [columns]           # of a text table: our name = name in the table, with a unit
 //! t_s = { name = "timestamp", unit = "ms" }
 //! ```
 
@@ -23,10 +23,10 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A wheel of the recorded car has this radius, m; another vehicle's stands in its vehicle file.
+/// Default rolling radius, m: that of the recorded car. The vehicle file gives another vehicle's.
 pub const RADIUS: f64 = 0.289;
 
-/// Describes a vehicle and the names in its logs.
+/// The contents of a vehicle file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Vehicle {
@@ -34,27 +34,27 @@ pub struct Vehicle {
     pub mounting: Mounting,
     /// The wheels and the signals of their speeds.
     pub wheels: Wheels,
-    /// The channels to take where several fit.
+    /// The channels to use if several fit.
     pub signals: Signals,
-    /// The bus.
+    /// The files that describe the CAN bus.
     pub bus: BusFiles,
     /// The columns of a text table.
     pub columns: Columns,
-    /// The file that it was read from.
+    /// The path of the vehicle file.
     #[serde(skip)]
     pub path: Option<PathBuf>,
 }
 
-/// Names of a table's columns, by ours.
+/// The columns of a text table, by our name of each column.
 pub type Columns = BTreeMap<String, Column>;
 
-/// A column.
+/// A column of a text table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// Its name in the file.
+    /// The name of the column in the file.
     pub name: String,
-    /// Its unit; without one it is SI.
+    /// The unit of the column; SI if absent.
     pub unit: Option<String>,
 }
 
@@ -62,53 +62,53 @@ pub struct Column {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mounting {
-    /// About x.
+    /// Angle about x.
     pub roll_deg: f64,
-    /// About y.
+    /// Angle about y.
     pub pitch_deg: f64,
-    /// About z.
+    /// Angle about z.
     pub yaw_deg: f64,
-    /// Says that the rows beside the file are in the vehicle's axes already.
+    /// The rows of the drive are already in the vehicle's axes.
     pub applied: bool,
 }
 
-/// The wheels.
+/// The dimensions of the wheels and the channels of their speeds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Wheels {
-    /// Rolling radius, m; speeds become rates of wheels by it.
+    /// Rolling radius, m; it converts speeds to wheel rates.
     pub radius_m: Option<f64>,
     /// Distance between the left and the right wheels, m.
     pub track_m: Option<f64>,
-    /// Channel of a wheel's speed.
+    /// Channel of the front left wheel's speed.
     pub front_left: Option<String>,
-    /// Channel of a wheel's speed.
+    /// Channel of the front right wheel's speed.
     pub front_right: Option<String>,
-    /// Channel of a wheel's speed.
+    /// Channel of the rear left wheel's speed.
     pub rear_left: Option<String>,
-    /// Channel of a wheel's speed.
+    /// Channel of the rear right wheel's speed.
     pub rear_right: Option<String>,
 }
 
-/// The channels to take where several fit.
+/// The channels to use if several fit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Signals {
-    /// Gyro and accelerometer.
+    /// Channel of the gyro and accelerometer.
     pub imu: Option<String>,
-    /// Odometry, whose speed stands in for the wheels.
+    /// Channel of the odometry, whose speed replaces the wheels.
     pub odometry: Option<String>,
-    /// GNSS.
+    /// Channel of the GNSS position.
     pub position: Option<String>,
-    /// A yaw rate to be the reference, `ref_gyr_z`: a better gyro's, never that of the IMU itself.
+    /// Channel of the reference yaw rate, `ref_gyr_z`: that of a better gyro, never of the IMU itself.
     pub reference_rate: Option<String>,
 }
 
-/// Files that say what is on the bus.
+/// The files that describe the CAN bus.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BusFiles {
-    /// The DBC file, from the vehicle file's folder if relative.
+    /// The DBC file; a relative path starts at the vehicle file's folder.
     pub dbc: Option<PathBuf>,
 }
 
@@ -128,13 +128,13 @@ impl Vehicle {
         Ok(vehicle)
     }
 
-    /// Returns the place of the vehicle file of a drive.
+    /// Returns the path of a drive's vehicle file.
     #[must_use]
     pub fn beside(drive: &Path) -> PathBuf {
         drive.with_extension("toml")
     }
 
-    /// Reads the vehicle file of a drive; without one nothing is known of the vehicle.
+    /// Reads the vehicle file of a drive; returns the defaults if there is none.
     ///
     /// # Errors
     /// [`DataError`].
@@ -143,7 +143,7 @@ impl Vehicle {
         if path.is_file() { Self::read(&path) } else { Ok(Self::default()) }
     }
 
-    /// Forgets the names of channels, columns and files.
+    /// Returns the vehicle without the names of channels, columns and bus files.
     #[must_use]
     pub fn without_names(self) -> Self {
         let Wheels { radius_m, track_m, .. } = self.wheels;
@@ -151,7 +151,7 @@ impl Vehicle {
         Self { mounting: self.mounting, wheels, path: self.path, ..Self::default() }
     }
 
-    /// Returns the rolling radius of the wheels, m; where none is known, that of the recorded car.
+    /// Returns the rolling radius of the wheels, m; [`RADIUS`] if the file gives none.
     #[must_use]
     pub fn radius_m(&self) -> f64 {
         self.wheels.radius_m.unwrap_or(RADIUS)
@@ -160,7 +160,7 @@ impl Vehicle {
     /// Parses the text of a vehicle file.
     ///
     /// # Errors
-    /// [`DataError`], for an unknown key too.
+    /// [`DataError`], also for an unknown key.
     pub fn parse(path: &str, text: &str) -> Result<Self, DataError> {
         let error = |reason: String| DataError::of(path, DataFault::Vehicle { reason });
         let vehicle: Self = toml::from_str(text).map_err(|cause| {
@@ -169,19 +169,19 @@ impl Vehicle {
         })?;
         for (name, length) in [("radius_m", vehicle.wheels.radius_m), ("track_m", vehicle.wheels.track_m)] {
             if length.is_some_and(|length| !(0.01..10.0).contains(&length)) {
-                return Err(error(format!("wheels.{name} should be 0.01 to 10 m")));
+                return Err(error(format!("wheels.{name} must be 0.01 to 10 m")));
             }
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg, .. } = vehicle.mounting;
         if [roll_deg, pitch_deg, yaw_deg].iter().any(|angle| angle.is_nan() || angle.abs() > 360.0) {
-            return Err(error("mounting should be angles of at most 360 degrees".to_owned()));
+            return Err(error("the angles of mounting must be at most 360 degrees".to_owned()));
         }
         Ok(vehicle)
     }
 }
 
 impl Mounting {
-    /// Returns the rotation that the rows of a drive still need, as the board computes it; `None` where they need none.
+    /// Returns the rotation that the rows of a drive still need, as the board computes it; `None` if they need none.
     #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         let [roll, pitch, yaw] = [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle as f32);
@@ -189,7 +189,7 @@ impl Mounting {
         (!self.applied && rotation != Rotation::IDENTITY).then_some(rotation)
     }
 
-    /// Turns a vector from the sensor's axes to the vehicle's, unless that is done.
+    /// Rotates a vector from the sensor's axes to the vehicle's, unless the rows are already in the vehicle's axes.
     #[must_use]
     pub fn turn(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         if self.applied {
@@ -228,6 +228,6 @@ mod tests {
         let error = Vehicle::parse("car.toml", "[wheels]\nradius = 0.3\n").unwrap_err().to_string();
         assert!(error.starts_with("car.toml: ") && error.contains("unknown field `radius`"), "{error}");
         let error = Vehicle::parse("car.toml", "[wheels]\nradius_m = 30\n").unwrap_err().to_string();
-        assert_eq!(error, "car.toml: no vehicle file: wheels.radius_m should be 0.01 to 10 m");
+        assert_eq!(error, "car.toml: not a valid vehicle file: wheels.radius_m must be 0.01 to 10 m");
     }
 }

@@ -1,5 +1,4 @@
-//! This module makes the frames of a vehicle's bus from wheel speeds: those of a recorded drive, or of any other
-//! vehicle.
+//! This module creates wheel speed CAN frames, of a recorded drive or of given speeds.
 
 use crate::drive::recording::{Recording, Row, WHEEL_STANDS};
 use embedded_can::{Frame, StandardId};
@@ -7,43 +6,43 @@ use gyronet::can::DataFrame;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::sample::WHEELS;
 
-/// Gives for each place of [`gyronet::sample::WheelSample::speeds`] the recorded wheel (front right, rear right, front
-/// left, rear left).
+/// Index in [`gyronet::sample::WheelSample::speeds`] of each recorded wheel (front right, rear right, front left,
+/// rear left).
 const PLACES: [usize; WHEELS] = [1, 3, 0, 2];
 const FRONT: [usize; 2] = [0, 2];
 const REAR: [usize; 2] = [1, 3];
-/// A frame is sent every so many rows: 20 ms.
+/// Rows from one frame to the next: 20 ms.
 pub const FRAME_ROWS: usize = 2;
-/// A wheel without a new rate is silent after this many rows: 100 ms.
+/// Rows without a new rate after which a wheel is silent: 100 ms.
 const SILENT_ROWS: usize = 10;
 
-/// Returns the receiver of these frames, as the image has it.
+/// Returns the receiver of these frames, with the same settings as in the image.
 ///
 /// # Panics
-/// Never: the settings come with the library.
+/// Never: the settings are constants of the library.
 #[must_use]
 pub fn receiver() -> WheelReceiver {
     WheelReceiver::new(WheelSettings::TOYOTA).expect("settings that come with the library")
 }
 
-/// Makes the frame of four wheel speeds in km/h (front left, front right, rear left, rear right), in the layout of
-/// [`WheelSettings::TOYOTA`]; `None` if one is not known.
+/// Encodes four wheel speeds in km/h (front left, front right, rear left, rear right) as a frame in the layout of
+/// [`WheelSettings::TOYOTA`]; `None` if one is unknown.
 #[must_use]
 pub fn frame([front_left, front_right, rear_left, rear_right]: [Option<f64>; WHEELS]) -> Option<DataFrame> {
     let mut data = [0; 8];
     for (bytes, speed) in data.chunks_exact_mut(2).zip([front_right, front_left, rear_right, rear_left]) {
-        // 0.01 km/h from -67.67.
+        // Units of 0.01 km/h, offset -67.67 km/h.
         bytes.copy_from_slice(&((libm::round((speed? + 67.67) * 100.0)) as u16).to_be_bytes());
     }
     DataFrame::new(StandardId::new(0xAA)?, &data)
 }
 
-/// Makes the wheel frames of one recorded drive.
+/// An encoder of the wheel frames of one recorded drive.
 #[derive(Debug, Clone)]
 pub struct WheelFrames {
-    /// The recorded wheel used for each place: its own, or another if that was not recorded.
+    /// The recorded wheel that each wheel's speed is taken from: the wheel itself, or another if it was not recorded.
     source: [usize; WHEELS],
-    /// The newest speed of each recorded wheel in km/h, and the row that it came with.
+    /// The newest speed of each recorded wheel in km/h, and its row number.
     newest: [Option<(f64, usize)>; WHEELS],
     row: usize,
     /// Rolling radius, m.
@@ -51,7 +50,7 @@ pub struct WheelFrames {
 }
 
 impl WheelFrames {
-    /// Begins before the first row; `None` where the recording has no wheels.
+    /// Creates the encoder, before the first row; `None` if the recording has no wheels.
     #[must_use]
     pub fn new(recording: &Recording) -> Option<Self> {
         let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
@@ -65,8 +64,8 @@ impl WheelFrames {
         Some(Self { source, newest: [None; WHEELS], row: 0, radius: recording.vehicle.radius_m() })
     }
 
-    /// Takes a row and returns the known speed of each wheel in km/h. A wheel that turns too slowly to be distinguished
-    /// from a standing one shows zero, as passive sensors do.
+    /// Advances by a row and returns the known speed of each wheel in km/h. A wheel that turns too slowly to be told
+    /// from a standing one reads zero, as with passive sensors.
     pub fn speeds(&mut self, row: &Row) -> [Option<f64>; WHEELS] {
         for (newest, rate) in self.newest.iter_mut().zip(row.wheels) {
             let shown = |rate: f64| if rate.abs() > WHEEL_STANDS { rate.abs() } else { 0.0 };
@@ -78,7 +77,7 @@ impl WheelFrames {
             .map(|wheel| self.newest[wheel].filter(|(_, at)| now - at < SILENT_ROWS).map(|(speed, _)| speed))
     }
 
-    /// Takes a row and returns its frame: one with every [`FRAME_ROWS`]th row, if all wheels are known.
+    /// Advances by a row and returns its frame: one every [`FRAME_ROWS`] rows, if all wheels are known.
     pub fn next(&mut self, row: &Row) -> Option<DataFrame> {
         let is_due = self.row.is_multiple_of(FRAME_ROWS);
         let speeds = self.speeds(row);
@@ -86,18 +85,18 @@ impl WheelFrames {
     }
 }
 
-/// Holds the speed of the vehicle at each row of a recording, for dead reckoning.
+/// The speed of the vehicle at each row of a recording, for dead reckoning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Speeds {
-    /// The number of wheels that the speed is the mean of.
+    /// The number of wheels that are averaged.
     pub wheels: usize,
     /// The speed at each row, m/s, forward positive; a wheel keeps its last known rate.
     pub metre_per_sec: Vec<f64>,
 }
 
 impl Speeds {
-    /// Computes the mean speed of the rear wheels, which do not steer, or of the front ones if no rear one is recorded;
-    /// `None` if the recording has no wheels.
+    /// Computes the mean speed of the rear wheels, which do not steer, or else of the front ones; `None` if the
+    /// recording has no wheels.
     #[must_use]
     pub fn new(recording: &Recording) -> Option<Self> {
         let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
@@ -163,7 +162,7 @@ mod tests {
     #[test]
     fn a_silent_wheel_is_not_still() {
         let seen = standstills(|k| if k < 400 { "0" } else { "" }.into());
-        // The last frame comes 0.1 s after the wheel's last rate, and is good for 0.1 s itself.
+        // The last frame is sent 0.1 s after the wheel's last rate, and is valid for 0.1 s.
         assert_eq!((seen[399], seen[425]), (Standstill::Still, Standstill::Unknown));
     }
 }

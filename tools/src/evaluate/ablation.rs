@@ -1,5 +1,5 @@
-//! This module measures the worth of each part of the compensation: the error of the navigation rate with one
-//! configuration after another, all of which the board can run.
+//! This module measures what each part of the compensation contributes. It computes the error of the navigation rate
+//! with different configurations, all of which the board can run.
 
 use crate::drive::recording::Recording;
 use crate::drive::replay::{Replay, ReplayError, Step};
@@ -14,16 +14,16 @@ use gyronet::sample::Standstill;
 use gyronet::units::AngularRate;
 use serde::Serialize;
 
-/// Holds a configuration and its name.
+/// A configuration to compare.
 #[derive(Debug, Clone)]
 pub struct Variant {
     /// The name in tables.
     pub name: String,
     /// The configuration.
     pub config: PipelineConfig,
-    /// Says whether windows go through the network; otherwise its corrections are zero.
+    /// Whether the network runs; otherwise the corrections are zero.
     pub network: bool,
-    /// Says whether the vehicle's bus has wheel speeds.
+    /// Whether the vehicle's bus has wheel speeds.
     pub wheels: bool,
 }
 
@@ -33,18 +33,18 @@ impl Variant {
     }
 }
 
-/// Stands in for a network and corrects nothing.
+/// A network whose corrections are zero.
 pub(crate) struct Uncorrected;
 
 impl WindowNetwork for Uncorrected {
     fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
         let corrections = [AngularRate::ZERO; gyronet::model::window::WINDOW];
-        // The scale is 1e-3 rad/s: with it a second's sigma is that of an uncorrected rate.
+        // A scale of 1e-3 rad/s gives a second the sigma of an uncorrected rate.
         Estimate { corrections, scale: AngularRate(134_218), ..Estimate::NONE }
     }
 }
 
-/// Returns the default configuration in another mode.
+/// Returns the default configuration with another mode.
 fn with_mode(mode: Mode) -> PipelineConfig {
     let compensate = CompensateConfig { mode, ..CompensateConfig::DEFAULT };
     PipelineConfig { compensate, ..PipelineConfig::DEFAULT }
@@ -56,7 +56,7 @@ pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
     PipelineConfig { compensate, ..config }
 }
 
-/// Returns a variant for each part of the compensation.
+/// Returns the variants that show the parts of the compensation.
 #[must_use]
 pub fn parts() -> Vec<Variant> {
     let alone = |config| PipelineConfig { zero_rate: None, ..config };
@@ -86,35 +86,34 @@ pub fn lags() -> Vec<Variant> {
         .collect()
 }
 
-/// Holds the score of one variant, on one drive or as a mean.
+/// The score of one variant, on one drive or as a mean over drives.
 #[derive(Debug, Clone, Serialize)]
 pub struct Score {
     /// The variant's name.
     pub name: String,
-    /// Its yaw error.
+    /// The yaw error.
     #[serde(flatten)]
     pub error: YawError,
     /// RMS error of a sample, rad/s.
     pub rms_rad_per_s: f64,
-    /// Shares of the 1 s errors inside one, two and three sigma.
+    /// Shares of the 1 s errors within one, two and three sigma.
     pub inside_sigma: [f64; 3],
     /// Mean sigma of a second, rad.
     pub sigma_rad: f64,
 }
 
-/// Holds the reference's own error in whole seconds in which the wheels stand; smaller errors cannot be measured with
-/// it.
+/// The error of the reference itself in whole seconds in which the wheels stand. Smaller errors cannot be measured.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Floor {
-    /// Whole seconds.
+    /// Number of whole seconds.
     pub seconds: usize,
-    /// Mean absolute yaw change of one, rad.
+    /// Mean absolute yaw change in one second, rad.
     pub mean_1s_rad: f64,
-    /// Mean rate over all, rad/s.
+    /// Mean rate over all seconds, rad/s.
     pub bias_rad_per_s: f64,
 }
 
-/// Runs variants over one drive.
+/// Runs the variants on one drive; `tick` is called for each row of each run.
 ///
 /// # Errors
 /// [`ReplayError`].
@@ -145,7 +144,7 @@ pub fn run(
         .collect()
 }
 
-/// Returns the means over drives, each counting the same; `None` without drives.
+/// Returns the means over drives with equal weights; `None` without drives.
 #[must_use]
 pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
     let first = drives.first()?;
@@ -165,7 +164,7 @@ pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
     (0..first.len()).map(of).collect()
 }
 
-/// Returns the reference's error while the wheels stand; `None` without wheels, or where they never stand.
+/// Returns the reference's error while the wheels stand; `None` if the drive has no wheels or they never stand.
 #[must_use]
 pub fn floor(recording: &Recording) -> Option<Floor> {
     let wheels = Some(WheelFrames::new(recording)?);

@@ -1,4 +1,4 @@
-//! The cost of a method is its multiplications and its delay, computed from its structure.
+//! This module computes the cost of a method, its multiplications and its delay, from its structure.
 
 use super::fir::LowPass;
 use super::methods::Method;
@@ -9,7 +9,7 @@ use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::sample::PERIOD_US;
 use serde::Serialize;
 
-/// Holds the cost of one sample, without the work that is done once a second at standstill.
+/// The cost of one sample, without the work that is done once a second at standstill.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cost {
     /// Multiplications per sample.
@@ -18,7 +18,7 @@ pub struct Cost {
     pub delay_ms: u64,
 }
 
-/// Holds the shapes of the networks.
+/// The shapes of the networks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shapes {
     /// GyroNet in f32.
@@ -48,7 +48,7 @@ impl Cost {
             Method::GYRONET_INT => (windows(shapes.integer), settled),
             Method::PROMPT => (windows(shapes.sent), 0),
             Method::NAVIGATION => (windows(shapes.sent), lag.samples()),
-            // The gyro, less a bias.
+            // The other methods only subtract a bias from the gyro.
             _ => (0.0, 0),
         };
         Self { multiplications_per_sample, delay_ms: samples as u64 * PERIOD_US / 1_000 }

@@ -1,13 +1,13 @@
-//! This module is the classical baseline: a low pass of linear phase after static initialisation.
+//! This module is the classical baseline: a linear-phase low pass after static initialisation.
 //!
-//! It is a Hamming window over a sinc. Its delay of half its length is compensated, as that of the navigation rate is,
-//! so it shows what smoothing alone gains with the same inputs and no more delay. Length and corner are the best ones
-//! on the training drives (`host-tests/tests/tools/fir_choice.rs` compares them with a grid).
+//! The filter is a sinc with a Hamming window. Its delay of half its length is compensated, as that of the navigation
+//! rate is. So it shows what smoothing alone gains with the same inputs and no more delay. Length and corner
+//! frequency are the best on the training drives (`host-tests/tests/tools/fir_choice.rs` compares them with a grid).
 
 use gyronet::sample::RATE_HZ;
 use std::f64::consts::PI;
 
-/// Filters with a symmetric low pass with an odd number of taps.
+/// A symmetric low pass with an odd number of taps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LowPass {
     /// The taps, with a sum of 1.
@@ -15,23 +15,23 @@ pub struct LowPass {
 }
 
 impl LowPass {
-    /// The chosen filter has this many samples before and after the one in the middle.
+    /// Taps of the chosen filter on either side of the middle one.
     pub const HALF: usize = 5;
-    /// The chosen filter has this corner frequency, Hz.
+    /// Corner frequency of the chosen filter, Hz.
     pub const CORNER_HZ: f64 = 5.0;
 
-    /// Makes the filter that the tables use.
+    /// Creates the filter that the tables use.
     #[must_use]
     pub fn chosen() -> Self {
         Self::new(Self::HALF, Self::CORNER_HZ)
     }
 
-    /// Makes a filter over `half` samples on either side.
+    /// Creates a filter with `half` taps on either side of the middle one.
     #[must_use]
     pub fn new(half: usize, corner_hz: f64) -> Self {
         let tap = |k: usize| {
             let from_middle = k as f64 - half as f64;
-            // The window's ends would lie one sample outside.
+            // The window ends one sample beyond the first and the last tap.
             let window = 0.54 + 0.46 * (PI * from_middle / (half + 1) as f64).cos();
             let phase = 2.0 * PI * corner_hz / f64::from(RATE_HZ) * from_middle;
             window * if phase == 0.0 { 1.0 } else { phase.sin() / phase }
@@ -47,7 +47,7 @@ impl LowPass {
         self.taps.len() / 2
     }
 
-    /// Returns the multiplications of a sample: samples with the same tap are added first.
+    /// Returns the multiplications per sample, when samples with equal taps are added first.
     #[must_use]
     pub fn multiplications(&self) -> usize {
         self.taps.len() / 2 + 1
@@ -82,7 +82,7 @@ mod tests {
         );
     }
 
-    /// A sine of 1 Hz comes out smaller but not later.
+    /// A sine of 1 Hz is attenuated but not delayed.
     #[test]
     fn a_sine_lines_up_with_its_input() {
         let sine = |shift: f64| -> Vec<f64> {

@@ -1,30 +1,30 @@
-//! This module computes the heading error of a yaw rate over 1 s, 10 s, 60 s and a whole drive, against a reference of
-//! either kind.
+//! This module computes the heading error of a yaw rate over 1 s, 10 s, 60 s and a whole drive, against a reference
+//! yaw rate or a course.
 //!
-//! A yaw rate as reference gives every figure. A course over ground (GNSS) is the direction of travel, not the heading:
-//! latency, side slip and noise give it errors of 0.05 to 0.1 rad from one second to the next. So errors against it are
-//! medians of 10 s, which still scatter by 0.02 rad: it cannot judge 1 s and 10 s, and those figures stay empty.
+//! A reference yaw rate gives every figure. A course over ground (GNSS) is the direction of travel, not the heading:
+//! latency, side slip and noise give it errors of 0.05 to 0.1 rad from one second to the next. So errors against a
+//! course are medians over 10 s, which still scatter by 0.02 rad. A course cannot judge 1 s and 10 s.
 
 use super::metrics::{integral, wrap};
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 
-/// A second has this many samples.
+/// Samples per second.
 const SECOND: usize = RATE_HZ as usize;
-/// The error against a course is a median over this many seconds.
+/// Seconds over which the median of the error against a course is taken.
 pub const BLOCK_S: usize = 10;
-/// A median needs at least this many values of the course.
+/// Fewest values of the course for a median.
 const BLOCK_VALUES: usize = 3;
-/// Both headings are aligned at their median over this many seconds of known course.
+/// Seconds of known course over whose median both headings are aligned.
 const ALIGNED_S: usize = 20;
-/// Largest median error of [`HeadingErrorSeries::typical_10s`] that any bias can explain, rad.
+/// Largest [`HeadingErrorSeries::typical_10s`] that a bias can explain, rad.
 pub const PLAUSIBLE_10S_RAD: f64 = 0.5;
 
-/// Holds the truth that a drive has.
+/// The reference of a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reference {
-    /// The yaw rate of each sample, rad/s (`ref_gyr_z`).
+    /// The true yaw rate of each sample, rad/s (`ref_gyr_z`).
     Rate(Vec<f64>),
     /// The course of some samples, rad to the left (`ref_yaw`).
     Course(Vec<Option<f64>>),
@@ -40,7 +40,7 @@ impl Reference {
         }
     }
 
-    /// Returns the yaw rates, where it has them.
+    /// Returns the yaw rates; `None` for a course.
     #[must_use]
     pub fn rate(&self) -> Option<&[f64]> {
         match self {
@@ -49,8 +49,8 @@ impl Reference {
         }
     }
 
-    /// Returns the error of a yaw rate, sample by sample; `None` where there is less than a second, or less than
-    /// 20 s of course.
+    /// Returns the heading error of an estimated yaw rate over time; `None` for less than a second of yaw rate or
+    /// less than 20 s of course.
     #[must_use]
     pub fn errors(&self, estimate: &[f64]) -> Option<HeadingErrorSeries> {
         match self {
@@ -60,27 +60,27 @@ impl Reference {
     }
 }
 
-/// Holds the heading error over a drive.
+/// The heading error over a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadingErrorSeries {
     /// Seconds from one error to the next.
     step_s: usize,
     /// The shortest window that the reference can judge, s.
     shortest_s: usize,
-    /// The errors, rad; `None` where the reference is not known.
+    /// The errors, rad; `None` while the reference is unknown.
     errors: Vec<Option<f64>>,
     /// The error at the end, rad.
     last: f64,
 }
 
-/// Holds the figures of a heading error; `None` where the reference cannot give one, or the drive is too short.
+/// The figures of a heading error; `None` if the reference cannot give a figure, or the drive is too short for it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct HeadingError {
-    /// Mean over windows of 1 s, a new one every second, of the absolute error of the change of heading.
+    /// Mean absolute error of the heading change over 1 s; a window starts every second.
     pub mean_1s_rad: Option<f64>,
-    /// The same over 10 s.
+    /// Mean absolute error of the heading change over 10 s.
     pub mean_10s_rad: Option<f64>,
-    /// The same over 60 s.
+    /// Mean absolute error of the heading change over 60 s.
     pub mean_60s_rad: Option<f64>,
     /// RMS of the error over the drive.
     pub rms_rad: Option<f64>,
@@ -105,14 +105,14 @@ impl HeadingErrorSeries {
         }
     }
 
-    /// Returns the median absolute change of the error in 10 s, rad: large where rate and reference do not belong
-    /// together, by sign, unit or drive.
+    /// Returns the median absolute change of the error in 10 s, rad. It is large if rate and reference differ in sign
+    /// or unit, or are not from the same drive.
     #[must_use]
     pub fn typical_10s(&self) -> Option<f64> {
         median(self.changes(10).map(f64::abs).collect())
     }
 
-    /// Returns the changes of the error over windows that begin with each step.
+    /// Returns the changes of the error over windows of this length, one from each step.
     fn changes(&self, seconds: usize) -> impl Iterator<Item = f64> {
         let later = self.errors.iter().skip(seconds / self.step_s);
         self.errors.iter().zip(later).filter_map(|(from, to)| Some((*to)? - (*from)?))
@@ -120,7 +120,7 @@ impl HeadingErrorSeries {
 }
 
 impl HeadingError {
-    /// Returns the figure by which methods are compared: that over 1 s, or over the drive where there is none.
+    /// Returns the figure by which methods are compared: the 1 s error, or the RMS over the drive if there is none.
     #[must_use]
     pub fn compared(&self) -> Option<f64> {
         self.mean_1s_rad.or(self.rms_rad)
@@ -164,8 +164,8 @@ fn against_course(estimate: &[f64], course: &[Option<f64>]) -> Option<HeadingErr
     enough.then_some(HeadingErrorSeries { step_s: BLOCK_S, shortest_s: 6 * BLOCK_S, errors, last })
 }
 
-/// Returns the integral of a yaw rate less the course, where that is known. The difference is unwrapped and not the
-/// course, because it changes slowly however the vehicle turns while the course is not known.
+/// Returns the integral of a yaw rate less the course, where the course is known. The difference is unwrapped instead
+/// of the course, because the difference changes slowly even if the vehicle turns while the course is unknown.
 #[must_use]
 pub fn off_course(estimate: &[f64], course: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut last = None;
@@ -178,7 +178,7 @@ pub fn off_course(estimate: &[f64], course: &[Option<f64>]) -> Vec<Option<f64>> 
     integral(estimate).into_iter().zip(course).map(off).collect()
 }
 
-/// Returns the median of each block of [`BLOCK_S`] seconds; `None` where too few values are known.
+/// Returns the median of each block of [`BLOCK_S`] seconds; `None` if too few values are known.
 pub fn medians(off: &[Option<f64>]) -> impl Iterator<Item = Option<f64>> {
     off.chunks(BLOCK_S * SECOND).map(|block| {
         let values: Vec<f64> = block.iter().flatten().copied().collect();
@@ -186,8 +186,8 @@ pub fn medians(off: &[Option<f64>]) -> impl Iterator<Item = Option<f64>> {
     })
 }
 
-/// Returns the bias that a gyro has had over a drive, by the line through its heading less the course, rad/s; `None`
-/// where less than 20 s of course are known.
+/// Returns the mean bias of a gyro over a drive, rad/s: the slope of its heading less the course. Returns `None` if
+/// less than 20 s of course are known.
 #[must_use]
 pub fn bias_by_course(gyro: &[f64], course: &[Option<f64>]) -> Option<f64> {
     let off = off_course(gyro, course);
@@ -239,8 +239,8 @@ mod tests {
         assert_eq!(Reference::Rate(vec![0.0; 200]).errors(&[0.0; 199]), None);
     }
 
-    /// Two minutes in circles, with a course every second that is wrapped, starts anywhere, misses half a minute and
-    /// has outliers; the gyro is off by 0.001 rad/s.
+    /// The vehicle drives in circles for two minutes. The course of each second is wrapped, has an arbitrary zero, a
+    /// gap of half a minute and outliers; the gyro is off by 0.001 rad/s.
     #[test]
     fn the_error_against_a_course_is_found() {
         let (turn, bias) = (0.5, 0.001);

@@ -1,29 +1,29 @@
-//! This module lists the methods of computing a yaw rate that are compared with each other, with one set of names for
-//! the tables of drives and for the paper's.
+//! This module lists the compared methods of computing a yaw rate, with one set of names for the tables of drives and
+//! for the paper's tables.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// Names the gyro that a method starts from.
+/// The gyro that a method starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gyro {
     /// The gyro of the inertial sensor.
     Mems,
     /// The fibre-optic gyro.
     Fog,
-    /// The wheels alone, without a gyro.
+    /// No gyro: the wheels alone.
     Wheels,
-    /// That of another program, whose trajectory is given.
+    /// The gyro of another program, whose trajectory is given.
     Given,
 }
 
-/// Names a method of computing a yaw rate.
+/// A method of computing a yaw rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Method {
     /// The name in JSON.
     pub key: &'static str,
     /// The name in tables.
     pub name: &'static str,
-    /// The gyro that it starts from.
+    /// The gyro that the method starts from.
     pub gyro: Gyro,
 }
 
@@ -36,64 +36,64 @@ const fn fog(key: &'static str, name: &'static str) -> Method {
 }
 
 impl Method {
-    /// Returns a method of another program. Its name lives as long as this one: a command line has few.
+    /// Returns the method of another program. The name is leaked; a command line has only a few.
     #[must_use]
     pub fn given(name: &str) -> Self {
         let name = String::leak(name.to_owned());
         Self { key: name, name, gyro: Gyro::Given }
     }
 
-    /// The inertial sensor's gyro as it is.
+    /// The inertial sensor's gyro without any correction.
     pub const RAW: Self = mems("raw", "raw gyro");
     /// The gyro less its mean over the first 3 s.
     pub const STATIC: Self = mems("static", "static initialisation");
     /// The pipeline without a network: static initialisation and zero-rate updates.
     pub const STATIC_ZERO_RATE: Self = mems("static_zero_rate", "static, zero-rate updates");
-    /// Static initialisation and a low pass ([`crate::evaluate::fir`]), its delay compensated.
+    /// Static initialisation and a low pass ([`crate::evaluate::fir`]) whose delay is compensated.
     pub const FIR: Self = mems("fir", "FIR low pass");
     /// Static initialisation, zero-rate updates and the same low pass.
     pub const FIR_ZERO_RATE: Self = mems("fir_zero_rate", "FIR, zero-rate updates");
     /// Static initialisation and the linear window ([`gyronet::model::weights::DEFAULT`]): the mean of both
     /// windows over each sample, which is known 110 ms later.
     pub const LINEAR: Self = mems("linear", "linear window");
-    /// The same with the paper's GyroNet in f32.
+    /// The same as [`Method::LINEAR`] with the paper's GyroNet in f32.
     pub const GYRONET_F32: Self = mems("gyronet_f32", "GyroNet, f32");
-    /// The same with the paper's GyroNet in integers.
+    /// The same as [`Method::LINEAR`] with the paper's GyroNet in integers.
     pub const GYRONET_INT: Self = mems("gyronet_int", "GyroNet, integer");
-    /// The rate that the board sends at once: Bosch TX1, VDC2.
+    /// The prompt rate, which the board sends at once: Bosch TX1, VDC2.
     pub const PROMPT: Self = mems("prompt", "sent at once");
-    /// The rate that the board sends in its own yaw messages, some samples later.
+    /// The navigation rate, which the board sends in its own yaw messages, some samples later.
     pub const NAVIGATION: Self = mems("default", "sent for navigation");
-    /// The well-known orientation filter VQF ([`crate::evaluate::vqf`]). On a drive it starts from static
-    /// initialisation; in the paper's tables it stands in for the vendor's filter and finds the bias itself.
+    /// The orientation filter VQF ([`crate::evaluate::vqf`]). On a drive it starts from static initialisation; in the
+    /// paper's tables it replaces the vendor's filter and estimates the bias itself.
     pub const VQF: Self = mems("vqf", "VQF filter");
-    /// The same filter, with limits of rest that a shaking vehicle keeps.
+    /// VQF with wider limits of rest, for a vehicle that vibrates at standstill.
     pub const VQF_VEHICLE: Self = mems("vqf_vehicle", "VQF filter, vehicle's limits of rest");
     /// The vendor's own heading.
     pub const VENDOR: Self = mems("vendor", "vendor's filter");
     /// GyroNet alone, integer, settled estimates.
     pub const GYRONET: Self = mems("gyronet", "GyroNet");
-    /// GyroNet alone, the rate that is sent at once.
+    /// GyroNet alone, prompt rate.
     pub const GYRONET_ONLINE: Self = mems("gyronet_online", "GyroNet, sent at once");
-    /// GyroNet with zero-rate updates behind it: the rate that is sent for navigation.
+    /// GyroNet followed by zero-rate updates, navigation rate.
     pub const GYRONET_LOOP: Self = mems("gyronet_loop", "GyroNet with the bias loop");
-    /// The fibre-optic gyro as it is.
+    /// The fibre-optic gyro without any correction.
     pub const FOG: Self = fog("fog", "FoG");
-    /// The fibre-optic gyro less the Earth's rate at the place's latitude.
+    /// The fibre-optic gyro less the Earth's rate at the latitude of the sequence.
     pub const FOG_EARTH: Self = fog("fog_earth", "FoG less Earth rate");
-    /// The fibre-optic gyro as the board sends it by default: less the Earth's rate, and less the bias that it has shown
-    /// at standstills.
+    /// The fibre-optic gyro as the board sends it by default: less the Earth's rate and the bias at standstills.
     pub const FOG_DEFAULT: Self = fog("fog_default", "FoG, default lane");
-    /// FoGNet on the rate of [`Method::GYRONET_LOOP`], in the place of a fibre-optic gyro: the paper's future work.
-    /// FoGNet was not trained on such rates.
+    /// FoGNet on the rate of [`Method::GYRONET_LOOP`] instead of a fibre-optic gyro: the paper's future work. FoGNet
+    /// was not trained on such rates.
     pub const PSEUDO_FOG: Self = mems("pseudo_fog", "FoGNet on GyroNet's rate");
-    /// The turn by the difference of the wheels' ways and their distance.
+    /// The yaw rate from the travel difference of the left and right wheels over the track.
     pub const WHEELS: Self = Self { key: "wheels", name: "wheels alone", gyro: Gyro::Wheels };
-    /// The fibre-optic gyro and the wheels with four numbers fitted to training sequences ([`crate::paper::tables::joint`]).
+    /// The fibre-optic gyro and the wheels with four numbers fitted to training sequences
+    /// ([`crate::paper::tables::joint`]).
     pub const FOG_WHEELS: Self = fog("fog_wheels", "FoG and wheels, fitted");
-    /// FoGNet, its first minute padded.
+    /// FoGNet; the first minute is padded.
     pub const FOGNET: Self = fog("fognet", "FoGNet");
-    /// FoGNet, its first minute uncorrected.
+    /// FoGNet; the first minute is uncorrected.
     pub const FOGNET_NOPAD: Self = fog("fognet_nopad", "FoGNet, no padding");
 
     /// The methods of one drive, in the order of its table.
@@ -137,7 +137,7 @@ impl Method {
         [Self::RAW, Self::STATIC, Self::STATIC_ZERO_RATE, Self::FIR, Self::FIR_ZERO_RATE, Self::VQF];
 }
 
-/// Holds a value for each method of a drive.
+/// A value for each method of [`Method::ON_A_DRIVE`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PerMethod<T>([T; Method::ON_A_DRIVE.len()]);
 
@@ -159,7 +159,7 @@ impl<T> PerMethod<T> {
 }
 
 impl<T: Copy> PerMethod<Option<T>> {
-    /// Returns all values, or `None` where one is missing.
+    /// Returns all values, or `None` if one is missing.
     pub fn all(self) -> Option<PerMethod<T>> {
         let values: Option<Vec<T>> = self.0.into_iter().collect();
         values?.try_into().ok().map(PerMethod)

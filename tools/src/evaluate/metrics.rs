@@ -5,25 +5,25 @@ use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// One window of [`YawError::mean_1s_rad`] has this many samples.
+/// Samples of a window of [`YawError::mean_1s_rad`].
 pub const WINDOW: usize = RATE_HZ as usize;
 
-/// Holds the yaw error of one method on one drive.
+/// The yaw error of one method on one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct YawError {
-    /// Mean over consecutive 1 s windows, none overlapping another, of the absolute error of
-    /// the yaw change. An incomplete last window does not count.
+    /// Mean absolute error of the yaw change over consecutive, non-overlapping 1 s windows. An incomplete window does
+    /// not count.
     pub mean_1s_rad: f64,
     /// Absolute error of the yaw at the end, wrapped to at most pi.
     pub final_rad: f64,
-    /// The absolute error of the yaw at the end, not wrapped.
+    /// Absolute error of the yaw at the end, not wrapped.
     pub final_unwrapped_rad: f64,
 }
 
 impl YawError {
     /// Compares a yaw rate with the true one, sample by sample, both in rad/s.
     ///
-    /// `None` if there is no whole window, or the two differ in length.
+    /// Returns `None` if there is no complete window, or the two differ in length.
     #[must_use]
     pub fn new(estimate: &[f64], reference: &[f64]) -> Option<Self> {
         if estimate.len() != reference.len() || estimate.len() < WINDOW {
@@ -37,7 +37,7 @@ impl YawError {
         Some(Self { mean_1s_rad, final_rad: wrap(unwrapped).abs(), final_unwrapped_rad: unwrapped.abs() })
     }
 
-    /// Returns the mean of each number over several drives; `None` without drives.
+    /// Returns the mean of each error over several drives; `None` without drives.
     #[must_use]
     pub fn mean(errors: &[Self]) -> Option<Self> {
         let count = (!errors.is_empty()).then_some(errors.len() as f64)?;
@@ -60,7 +60,7 @@ pub fn integral(rates: &[f64]) -> Vec<f64> {
     rates.iter().scan(0.0, step).collect()
 }
 
-/// Returns the same angle within -pi to pi.
+/// Wraps an angle to -pi to pi.
 pub(crate) fn wrap(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn opposite_errors_cancel_in_the_end_but_not_in_the_mean() {
-        // The rate is off by +0.02 rad/s for one second, by -0.01 for another, then by 0.04 for half a second.
+        // The error is +0.02 rad/s for one second, -0.01 for another, then 0.04 for half a second.
         let estimate: Vec<f64> = (0..250)
             .map(|k| {
                 0.3 + if k < 100 {

@@ -1,4 +1,4 @@
-//! This module reports the errors and costs of each method, drive by drive, as a table and as JSON.
+//! This module reports the errors and costs of each method on each drive, as a table and as JSON.
 
 use crate::drive::DT;
 use crate::drive::recording::Recording;
@@ -15,59 +15,59 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
-    /// There is no truth to compare with.
+    /// The drive has no reference.
     #[error(
-        "{path}: line {line}: no reference, which evaluation needs: neither a yaw rate (ref_gyr_z, in every row) nor a \
-         course (ref_yaw)"
+        "{path}: line {line}: no reference to evaluate against: neither a yaw rate (ref_gyr_z, in every row) nor a \
+        course (ref_yaw)"
     )]
     NoReference {
         /// The recording.
         path: String,
-        /// The first line without it.
+        /// The first line without a reference.
         line: u64,
     },
     /// The reference is known for too short a time after static initialisation.
     #[error(
-        "{path}: {column} is known for too short a time after static initialisation, which is {seconds:.2} s: a yaw \
-         rate is needed for 1 s, a course for 20 s"
+        "{path}: {column} is known for too short a time in the {seconds:.2} s after static initialisation: at least 1 s of \
+        yaw rate or 20 s of course is needed"
     )]
     TooShort {
         /// The recording.
         path: String,
         /// The reference's column.
         column: &'static str,
-        /// The time after static initialisation.
+        /// Length of the drive after static initialisation, s.
         seconds: f64,
     },
-    /// Gyro and reference are too far apart.
+    /// The gyro and the reference disagree.
     #[error(
-        "{path}: {column} turns otherwise than the gyro, by {rad:.2} rad in 10 s: another unit or sign (rad, positive to \
-         the left), or another drive"
+        "{path}: {column} disagrees with the gyro by {rad:.2} rad in 10 s: wrong unit or sign (rad, positive to the left), \
+        or another drive"
     )]
     Disagrees {
         /// The recording.
         path: String,
         /// The reference's column.
         column: &'static str,
-        /// The typical difference in 10 s.
+        /// The typical difference in 10 s, rad.
         rad: f64,
     },
 }
 
-/// Holds a method's errors and cost.
+/// The errors and the cost of a method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
     /// The errors.
     #[serde(flatten)]
     pub error: HeadingError,
-    /// The mean of its corrections beyond static initialisation and zero-rate updates, deg/h.
+    /// The mean of the corrections beyond static initialisation and zero-rate updates, deg/h.
     pub mean_correction_deg_h: f64,
-    /// Its cost.
+    /// The cost of the method.
     #[serde(flatten)]
     pub cost: Cost,
 }
 
-/// The legend of the columns of [`columns`].
+/// The headings of the columns that [`columns`] returns.
 pub const COLUMNS: [&str; 10] = [
     "heading error, rad",
     "in 1 s",
@@ -81,7 +81,7 @@ pub const COLUMNS: [&str; 10] = [
     "delay, ms",
 ];
 
-/// Returns the table of a drive or of a mean: the name of each method and its figures, a dash where there is none.
+/// Returns the table of a drive or of a mean: the name of each method and its figures, a dash for a missing figure.
 pub fn columns(rows: &PerMethod<Row>) -> impl Iterator<Item = (Method, [String; 10])> {
     let still = rows[Method::STATIC].error.compared();
     rows.each().map(move |(method, row)| {
@@ -108,26 +108,26 @@ pub fn columns(rows: &PerMethod<Row>) -> impl Iterator<Item = (Method, [String; 
     })
 }
 
-/// Compares one of our rates with the best classical method that has the same inputs and no more delay.
+/// Comparison of one of our rates with the best classical method that has the same inputs and no more delay.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The classical method.
+    /// The key of the best classical method.
     pub best_classical: &'static str,
-    /// Our error over its: over 1 s, or the RMS of the drive where the reference gives no 1 s error.
+    /// Our error over that method's: the 1 s error, or the RMS over the drive if the reference gives no 1 s error.
     pub ratio: f64,
 }
 
-/// Compares both rates that are sent, each with the best classical method.
+/// Comparison of both rates that are sent with the best classical methods.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparisons {
-    /// The rate for navigation.
+    /// The navigation rate.
     pub default: Comparison,
-    /// The rate that is sent at once.
+    /// The prompt rate.
     pub prompt: Comparison,
 }
 
 impl Comparisons {
-    /// Makes the comparisons; `None` if there is no error to compare.
+    /// Compares the rates; `None` if there is no error to compare.
     #[must_use]
     pub fn new(rows: &PerMethod<Row>) -> Option<Self> {
         let compare = |ours: Method| {
@@ -153,26 +153,26 @@ impl fmt::Display for Comparisons {
     }
 }
 
-/// Holds the results of all methods on one drive.
+/// The results of all methods on one drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriveErrors {
     /// The recording's name.
     pub name: String,
-    /// The folder that it is in.
+    /// The folder of the recording.
     pub set: String,
     /// The length of the comparison, s.
     pub seconds: f64,
-    /// Grid steps without a sample; they count for no method.
+    /// Number of grid steps without a sample; they are left out of every method's errors.
     pub missing: u32,
     /// The column of the reference.
     pub reference: &'static str,
-    /// Says whether the vehicle's wheels are known.
+    /// Whether the recording has wheel rates.
     pub wheels: bool,
-    /// Says whether the standstill at the start is simulated.
+    /// Whether the standstill at the start is simulated.
     pub simulated_rest: bool,
-    /// Our rates beside the best classical method.
+    /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,
-    /// The methods.
+    /// The errors and the cost of each method.
     pub methods: PerMethod<Row>,
 }
 
@@ -219,16 +219,16 @@ impl DriveErrors {
     }
 }
 
-/// Holds the mean of some drives, each counting the same; a figure is the mean over those that have it.
+/// The mean over some drives with equal weights. Each figure is the mean over the drives that have it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mean {
     /// The folder of the drives, or "all".
     pub set: String,
     /// The number of drives.
     pub drives: usize,
-    /// Our rates beside the best classical method.
+    /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,
-    /// The methods.
+    /// The errors and the cost of each method.
     pub methods: PerMethod<Row>,
 }
 
@@ -246,7 +246,7 @@ impl Mean {
     }
 }
 
-/// Holds the results of the methods on several drives, and their means.
+/// The results of the methods on several drives, and their means.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// The results of each drive.
@@ -259,7 +259,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Adds the means.
+    /// Creates a report of the drives and computes the means.
     #[must_use]
     pub fn new(drives: Vec<DriveErrors>) -> Self {
         let mut names: Vec<&String> = Vec::new();
@@ -285,7 +285,7 @@ impl fmt::Display for Report {
                 write!(f, ", {missing} samples missing")?;
             }
             if drive.simulated_rest {
-                write!(f, "; it starts moving: 3 s at rest are simulated, with the best constant bias")?;
+                write!(f, "; starts in motion: 3 s at rest are simulated, with the best constant bias")?;
             }
             writeln!(f)?;
             table(f, drive.over_best_classical, &drive.methods)?;

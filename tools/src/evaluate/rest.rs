@@ -1,9 +1,8 @@
-//! This module simulates a standstill for a recording that begins while the vehicle moves and has a course as
-//! reference.
+//! This module inserts a simulated standstill before a recording that begins in motion and has a course as reference.
 //!
-//! No board can start on such a drive. The corrections after a good start can still be compared: 3 s at rest are put
-//! before the recording, in which each axis shows its mean over the drive, the yaw gyro less the turn of the course. It
-//! is the best constant bias that any initialisation can find, the same one for every method.
+//! Static initialisation fails on such a drive. To compare the corrections after a good start, 3 s at rest are
+//! inserted before the recording. In them each axis reads its mean over the drive; from the yaw gyro's mean the turn
+//! of the course is subtracted. This is the best constant bias that an initialisation can find.
 
 use crate::drive::recording::{Recording, Row};
 use crate::evaluate::heading_error::bias_by_course;
@@ -11,10 +10,10 @@ use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 
-/// Each axis flickers by this amplitude, because equal readings would count as stuck.
+/// Amplitude by which each axis varies, because equal readings count as stuck.
 const FLICKER: f64 = 1e-3;
 
-/// Returns the recording with that standstill before it; `None` without 20 s of course.
+/// Returns the recording with the simulated standstill before it; `None` without 20 s of course.
 #[must_use]
 pub fn before(recording: &Recording) -> Option<Recording> {
     let rows = &recording.rows;

@@ -1,5 +1,4 @@
-//! This module computes the absolute trajectory error (ATE) of a dead-reckoned path against the true one, as it lies
-//! and after alignment.
+//! This module computes the absolute trajectory error (ATE) of a dead-reckoned path, with and without alignment.
 //!
 //! The paper says "using evo" but not whether rmse or mean, so both are computed. Alignment is Umeyama's (IEEE PAMI
 //! 13(4), 1991) without scale, in the plane: with the centred points as vectors, the rotation is
@@ -9,10 +8,10 @@
 
 use serde::Serialize;
 
-/// Holds a point of a plane, m.
+/// A point in the plane, m.
 pub type Point = [f64; 2];
 
-/// Holds the error of a path.
+/// The error of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TrajectoryError {
     /// Root of the mean squared distance, m.
@@ -22,7 +21,7 @@ pub struct TrajectoryError {
 }
 
 impl TrajectoryError {
-    /// Compares point by point; `None` if there are no points, or the paths differ in length.
+    /// Compares two paths point by point; `None` if there are no points, or the paths differ in length.
     #[must_use]
     pub fn new(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         if estimate.len() != truth.len() || estimate.is_empty() {
@@ -40,7 +39,7 @@ impl TrajectoryError {
         Some(Self { rmse_m, mean_m })
     }
 
-    /// Compares after the estimate has been turned and shifted onto the truth as well as possible.
+    /// Compares after the estimate is aligned with the truth ([`Alignment`]).
     #[must_use]
     pub fn aligned(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         let alignment = Alignment::new(estimate, truth)?;
@@ -49,18 +48,18 @@ impl TrajectoryError {
     }
 }
 
-/// Describes a turn about the origin, then a shift.
+/// A rotation about the origin, followed by a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
-    /// The turn to the left, rad.
+    /// The rotation to the left, rad.
     pub yaw: f64,
     /// The shift, m.
     pub shift: Point,
 }
 
 impl Alignment {
-    /// The one with the least squared distances; without a turn where all points are the same.
-    /// `None` where there are no points, or not as many of both.
+    /// Computes the alignment with the least squared distances; its rotation is zero if all points are the same.
+    /// Returns `None` if there are no points, or the paths differ in length.
     #[must_use]
     pub fn new(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         if estimate.len() != truth.len() || estimate.is_empty() {
@@ -78,7 +77,7 @@ impl Alignment {
         Some(Self { shift: [to[0] - x, to[1] - y], ..turned })
     }
 
-    /// Returns the aligned place of a point of the estimate.
+    /// Returns the aligned position of a point of the estimate.
     #[must_use]
     pub fn apply(&self, [x, y]: Point) -> Point {
         let (sin, cos) = (libm::sin(self.yaw), libm::cos(self.yaw));
@@ -102,7 +101,7 @@ mod tests {
         assert!((a - b).abs() < 1e-8, "{a} is not {b}");
     }
 
-    /// Computed with evo 1.38.1.
+    /// The expected values were computed with evo 1.38.1.
     #[test]
     fn as_evo_has_it() {
         let raw = TrajectoryError::new(&ESTIMATE, &TRUTH).unwrap();

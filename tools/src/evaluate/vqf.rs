@@ -1,24 +1,25 @@
-//! The heading of VQF, a known orientation filter: D. Laidig and T. Seel, VQF: Highly accurate IMU orientation
-//! estimation with bias estimation and magnetic disturbance rejection, Information Fusion 91 (2023), 187-204.
+//! This module computes the heading of the orientation filter VQF: D. Laidig and T. Seel, VQF: Highly accurate IMU
+//! orientation estimation with bias estimation and magnetic disturbance rejection, Information Fusion 91 (2023),
+//! 187-204.
 //!
-//! It integrates the gyro, corrects the inclination by the acceleration that is low-passed in the almost inertial
-//! frame, and estimates the gyro's bias at rest and in motion; the crate `vqf-rs` is a port of its authors' code. It is
-//! used here without a magnetometer and with the published parameters: 3 s for the acceleration, rest below 2 deg/s and
-//! 0.5 m/s^2 for 1.5 s. On drives it estimates no bias in motion: that assumes accelerations that average out in 3 s,
-//! which a car's do not, and makes the 1 s error 1.5 times as large on the training drives.
+//! VQF integrates the gyro, corrects the inclination by the acceleration that is low-passed in the almost inertial
+//! frame, and estimates the gyro's bias at rest and in motion; the crate `vqf-rs` is a port of its authors' code. The
+//! filter runs without a magnetometer and with the published parameters: 3 s for the acceleration, rest below 2 deg/s
+//! and 0.5 m/s^2 for 1.5 s. On drives the bias estimate in motion is off: it assumes that accelerations average out
+//! in 3 s, which a car's do not, and makes the 1 s error 1.5 times as large on the training drives.
 
 use super::metrics::wrap;
 use crate::drive::DT;
 use vqf_rs::{Quaternion, VQF};
 
-/// A second-order low pass takes this many multiplications a value.
+/// Multiplications of a second-order low pass per value.
 const LOW_PASS: usize = 5;
-/// A product of two quaternions takes 16 multiplications, normalising one 8.
+/// Multiplications of a quaternion product (16) and of normalising the result (8).
 const QUATERNION: usize = 16 + 8;
-/// Converting a quaternion to a matrix takes 9 multiplications, turning a vector by it 9.
+/// Multiplications of converting a quaternion to a matrix (9) and of rotating a vector by the matrix (9).
 const ROTATION: usize = 9 + 9;
 
-/// A sample without a bias in motion takes this many multiplications and divisions, in the order of the algorithm: rest
+/// Multiplications and divisions per sample without the bias estimate in motion, in the order of the algorithm: rest
 /// detection, strapdown integration, acceleration in the inertial frame, inclination.
 pub const MULTIPLICATIONS: usize = (6 * LOW_PASS + 2 * 3)
     + (3 + 6 + QUATERNION)
@@ -69,7 +70,7 @@ mod tests {
         }
     }
 
-    /// 90 degrees to the left on a sensor that is mounted 10 degrees askew, after 5 s at rest.
+    /// The vehicle turns 90 degrees to the left after 5 s at rest; the sensor is tilted by 10 degrees.
     #[test]
     fn a_turn_is_followed() {
         let (sin, cos) = 10.0_f64.to_radians().sin_cos();

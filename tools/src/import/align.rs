@@ -1,40 +1,40 @@
-//! The offset between two files' clocks, by the cross-correlation of the yaw rates that both have.
+//! This module finds the offset between the clocks of two files, by cross-correlation of a yaw rate in each.
 //!
-//! Both rates go to 2 Hz and every lag with enough in common is tried; around the best one they are compared again at
-//! 100 Hz, and a parabola through the best three lags gives the fraction. The correlation coefficient is free of scale
-//! and bias, so a rate in other units or from other sensors does as well.
+//! Both rates are resampled to 2 Hz, and every lag with enough overlap is tried. Around the best lag they are
+//! compared again at 100 Hz, and a parabola through the best three lags gives the fraction. The correlation
+//! coefficient does not depend on scale and bias, so units and sensors may differ.
 
-/// Yaw rates over time on one clock.
+/// A yaw rate over time: pairs of time, s, and rate.
 pub type Rate = [(f64, f64)];
 
 /// Coarse step, s, and fine step, s.
 const STEPS: [f64; 2] = [0.5, 0.01];
-/// Time that both must have in common, s, and at least this share of the shorter.
+/// Least overlap, s, and as a share of the shorter rate.
 const COMMON: (f64, f64) = (20.0, 0.5);
-/// A coefficient below this is no match.
+/// Least correlation coefficient of a match.
 const LEAST: f64 = 0.8;
-/// A second peak this far from the first, s, must be lower by this much.
+/// A second peak that is further from the first than this, s, must be lower by this much.
 const RIVAL: (f64, f64) = (3.0, 0.05);
-/// So much time of each is compared, from its beginning, s: all lags of more would take minutes.
+/// Time of each rate that is compared, from its beginning, s: all lags of a longer time would take minutes.
 pub const LONGEST: f64 = 8_192.0;
 
-/// The offset of a clock.
+/// The offset between two clocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
-    /// This is added to the second clock's times, s.
+    /// Time to add to the times of the second clock, s.
     pub seconds: f64,
-    /// The coefficient at that offset.
+    /// The correlation coefficient at that offset.
     pub coefficient: f64,
 }
 
-/// Returns the offset that lays the second rate on the first.
+/// Returns the offset that aligns the second rate with the first.
 ///
 /// # Errors
-/// The reason why there is none.
+/// The reason why no offset is found.
 pub fn offset(first: &Rate, second: &Rate) -> Result<Offset, String> {
     let (first, second) = (beginning(first), beginning(second));
     let (Some(one), Some(two)) = (on_grid(first, STEPS[0]), on_grid(second, STEPS[0])) else {
-        return Err("the files hold no yaw rate that both have".to_owned());
+        return Err("the yaw rates are too short".to_owned());
     };
     let least = COMMON.0.max(COMMON.1 * STEPS[0] * one.values.len().min(two.values.len()) as f64) / STEPS[0];
     let lags = -(two.values.len() as isize)..one.values.len() as isize;
@@ -42,7 +42,7 @@ pub fn offset(first: &Rate, second: &Rate) -> Result<Offset, String> {
         .filter_map(|lag| Some((lag, correlation(&one.values, &two.values, lag, least as usize)?)))
         .collect();
     let best = all.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
-    let Some((lag, coarse)) = best else { return Err("the files have too little time in common".to_owned()) };
+    let Some((lag, coarse)) = best else { return Err("the yaw rates overlap too little in time".to_owned()) };
     let far = |other: isize| (other - lag).unsigned_abs() as f64 * STEPS[0] > RIVAL.0;
     let rival = all.iter().filter(|(other, _)| far(*other)).map(|(_, value)| *value).fold(0.0, f64::max);
     let near = one.start - two.start + STEPS[0] * lag as f64;
@@ -50,11 +50,11 @@ pub fn offset(first: &Rate, second: &Rate) -> Result<Offset, String> {
         fine(first, second, near).unwrap_or(Offset { seconds: near, coefficient: coarse });
     if coefficient < LEAST {
         return Err(format!(
-            "the yaw rates have nothing in common: correlation {coefficient:.2}, needed {LEAST}"
+            "the yaw rates do not match: correlation {coefficient:.2}, at least {LEAST} is needed"
         ));
     }
     if rival > coarse - RIVAL.1 {
-        return Err(format!("two offsets fit alike: correlations {coarse:.3} and {rival:.3}"));
+        return Err(format!("two offsets match equally well: correlations {coarse:.3} and {rival:.3}"));
     }
     Ok(Offset { seconds, coefficient })
 }
@@ -84,13 +84,14 @@ fn fine(first: &Rate, second: &Rate, near: f64) -> Option<Offset> {
     Some(Offset { seconds, coefficient: peak })
 }
 
-/// A rate at equal steps.
+/// A rate in equal time steps.
 struct Grid {
     start: f64,
     values: Vec<f64>,
 }
 
-/// Means over each step, or interpolated where a step has no sample; `None` for less than two samples.
+/// Resamples a rate to equal steps, by means, or by interpolation in a step with fewer than two samples; `None` for
+/// fewer than two samples, or for less than a step.
 fn on_grid(rate: &Rate, step: f64) -> Option<Grid> {
     let (first, last) = (rate.first()?.0, rate.last()?.0);
     let count = ((last - first) / step) as usize;
@@ -116,7 +117,8 @@ fn on_grid(rate: &Rate, step: f64) -> Option<Grid> {
     Some(Grid { start: first, values: (0..count).map(value).collect() })
 }
 
-/// The coefficient with `two` shifted by `lag`; `None` for less than `least` values, or where one of them never changes.
+/// Returns the correlation coefficient with `two` shifted by `lag`; `None` for fewer than `least` values, or if one
+/// of the rates never changes.
 fn correlation(one: &[f64], two: &[f64], lag: isize, least: usize) -> Option<f64> {
     let (skip_one, skip_two) = (lag.max(0) as usize, (-lag).max(0) as usize);
     let (one, two) = (one.get(skip_one..)?, two.get(skip_two..)?);
@@ -170,7 +172,7 @@ mod tests {
         let other: Vec<_> = (0..10_000u32)
             .map(|k| (0.01 * f64::from(k), (0.01 * f64::from(k) * (1.0 + 0.0002 * f64::from(k))).sin()))
             .collect();
-        assert!(offset(&first, &other).unwrap_err().contains("nothing in common"));
+        assert!(offset(&first, &other).unwrap_err().contains("do not match"));
         let still: Vec<_> = (0..1_000).map(|k| (0.1 * f64::from(k), 0.0)).collect();
         assert!(offset(&first, &still).is_err());
         let circle = |clock: f64| {
@@ -178,6 +180,6 @@ mod tests {
                 .map(|k| (0.01 * f64::from(k) + clock, (0.01 * f64::from(k)).sin()))
                 .collect::<Vec<_>>()
         };
-        assert!(offset(&circle(0.0), &circle(7.0)).unwrap_err().contains("fit alike"));
+        assert!(offset(&circle(0.0), &circle(7.0)).unwrap_err().contains("match equally well"));
     }
 }

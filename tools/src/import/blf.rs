@@ -1,34 +1,34 @@
-//! Vector's binary log (BLF): objects, most of them in containers that zlib has packed.
+//! This module reads Vector's binary log (BLF): a sequence of objects, most in zlib-compressed containers.
 //!
-//! Of the crates, `ablf` knows one of the four objects that hold a frame, and prints on standard output where an object
-//! begins elsewhere than it expects.
+//! The crate `ablf` is not used. It decodes only one of the four objects that hold a frame, and prints to standard
+//! output when an object does not begin where it expects.
 
 use super::can::{Bus, Frame, add};
 use super::input::{Input, read_up_to};
 use super::log::Log;
 
-/// First bytes of a file.
+/// First bytes of a BLF file.
 pub const MAGIC: &[u8] = b"LOGG";
 const OBJECT: &[u8] = b"LOBJ";
-/// Bytes of an object's first header.
+/// Length of an object's base header, bytes.
 const BASE: usize = 16;
-/// Largest container, packed and unpacked; Vector's own hold 128 KiB.
+/// Largest container, compressed or not, bytes; Vector's own hold 128 KiB.
 const MAX_CONTAINER: usize = 64 << 20;
-/// Types of objects.
+/// Object types.
 const CONTAINER: u32 = 10;
 const CAN_MESSAGE: u32 = 1;
 const CAN_MESSAGE_2: u32 = 86;
 const CAN_FD: u32 = 100;
 const CAN_FD_64: u32 = 101;
 
-/// Reads a file from its magic on.
+/// Reads a file, including its magic.
 ///
 /// # Errors
-/// The reader's. Damage is none: it is counted.
+/// The reader's error. Damage is not an error; it is counted.
 pub fn read(input: &mut Input<'_>, bus: Option<&Bus>, log: &mut Log) -> std::io::Result<()> {
     let head = read_up_to(input, 8)?;
     let len = u32_at(&head, 4).unwrap_or_default() as usize;
-    // Statistics, of which a cut file has none that hold.
+    // Of the header only the start time is used; the statistics of a truncated file are wrong.
     let head = read_up_to(input, len.clamp(8, 1 << 16) - 8)?;
     let start = start_seconds(&head).unwrap_or_default();
     let mut unpacked = Vec::new();
@@ -39,7 +39,7 @@ pub fn read(input: &mut Input<'_>, bus: Option<&Bus>, log: &mut Log) -> std::io:
         }
         let len = u32_at(&base, 8).unwrap_or_default() as usize;
         if !base.starts_with(OBJECT) || !(BASE..=MAX_CONTAINER).contains(&len) {
-            log.drop("damaged from here on: no object where one should begin".to_owned());
+            log.drop("corrupt from here on: no object where one should begin".to_owned());
             break;
         }
         let body = read_up_to(input, len - BASE)?;
@@ -75,19 +75,19 @@ fn unpack(body: &[u8]) -> Result<Vec<u8>, &'static str> {
     match method {
         0 => Ok(packed.to_vec()),
         2 => miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(packed, MAX_CONTAINER)
-            .map_err(|_| "damaged compression"),
+            .map_err(|_| "corrupt compressed data"),
         _ => Err("unknown compression"),
     }
 }
 
-/// Reads the whole objects, and returns how many bytes they take. Up to three bytes may lie between two.
+/// Reads all complete objects and returns the number of bytes used. Up to three padding bytes may be between objects.
 fn objects(bytes: &[u8], start: f64, bus: Option<&Bus>, log: &mut Log) -> usize {
     let mut at = 0;
     while let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= BASE) {
         if !rest.starts_with(OBJECT) {
             let skip = rest.windows(4).position(|word| word == OBJECT);
             if skip.is_none_or(|skip| skip > 3) {
-                log.drop("objects that do not begin where the one before ends".to_owned());
+                log.drop("objects that do not begin where the previous one ends".to_owned());
             }
             at += skip.unwrap_or(rest.len() - 3);
             continue;
@@ -101,20 +101,20 @@ fn objects(bytes: &[u8], start: f64, bus: Option<&Bus>, log: &mut Log) -> usize 
         let Some(object) = rest.get(..len) else { break };
         at += len;
         if frame(object, start, bus, log).is_none() {
-            log.drop("frames that are cut short".to_owned());
+            log.drop("truncated frames".to_owned());
         }
     }
     at.min(bytes.len())
 }
 
-/// Adds the frame of an object; `None` for one whose bytes do not suffice.
+/// Adds the frame of an object; `None` if the object is too short.
 fn frame(object: &[u8], start: f64, bus: Option<&Bus>, log: &mut Log) -> Option<()> {
     let kind = u32_at(object, 12)?;
     if ![CAN_MESSAGE, CAN_MESSAGE_2, CAN_FD, CAN_FD_64].contains(&kind) {
         log.pass_over("BLF object without a frame");
         return Some(());
     }
-    // Time stamps count 10 us or, with flag 2, 1 ns.
+    // The unit of the time stamp is 10 us, or 1 ns with flag 2.
     let unit = if u32_at(object, 16)? == 1 { 1e-5 } else { 1e-9 };
     let ticks = u64::from_le_bytes(*object.get(24..)?.first_chunk()?);
     let body = object.get(usize::from(u16_at(object, 4)?)..)?;
@@ -142,7 +142,7 @@ fn frame(object: &[u8], start: f64, bus: Option<&Bus>, log: &mut Log) -> Option<
     Some(())
 }
 
-/// The start of the measurement, s since 1970, without a time zone: the file has local time.
+/// Returns the start of the measurement, s since 1970, in the local time of the file.
 fn start_seconds(head: &[u8]) -> Option<f64> {
     let [year, month, _, day, hour, minute, second, milli] =
         std::array::from_fn(|k| u16_at(head, 32 + 2 * k).map(u32::from));
@@ -157,7 +157,7 @@ fn start_seconds(head: &[u8]) -> Option<f64> {
     )
 }
 
-/// Days from 1970-01-01 to a date of the Gregorian calendar, counted from a year that begins in March.
+/// Returns the days from 1970-01-01 to a date of the Gregorian calendar; the year is shifted to begin in March.
 fn days_since_1970(year: i64, month: i64, day: i64) -> f64 {
     let year = if month <= 2 { year - 1 } else { year };
     let month = (month + 9) % 12;

@@ -1,4 +1,4 @@
-//! The signals of CAN frames, by a DBC file.
+//! This module decodes the signals of CAN frames with a DBC file.
 
 use super::error::ImportError;
 use super::log::Log;
@@ -8,11 +8,11 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A frame of a log.
+/// A CAN frame of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frame<'a> {
     pub(super) seconds: f64,
-    /// The bus where it is not the first.
+    /// The name of the bus; empty for the first bus.
     pub(super) bus: &'a str,
     pub(super) id: u32,
     pub(super) extended: bool,
@@ -31,7 +31,7 @@ struct Signal {
     unit: String,
     number: Number,
     invalid: Option<u32>,
-    /// The value of the multiplexer with which the signal is in the frame.
+    /// The multiplexer and the value of it for which the frame holds the signal.
     when: Option<(Number, u64)>,
 }
 
@@ -100,10 +100,10 @@ impl Bus {
         Ok(Self { messages })
     }
 
-    /// Adds the signals of a frame. A second bus with the same message has its number behind the name.
+    /// Adds the signals of a frame. The names of signals on other buses than the first end in `@` and the bus.
     fn decode(&self, frame: &Frame<'_>, log: &mut Log) {
         let Some(signals) = self.messages.get(&(frame.id, frame.extended)) else {
-            return log.pass_over("CAN message that the DBC file does not have");
+            return log.pass_over("CAN message that is not in the DBC file");
         };
         for Signal { name, unit, number, invalid, when } in signals {
             if let Some((switch, value)) = when
@@ -112,7 +112,7 @@ impl Bus {
                 continue;
             }
             let Some(raw) = number.raw(frame.data) else {
-                log.drop(format!("{name}: lies outside of the frame"));
+                log.drop(format!("{name}: outside the frame"));
                 continue;
             };
             if invalid.is_some_and(|code| u64::from(code) == raw) {
@@ -128,11 +128,11 @@ impl Bus {
     }
 }
 
-/// Adds a frame's signals, or counts it where there is no DBC file.
+/// Adds the signals of a frame, or counts the frame if there is no DBC file.
 pub(super) fn add(bus: Option<&Bus>, frame: &Frame<'_>, log: &mut Log) {
     match bus {
         Some(bus) => bus.decode(frame, log),
-        None => log.pass_over("CAN frame (--dbc FILE names their signals)"),
+        None => log.pass_over("CAN frame (pass --dbc FILE to decode signals)"),
     }
 }
 
@@ -149,14 +149,15 @@ fn number(dbc: &Dbc, id: MessageId, signal: &can_dbc::Signal) -> Option<Number> 
         _ => Kind::Unsigned,
     };
     let (start, bits) = (usize::try_from(signal.start_bit).ok()?, usize::try_from(signal.size).ok()?);
-    // 64 bytes of CAN FD.
+    // A CAN FD frame has up to 64 bytes.
     let fits = (1..=64).contains(&bits) && start < 512;
     let (order, factor, offset) = (signal.byte_order, signal.factor, signal.offset);
     fits.then_some(Number { start, bits, order, kind, factor, offset })
 }
 
 impl Number {
-    /// The bits, the most significant first: a Motorola signal goes on in the next byte's bit 7.
+    /// Returns the raw value. The bits are read from the most significant on; a Motorola signal continues in the next
+    /// byte's bit 7.
     fn raw(&self, data: &[u8]) -> Option<u64> {
         let mut raw = 0;
         let mut at = match self.order {

@@ -1,24 +1,24 @@
-//! CAN logs as text: candump's, Vector's ASC and PEAK's TRC.
+//! This module reads CAN logs in text form: candump, Vector ASC and PEAK TRC.
 
 use super::can::{Bus, Frame, add};
 use super::input::{Input, read_line};
 use super::log::Log;
 
-/// A line of 64 bytes of CAN FD with Vector's statistics has some 400.
+/// Longest line, bytes. A CAN FD frame of 64 bytes with Vector's statistics takes about 400.
 const MAX_LINE: u64 = 4_096;
 
-/// The kinds of text.
+/// The format of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dialect {
-    /// `(1.234567) can0 123#0102`.
+    /// can-utils: `(1.234567) can0 123#0102`.
     Candump,
-    /// Vector.
+    /// Vector ASC.
     Asc,
-    /// PEAK, versions 1.0 to 2.1.
+    /// PEAK TRC, versions 1.0 to 2.1.
     Trc,
 }
 
-/// Returns the dialect of a file that begins so.
+/// Returns the format of a file by its beginning.
 pub fn dialect(head: &[u8]) -> Option<Dialect> {
     let head = String::from_utf8_lossy(&head[..head.len().min(4_096)]).to_lowercase();
     let first = head.lines().map(str::trim).find(|line| !line.is_empty())?;
@@ -36,7 +36,7 @@ pub fn dialect(head: &[u8]) -> Option<Dialect> {
 /// Reads a log.
 ///
 /// # Errors
-/// The reader's. A line that is no frame and no remark is counted.
+/// The reader's error. A line that is neither a frame nor a comment is counted.
 pub fn read(
     dialect: Dialect,
     input: &mut Input<'_>,
@@ -57,7 +57,7 @@ pub fn read(
             }
             Line::Remark => {}
             Line::Other(what) => log.pass_over(what),
-            Line::Bad => log.drop("lines that are no frame".to_owned()),
+            Line::Bad => log.drop("lines that are not a frame".to_owned()),
         }
     }
     Ok(())
@@ -78,12 +78,12 @@ struct Text<'a> {
     data: Vec<u8>,
 }
 
-/// Holds what the lines so far say about those that follow.
+/// The settings that earlier lines of the file give.
 struct State {
     radix: u32,
     relative: bool,
     last: f64,
-    /// The columns of a TRC file, one letter each.
+    /// The columns of a TRC file, by their first letters.
     columns: Option<Vec<char>>,
 }
 
@@ -119,7 +119,7 @@ fn candump(line: &str) -> Line<'_> {
     frame(parse())
 }
 
-/// The bytes of hexadecimal digits.
+/// Parses hexadecimal digits as bytes.
 fn bytes(digits: &str) -> Option<Vec<u8>> {
     if digits.len() > 128 || !digits.len().is_multiple_of(2) || !digits.is_ascii() {
         return None;
@@ -136,7 +136,7 @@ impl State {
             return Line::Remark;
         }
         let Some(seconds) = words.first().and_then(|word| word.parse::<f64>().ok()) else {
-            // The head and the marks of trigger blocks.
+            // A header line, or the begin or end of a trigger block.
             return Line::Remark;
         };
         let seconds = if self.relative { self.last + seconds } else { seconds };
@@ -158,7 +158,7 @@ impl State {
         }
     }
 
-    /// CANFD CHANNEL DIRECTION ID [NAME] BRS ESI DLC LENGTH DATA...
+    /// Parses a CAN FD event: CANFD CHANNEL DIRECTION ID [NAME] BRS ESI DLC LENGTH DATA...
     fn asc_fd<'a>(&self, seconds: f64, words: &[&'a str]) -> Line<'a> {
         let (channel, rest) = match words {
             [_, _, "ErrorFrame", ..] => return Line::Other("error frame"),
@@ -194,7 +194,7 @@ impl State {
         len: &str,
         data: &[&str],
     ) -> Option<Text<'a>> {
-        // Names of a data base or of a protocol stand where the identifier would.
+        // The field may also hold the name of a message or a protocol, which is not a number.
         let (id, extended) = self.id(id)?;
         let len = usize::from_str_radix(len, self.radix).ok()?.min(8);
         let data = self.data(data.get(..len)?)?;
@@ -226,12 +226,12 @@ impl State {
     }
 }
 
-/// The first bus needs no name.
+/// Returns the name of a bus; the first bus has none.
 fn bus_name(bus: &str) -> &str {
     if bus == "1" { "" } else { bus }
 }
 
-/// Version 2: the columns that the file names, data last.
+/// Parses a line of version 2, with the columns that the file names; the data is last.
 fn trc_2<'a>(columns: &[char], words: &[&'a str]) -> Line<'a> {
     let column = |letter: char| {
         let at = columns.iter().position(|column| *column == letter)?;
@@ -256,7 +256,7 @@ fn trc_2<'a>(columns: &[char], words: &[&'a str]) -> Line<'a> {
     frame(parse())
 }
 
-/// Version 1: `1) 17535.4 Tx 0100 8 00 ...`, from 1.3 on with the bus before the direction.
+/// Parses a line of version 1: `1) 17535.4 Tx 0100 8 00 ...`, from 1.3 on with the bus before the direction.
 fn trc_1<'a>(words: &[&'a str]) -> Option<Text<'a>> {
     let seconds = 1e-3 * words.get(1)?.parse::<f64>().ok()?;
     let bus = words

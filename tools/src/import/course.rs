@@ -1,32 +1,33 @@
-//! The course over ground by GNSS, with its uncertainty, to be `ref_yaw`.
+//! This module computes the GNSS course over ground and its uncertainty, for the column `ref_yaw`.
 //!
-//! A receiver that gives a velocity has the better course, by Doppler. From positions alone it is the direction of the
-//! chord between two fixes around the middle one, as many apart as it takes for the chord to be long against the scatter
-//! of neighbouring fixes. That scatter is taken from third differences, which a vehicle's motion hardly reaches: the
-//! error that fixes share, most of a cheap receiver's, moves the path and does not turn it.
+//! A receiver that gives a velocity has the better course, by Doppler. From positions alone, the course at a fix is
+//! the direction of the chord between a fix before it and a fix after it. They are so far apart that the chord is
+//! long compared with the scatter of neighbouring fixes. The scatter is computed from third differences, to which the
+//! motion of the vehicle hardly contributes. An error that neighbouring fixes share, most of a cheap receiver's
+//! error, shifts the path without rotating it.
 
 use super::value::Fix;
 
-/// Below this speed the direction is noise, m/s.
+/// Least speed for a course, m/s; below it the direction is noise.
 const SLOWEST: f64 = 1.0;
-/// A course is given where its standard deviation is below this, rad.
+/// Standard deviation at which a course is rejected, rad.
 const WORST: f64 = 0.15;
-/// The chord spans at most this time, s: a turn bends it.
+/// Longest time of a chord, s; a turn makes a longer chord wrong.
 const LONGEST: f64 = 4.0;
-/// Least scatter, m: centimetres are what RTK gives.
+/// Least scatter, m: the accuracy of RTK.
 const LEAST_SCATTER: f64 = 0.01;
-/// Metres of a degree of latitude.
+/// Metres per degree of latitude.
 const METRES: f64 = 111_320.0;
 
-/// A course.
+/// The course at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Course {
     pub seconds: f64,
-    /// rad to the left, from any direction, without jumps.
+    /// Course, rad to the left of an arbitrary direction, unwrapped.
     pub rad: f64,
-    /// Its standard deviation, rad.
+    /// Standard deviation of the course, rad.
     pub sigma: f64,
-    /// m/s.
+    /// Speed, m/s.
     pub speed: f64,
 }
 
@@ -77,7 +78,7 @@ fn by_positions(fixes: &[(f64, Fix)]) -> Vec<Course> {
             let [x, y] = [0, 1].map(|axis| points[to][axis] - points[from][axis]);
             let length = x.hypot(y);
             let (sigma, speed) = (std::f64::consts::SQRT_2 * scatter / length, length / seconds);
-            // The shortest chord that is good enough; a longer one would cut more of a bend.
+            // Use the shortest chord that is good enough, since a longer one cuts a bend.
             if speed >= SLOWEST && sigma < 0.5 * WORST {
                 return Some(Course { seconds: time, rad: y.atan2(x), sigma, speed });
             }
@@ -87,7 +88,7 @@ fn by_positions(fixes: &[(f64, Fix)]) -> Vec<Course> {
     (1..points.len().max(1) - 1).filter_map(chord).collect()
 }
 
-/// Standard deviation of neighbouring fixes in one direction, m, by the median third difference.
+/// Returns the standard deviation of neighbouring fixes in one direction, m, by the median third difference.
 fn scatter(points: &[[f64; 2]]) -> f64 {
     let third = |w: &[[f64; 2]], axis: usize| w[3][axis] - 3.0 * w[2][axis] + 3.0 * w[1][axis] - w[0][axis];
     let mut sizes: Vec<f64> =
@@ -107,7 +108,7 @@ mod tests {
     use rand_chacha::rand_core::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
-    /// Five fixes a second along a wide bend at 10 m/s, with white noise; and the true course.
+    /// Returns five fixes per second along a wide bend at 10 m/s, with white noise, and the true course.
     fn bend(noise: f64) -> (Vec<(f64, Fix)>, Vec<f64>) {
         let (mut random, normal) = (ChaCha8Rng::seed_from_u64(7), Normal::new(0.0, 1.0).unwrap());
         let (mut x, mut y, mut heading) = (0.0, 0.0, 0.3f64);
@@ -131,7 +132,7 @@ mod tests {
             assert!(courses.len() > 500, "{noise} m: {}", courses.len());
             let errors = courses.iter().map(|course| {
                 let at = (course.seconds / 0.2).round() as usize;
-                // The chord from k - n to k + n has the mean heading, half a step behind the one at k.
+                // The chord from k - n to k + n has the mean heading, which lags half a step behind the heading at k.
                 (course.rad - 0.5 * (truth[at] + truth[at - 1])) / course.sigma
             });
             let rms = (errors.map(|error| error * error).sum::<f64>() / courses.len() as f64).sqrt();

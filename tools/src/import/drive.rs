@@ -1,5 +1,5 @@
-//! A drive from one or more logs: channels chosen, clocks aligned, everything on the 100 Hz grid of the IMU's file, one row
-//! in memory at a time.
+//! This module makes one drive from one or more logs. It chooses the channels, aligns the clocks and resamples
+//! everything to a 100 Hz grid on the clock of the IMU's file, with one row in memory at a time.
 
 mod clocks;
 mod csv;
@@ -15,29 +15,29 @@ use crate::drive::DT;
 use crate::drive::vehicle::Vehicle;
 use std::path::PathBuf;
 
-/// The shortest drive, s.
+/// Length of the shortest drive, s.
 const SHORTEST: f64 = 3.0;
-/// The longest, s: a day.
+/// Length of the longest drive, s: a day.
 const LONGEST: f64 = 86_400.0;
-/// Rates that the grid takes, Hz.
+/// IMU sample rates that can be resampled, Hz.
 const RATES: std::ops::RangeInclusive<f64> = 24.5..=1_020.0;
-/// A clock that both files share overlaps at least so much, s.
+/// Least overlap of the odometry with the IMU, s.
 const OVERLAP: f64 = 3.0;
 
-/// Holds what the user asks for.
+/// The request of the user.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// The logs; the one with the IMU gives the time.
+    /// Paths of the logs; the drive has the clock of the log with the IMU.
     pub files: Vec<PathBuf>,
-    /// The vehicle file's contents.
+    /// Contents of the vehicle file.
     pub vehicle: Vehicle,
-    /// The files' clocks are one.
+    /// All files have the same clock.
     pub same_clock: bool,
-    /// Seconds from the first sample that are left out.
+    /// Time to skip at the beginning, s.
     pub from: f64,
 }
 
-/// One row of a drive; values that are not known are `None`.
+/// One row of a drive; unknown values are `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Seconds since the first row.
@@ -52,17 +52,17 @@ pub struct Row {
     pub wheels: [Option<f64>; 4],
 }
 
-/// Holds the logs of a drive.
+/// The logs of a drive.
 #[derive(Debug)]
 pub struct Logs {
     files: Vec<File>,
     report: Vec<String>,
-    /// Records that could not be used.
+    /// Number of records that could not be used.
     pub dropped: u64,
 }
 
 impl Logs {
-    /// Reads the logs that are asked for.
+    /// Reads the requested logs.
     ///
     /// # Errors
     /// [`ImportError`].
@@ -81,7 +81,7 @@ impl Logs {
             if passed_over > 0 {
                 let kinds: Vec<&str> = log.passed_over.keys().map(String::as_str).take(6).collect();
                 report.push(format!(
-                    "{path}: {passed_over} records of no use to a drive: {}",
+                    "{path}: {passed_over} records of kinds that a drive does not need: {}",
                     kinds.join(", ")
                 ));
             }
@@ -91,7 +91,7 @@ impl Logs {
         Ok(Self { files, report, dropped })
     }
 
-    /// Makes one drive of them.
+    /// Makes one drive of the logs.
     ///
     /// # Errors
     /// [`ImportError`].
@@ -116,19 +116,19 @@ impl Logs {
         drive.check(&self.files)?;
         let missing = count - seen.rows;
         if missing > 0 {
-            drive.report.push(format!("imu: {missing} of {count} rows lie in gaps and are left out"));
+            drive.report.push(format!("imu: {missing} of {count} rows are in gaps and left out"));
         }
         drive.seen = seen;
         Ok(drive)
     }
 }
 
-/// Holds what is known of all rows together.
+/// A summary of all rows.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seen {
-    /// Their number.
+    /// The number of rows.
     pub rows: usize,
-    /// The time of the last one, s.
+    /// The time of the last row, s.
     pub seconds: f64,
     reference: bool,
     course: bool,
@@ -147,7 +147,7 @@ impl Seen {
     }
 }
 
-/// Holds a drive whose rows are made as they are asked for.
+/// A drive whose rows are computed on demand.
 #[derive(Debug)]
 pub struct Drive<'a> {
     selection: Selection<'a>,
@@ -155,12 +155,12 @@ pub struct Drive<'a> {
     vehicle: &'a Vehicle,
     start: f64,
     count: usize,
-    /// Courses by the row that is nearest to them; the rows between have none.
+    /// Each course with the index of the nearest row; other rows have no course.
     courses: Vec<(usize, [f64; 3])>,
     has_odometry: bool,
-    /// One line for each thing that a user should know: what was taken, how, and what was dropped.
+    /// Lines for the user: which channels were used, how, and what was dropped.
     pub report: Vec<String>,
-    /// What its rows are together.
+    /// The summary of the rows.
     pub seen: Seen,
 }
 
@@ -192,7 +192,7 @@ fn span(
     Ok((start, (seconds / DT) as usize + 1))
 }
 
-/// Says what the wheels are taken from, and whether that is an odometry.
+/// Reports which channels give the wheels; returns whether an odometry gives them.
 fn has_odometry(
     selection: &Selection<'_>,
     offsets: &[f64],
@@ -204,14 +204,14 @@ fn has_odometry(
         report.push(format!("reference rate: {}", channel.name));
     }
     let radius = vehicle.radius_m();
-    let assumed = if vehicle.wheels.radius_m.is_some() { "" } else { ", assumed: name wheels.radius_m" };
+    let assumed = if vehicle.wheels.radius_m.is_some() { "" } else { " (assumed; set wheels.radius_m)" };
     if let Some(channel) = &selection.odometry {
         let overlap = channel.samples.last().0 + offsets[channel.file] - start;
         if overlap < OVERLAP {
-            report.push(format!("wheels: {} has no time in common with the IMU", channel.name));
+            report.push(format!("wheels: {} does not overlap with the IMU in time", channel.name));
             return false;
         }
-        report.push(format!("wheels: the rear ones by {}, radius {radius} m{assumed}", channel.name));
+        report.push(format!("wheels: the rear wheels from {}, radius {radius} m{assumed}", channel.name));
         return true;
     }
     let names: Vec<&str> = selection.wheels.iter().flatten().map(|channel| channel.name).collect();
@@ -221,7 +221,7 @@ fn has_odometry(
     false
 }
 
-/// Returns the courses by the row that is nearest to each.
+/// Returns each course with the index of the nearest row.
 fn courses_by_row(
     selection: &Selection<'_>,
     offsets: &[f64],
@@ -249,7 +249,7 @@ fn courses_by_row(
 }
 
 impl<'a> Drive<'a> {
-    /// Returns the rows; those in a gap of the IMU are missing.
+    /// Returns the rows; rows in a gap of the IMU are left out.
     pub fn rows(&self) -> impl Iterator<Item = Row> {
         let start = self.start;
         let mut imu = Grid::new(|| self.selection.imu.imu(), 0.0, start);
@@ -291,7 +291,7 @@ impl<'a> Drive<'a> {
         (0..self.count).filter_map(row)
     }
 
-    /// Brings a channel to the rows.
+    /// Resamples a channel to the rows.
     fn grid<'s, const N: usize>(
         &'s self,
         channel: Option<&'s Channel<'a>>,
@@ -301,7 +301,7 @@ impl<'a> Drive<'a> {
         Some(Grid::new(|| of(channel), self.offsets[channel.file], self.start))
     }
 
-    /// Checks that no samples were lost between their temporary file and here.
+    /// Checks that all samples could be read back from the temporary files.
     fn check(&self, files: &[File]) -> Result<(), ImportError> {
         let failed =
             channels(&self.selection).find_map(|channel| Some((channel.file, channel.samples.failure()?)));

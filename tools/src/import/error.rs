@@ -1,6 +1,6 @@
-//! The error of an import: one line that names the file and what to do.
+//! The errors of an import: one line with the file or channel, and what to do.
 
-/// The reason for a refusal.
+/// The reason why logs cannot be imported.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each names its fields")]
@@ -8,29 +8,29 @@ pub enum ImportError {
     /// The file cannot be read.
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    /// The format is none that is read, or is damaged at its start.
+    /// The format is not supported, or the beginning of the file is corrupt.
     #[error("{path}: {reason}")]
     Format { path: String, reason: String },
     /// The DBC file cannot be used.
-    #[error("{path}: no DBC file: {reason}")]
+    #[error("{path}: not a valid DBC file: {reason}")]
     Dbc { path: String, reason: String },
-    /// The files hold no channel that fits.
+    /// No channel in the files fits the role.
     #[error("no {role} in the files{}", list(.candidates, "; there are "))]
     Missing { role: &'static str, candidates: Vec<String> },
-    /// Several channels are.
+    /// Several channels fit the role.
     #[error("several channels fit as {role}: name one in the vehicle file or with --{role}{}", list(.candidates, ": "))]
     Ambiguous { role: &'static str, candidates: Vec<String> },
-    /// A name is not in the files.
+    /// The named channel is not in the files, or in several of them.
     #[error("no channel {name} for {role}{}", list(.candidates, "; there are "))]
     Unknown { role: &'static str, name: String, candidates: Vec<String> },
-    /// The rate is outside of what the grid takes.
-    #[error("{channel}: {hz:.1} Hz, a drive needs 25 to 1000 Hz")]
+    /// The sample rate of the IMU is out of range.
+    #[error("{channel}: {hz:.1} Hz, but an IMU needs 25 to 1000 Hz")]
     Rate { channel: String, hz: f64 },
-    /// Two clocks cannot be laid on each other.
-    #[error("{path}: its clock cannot be laid on that of {first}: {reason}")]
+    /// The clocks of two files cannot be aligned.
+    #[error("{path}: the clock cannot be aligned with that of {first}: {reason}")]
     Clock { path: String, first: String, reason: String },
-    /// A drive would be shorter than static initialisation.
-    #[error("{channel}: {seconds:.2} s are no drive")]
+    /// The drive would be shorter than static initialisation, or longer than a day.
+    #[error("{channel}: {seconds:.2} s, but a drive is 3 s to a day long")]
     Short { channel: String, seconds: f64 },
 }
 

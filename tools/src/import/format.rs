@@ -1,4 +1,4 @@
-//! The format of a file, by its first bytes, and what to do with one that is not read.
+//! This module detects the format of a file by its first bytes, and says how to convert formats that cannot be read.
 
 use super::can::Bus;
 use super::error::ImportError;
@@ -10,11 +10,11 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Formats that are known but not read, by their first bytes, and what turns them into one that is.
+/// Formats that are known but cannot be read: their first bytes, and how to convert them.
 const REFUSED: [(&[u8], &str); 3] = [
     (
         b"SQLite format 3\0",
-        "a ROS 2 bag in SQLite, which would need a database to be built with this command; convert it: \
+        "a ROS 2 bag in SQLite, which cannot be read; convert it: \
          pip install rosbags && rosbags-convert --src FOLDER --dst CONVERTED --dst-storage mcap",
     ),
     (
@@ -28,26 +28,26 @@ const REFUSED: [(&[u8], &str); 3] = [
 /// Reads a file. `bus` decodes CAN frames, `columns` names the columns of a text table.
 ///
 /// # Errors
-/// [`ImportError`]: the file cannot be read at all, or its format is not one of those that are.
+/// [`ImportError`]: the file or its format cannot be read.
 pub fn read_file(path: &Path, bus: Option<&Bus>, columns: &Columns) -> Result<Log, ImportError> {
     read_into(path, bus, columns, Log::default())
 }
 
-/// Reads a file into a log that knows what is wanted.
+/// Reads a file into a log whose wanted channels are set.
 pub fn read_into(path: &Path, bus: Option<&Bus>, columns: &Columns, log: Log) -> Result<Log, ImportError> {
     let name = path.display().to_string();
     let io = |source| ImportError::Io { path: name.clone(), source };
     if path.is_dir() {
         return Err(ImportError::Format {
             path: name,
-            reason: "is a folder; name the files in it".to_owned(),
+            reason: "is a folder; give the files in it".to_owned(),
         });
     }
     let file = File::open(path).map_err(io)?;
     read(&name, &mut BufReader::with_capacity(1 << 16, file), bus, columns, log)
 }
 
-/// Reads bytes as a file of that name.
+/// Reads bytes as the contents of a file of that name.
 ///
 /// # Errors
 /// As [`read_file`].
@@ -69,7 +69,7 @@ fn read(
 ) -> Result<Log, ImportError> {
     let io = |source: std::io::Error| ImportError::Io { path: name.to_owned(), source };
     let refuse = |reason: &str| ImportError::Format { path: name.to_owned(), reason: reason.to_owned() };
-    // A file's buffer holds them all at the first look.
+    // The first read fills the buffer with more than the magic bytes.
     let head = input.fill_buf().map_err(io)?;
     if head.is_empty() {
         return Err(refuse("is empty"));
@@ -83,7 +83,7 @@ fn read(
         input.consume(ros_bag::MAGIC.len());
         ros_bag::read(input, &mut log).map_err(io)?;
     } else if head.starts_with(b"#ROSBAG") {
-        return Err(refuse("a bag of another version than 2.0; convert it: rosbag fix OLD.bag NEW.bag"));
+        return Err(refuse("not a bag of version 2.0; convert it: rosbag fix OLD.bag NEW.bag"));
     } else if head.starts_with(ulog::MAGIC) {
         ulog::read(input, &mut log).map_err(io)?;
     } else if head.starts_with(blf::MAGIC) {

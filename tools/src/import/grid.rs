@@ -1,23 +1,23 @@
-//! Samples of any rate on the 100 Hz grid.
+//! This module resamples samples of any rate to the 100 Hz grid.
 //!
-//! From 150 Hz on a row is the mean of the samples within 5 ms of it, which keeps the integral and what a mean filter
-//! keeps of the noise. Below, it is interpolated between its neighbours, at most two periods apart: a row in a gap is left
-//! out, because a row that is made up cannot be told from one that was measured.
+//! From 150 Hz on, a row is the mean of the samples within 5 ms of it, which preserves the integral and averages the
+//! noise. Below 150 Hz, a row is interpolated between its neighbours, if they are at most 2.5 periods apart. A row in
+//! a gap is left out, because an invented row could not be told from a measured one.
 
 use crate::drive::DT;
 
-/// Samples are averaged from this rate on, Hz.
+/// Rate from which on samples are averaged, Hz.
 const AVERAGED_HZ: f64 = 150.0;
-/// Gaps are longer than this many periods.
+/// Periods beyond which two samples have a gap between them.
 const GAP_PERIODS: f64 = 2.5;
 
-/// The rate is taken of at most this many periods: the beginning of a long log.
+/// Most periods, from the beginning of a log, of which the median is taken.
 const RATED: usize = 100_000;
 
-/// Samples of a vector, in rising order of time.
+/// An iterator over the samples of a vector, in order of time.
 pub type Stream<'a, const N: usize> = Box<dyn Iterator<Item = (f64, [f64; N])> + 'a>;
 
-/// Returns the rate by the median period, Hz.
+/// Returns the sample rate by the median period, Hz.
 pub fn rate<const N: usize>(stream: Stream<'_, N>) -> Option<f64> {
     let mut last = None;
     let period = |(seconds, _)| last.replace(seconds).map(|last| seconds - last);
@@ -30,7 +30,7 @@ pub fn rate<const N: usize>(stream: Stream<'_, N>) -> Option<f64> {
     Some(1.0 / *median)
 }
 
-/// Says how samples of a rate come to the grid.
+/// Returns how samples of this rate are resampled, for messages.
 pub fn method(hz: f64) -> &'static str {
     if hz >= AVERAGED_HZ {
         "mean of the samples within 5 ms of each row"
@@ -41,7 +41,7 @@ pub fn method(hz: f64) -> &'static str {
     }
 }
 
-/// Brings samples to `start + k * 10 ms`, row after row; `None` in gaps.
+/// An iterator over samples that are resampled to `start + k * 10 ms`; `None` in gaps.
 pub struct Grid<'a, const N: usize> {
     stream: std::iter::Peekable<Stream<'a, N>>,
     before: Option<(f64, [f64; N])>,
@@ -51,7 +51,8 @@ pub struct Grid<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Grid<'a, N> {
-    /// Begins at `start`. `stream` gives the samples anew each time it is called, `offset` is added to their times.
+    /// Creates a grid that begins at `start`. Each call of `stream` returns all samples again; `offset` is added to
+    /// their times.
     pub fn new(stream: impl Fn() -> Stream<'a, N>, offset: f64, start: f64) -> Self {
         let hz = rate(stream()).unwrap_or(100.0);
         let shifted: Stream<'a, N> =
@@ -73,7 +74,7 @@ impl<'a, const N: usize> Grid<'a, N> {
 impl<const N: usize> Iterator for Grid<'_, N> {
     type Item = Option<[f64; N]>;
 
-    /// Never ends.
+    /// Returns the value of the next row. The iterator never ends.
     fn next(&mut self) -> Option<Self::Item> {
         let time = self.start + DT * self.row as f64;
         self.row += 1;
@@ -91,14 +92,14 @@ impl<const N: usize> Iterator for Grid<'_, N> {
     }
 }
 
-/// The value at a time from the sample before and the one behind.
+/// Interpolates between the sample before a time and the sample after it.
 fn between<const N: usize>(
     before: &(f64, [f64; N]),
     behind: Option<&(f64, [f64; N])>,
     time: f64,
     longest: f64,
 ) -> Option<[f64; N]> {
-    // A stamp at a row's own time needs no neighbour.
+    // A sample at the time of the row needs no interpolation.
     if (time - before.0).abs() < 1e-6 {
         return Some(before.1);
     }

@@ -1,38 +1,38 @@
-//! A log as all formats give it: named channels of timed measurements in SI units, and a count of what was dropped.
+//! A log of any format: named channels of timed measurements in SI units, and counts of dropped records.
 
 use super::samples::Samples;
 use super::value::{Kind, Value};
 use std::collections::BTreeMap;
 
-/// Samples of one channel that are kept: over a day at 1 kHz.
+/// Most samples of one channel: more than a day at 1 kHz.
 pub const MAX_SAMPLES: usize = 100_000_000;
-/// So many fixes of one channel are kept: a day at 20 Hz. A course needs them all in memory.
+/// Most GNSS fixes of one channel: a day at 20 Hz. Computing the course needs all of them in memory.
 const MAX_FIXES: usize = 2_000_000;
-/// Channels of one file; a log has tens, a bus with a large DBC file some thousands of signals.
+/// Most channels of one file. A log has tens; a bus with a large DBC file has thousands of signals.
 const MAX_CHANNELS: usize = 4_096;
-/// Reasons that are counted apart.
+/// Most reasons for dropped records that are counted separately.
 const MAX_REASONS: usize = 64;
 
 /// The channels of one file.
 #[derive(Debug, Default)]
 pub struct Log {
-    /// The samples of each channel, by name, in rising order of time.
+    /// The samples of each channel, by name, in order of time.
     pub channels: BTreeMap<String, Samples>,
-    /// The units of plain numbers, by channel, where the log has them.
+    /// The units of plain numbers, by channel, if the log has them.
     pub units: BTreeMap<String, String>,
-    /// Records that were not used, by reason.
+    /// Numbers of records that could not be used, by reason.
     pub dropped: BTreeMap<String, u64>,
-    /// Records that have no use for a drive, by type.
+    /// Numbers of records that no drive needs, by type.
     pub passed_over: BTreeMap<String, u64>,
-    /// Names of the plain numbers that a drive is made of; of any other only the ends and the number of samples are known,
-    /// since a bus has thousands. `None` keeps all.
+    /// Names of the plain number channels that are kept. Of other ones only the ends and the count are kept, since a
+    /// bus has thousands. `None` keeps all.
     pub wanted: Option<Vec<String>>,
     /// The reason why samples could not be kept.
     pub(super) failed: Option<std::io::Error>,
 }
 
 impl Log {
-    /// Adds a measurement. One that is not finite, or not later than the one before, is dropped.
+    /// Adds a measurement. A measurement that is not finite, or not later than the previous one, is dropped.
     pub fn add(&mut self, channel: &str, seconds: f64, value: Value) {
         if !seconds.is_finite() || !value.is_finite() {
             return self.drop(format!("{channel}: not a finite number"));
@@ -40,9 +40,9 @@ impl Log {
         let sample = (seconds, value);
         let Some(samples) = self.channels.get_mut(channel) else {
             if self.channels.len() >= MAX_CHANNELS {
-                return self.drop("more channels than can be kept".to_owned());
+                return self.drop("channels beyond the limit".to_owned());
             }
-            // A name may say the file too.
+            // A wanted name may begin with the file's name.
             let is_wanted = |wanted: &Vec<String>| wanted.iter().any(|name| name.ends_with(channel));
             let kept = value.kind() != Kind::Number || self.wanted.as_ref().is_none_or(is_wanted);
             match Samples::new(sample, kept) {
@@ -76,7 +76,7 @@ impl Log {
         count(&mut self.passed_over, kind.to_owned());
     }
 
-    /// Returns the names, kinds and rates of the channels, Hz.
+    /// Returns the name, kind, number of samples and rate, Hz, of each channel.
     pub fn catalogue(&self) -> impl Iterator<Item = (&str, Kind, usize, f64)> {
         self.channels.iter().map(|(name, samples)| {
             let rate = (samples.len() - 1) as f64 / (samples.last().0 - samples.first().0).max(1e-9);

@@ -1,4 +1,4 @@
-//! MCAP with ROS 1 or ROS 2 messages in it.
+//! This module reads MCAP files with ROS 1 or ROS 2 messages.
 
 use super::input::Input;
 use super::log::Log;
@@ -7,12 +7,12 @@ use super::zstd::Zstd;
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 
-/// First bytes of a file.
+/// First bytes of an MCAP file.
 pub const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Largest record; recorders close a chunk after 1 to 4 MiB.
+/// Largest record, bytes; recorders close a chunk after 1 to 4 MiB.
 const MAX_RECORD: usize = 256 << 20;
 
-/// Reads a file from its magic on. Damage ends it: what was read until then is kept, and the reason counted.
+/// Reads a file, including its magic. Reading ends at the first damage, which is counted.
 pub fn read(input: &mut Input<'_>, log: &mut Log) {
     let options = LinearReaderOptions::default().with_record_length_limit(MAX_RECORD);
     let mut reader = MessageReader::new_with_options(input, options);
@@ -22,7 +22,7 @@ pub fn read(input: &mut Input<'_>, log: &mut Log) {
     for message in reader {
         let message = match message {
             Ok(message) => message,
-            Err(error) => return log.drop(format!("damaged from here on: {error}")),
+            Err(error) => return log.drop(format!("corrupt from here on: {error}")),
         };
         let encoding = match message.channel.message_encoding.as_str() {
             "ros1" => Encoding::Ros1,

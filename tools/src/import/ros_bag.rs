@@ -1,7 +1,7 @@
-//! ROS 1 bags, version 2.0: records one after another, messages in compressed chunks.
+//! This module reads ROS 1 bags, version 2.0: a sequence of records, with messages in compressed chunks.
 //!
-//! The `rosbag` crate maps the whole file and finds its chunks by the index at the end, which a recording that was cut
-//! short does not have. Here records are read as they come, and the index is never needed.
+//! The `rosbag` crate maps the whole file and finds its chunks by the index at the end, which a truncated recording
+//! does not have. This module reads the records in order and does not need the index.
 
 use super::input::{Input, read_up_to};
 use super::log::Log;
@@ -9,18 +9,18 @@ use super::ros_message::{self, Encoding};
 use std::collections::BTreeMap;
 use std::io::Read;
 
-/// First bytes of a file.
+/// First bytes of a bag.
 pub const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Largest record, and largest chunk once unpacked; the recorder's own default is 768 KiB.
 const MAX_RECORD: u32 = 256 << 20;
 
-/// Topic and type of each connection.
+/// Topic and type of each connection, by its number.
 type Connections = BTreeMap<u32, (String, String)>;
 
-/// Reads a bag behind its magic.
+/// Reads a bag after its magic.
 ///
 /// # Errors
-/// The reader's. A file that ends within a record is no error: the end is counted.
+/// The reader's error. A file that ends within a record is not an error; it is counted.
 pub fn read(input: &mut Input<'_>, log: &mut Log) -> std::io::Result<()> {
     let mut connections = Connections::new();
     loop {
@@ -51,7 +51,7 @@ enum Part {
     Cut,
 }
 
-/// The next length and as many bytes.
+/// Reads a length and as many bytes.
 fn part(input: &mut Input<'_>) -> std::io::Result<Part> {
     let len = read_up_to(input, 4)?;
     if len.is_empty() {
@@ -77,11 +77,11 @@ fn unpack(fields: &Fields<'_>, data: Vec<u8>) -> Result<Vec<u8>, &'static str> {
         },
         _ => return Err("unknown compression"),
     };
-    done.map_err(|_| "damaged compression")?;
+    done.map_err(|_| "corrupt compressed data")?;
     Ok(unpacked)
 }
 
-/// The records of a chunk.
+/// Reads the records of a chunk.
 fn records(mut chunk: &[u8], connections: &mut Connections, log: &mut Log) {
     while !chunk.is_empty() {
         let (Some(header), Some(data)) = (block(&mut chunk), block(&mut chunk)) else {
@@ -124,11 +124,11 @@ fn message(fields: &Fields<'_>, data: &[u8], connections: &Connections, log: &mu
         (Some(time), Some((topic, kind))) => {
             ros_message::add(log, topic, kind, Encoding::Ros1, data, time);
         }
-        _ => log.drop("message of no connection".to_owned()),
+        _ => log.drop("messages of an unknown connection".to_owned()),
     }
 }
 
-/// The fields NAME=VALUE of a header.
+/// The NAME=VALUE fields of a header.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {

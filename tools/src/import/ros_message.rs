@@ -1,4 +1,4 @@
-//! ROS messages of the types that a drive can need, in ROS 1 serialisation and in CDR, which ROS 2 sends.
+//! This module parses ROS messages of the types that a drive can need, in ROS 1 serialisation and in CDR (ROS 2).
 //!
 //! The two differ in three ways: CDR aligns each number to its size, ends a string with a zero, and names its byte
 //! order; a ROS 1 header begins with a sequence number.
@@ -6,17 +6,16 @@
 use super::log::Log;
 use super::value::{Fix, Value};
 
-/// Says how the numbers of a message lie in its bytes.
+/// The serialisation of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// ROS 1: packed, little-endian.
     Ros1,
-    /// CDR behind its header of four bytes.
+    /// CDR after a header of four bytes.
     Cdr,
 }
 
-/// Adds a message to the log under its topic. `recorded` is the time at which it was written, s, for messages whose
-/// own stamp is zero.
+/// Adds a message to the log under its topic. `recorded` is the recording time, s, for messages whose stamp is zero.
 pub fn add(log: &mut Log, topic: &str, kind: &str, encoding: Encoding, bytes: &[u8], recorded: f64) {
     let kind = kind.replace("/msg/", "/");
     let read: fn(&mut Cursor<'_>) -> Option<Value> = match kind.as_str() {
@@ -31,14 +30,14 @@ pub fn add(log: &mut Log, topic: &str, kind: &str, encoding: Encoding, bytes: &[
     let parsed = cursor.as_mut().and_then(|cursor| Some((cursor.header()?, read(cursor)?)));
     match parsed {
         Some((stamp, value)) => log.add(topic, if stamp > 0.0 { stamp } else { recorded }, value),
-        None => log.drop(format!("{topic}: no whole {kind}")),
+        None => log.drop(format!("{topic}: invalid or truncated {kind}")),
     }
 }
 
 fn imu(cursor: &mut Cursor<'_>) -> Option<Value> {
     cursor.numbers::<13>()?;
     let rate = cursor.numbers()?;
-    // A driver without a gyro says so by -1 in its covariance.
+    // A first covariance element of -1 says that the driver has no such reading.
     let unknown = cursor.numbers::<9>()?[0] == -1.0;
     let force = cursor.numbers()?;
     let unknown = unknown || cursor.numbers::<9>()?[0] == -1.0;
@@ -64,12 +63,12 @@ fn fix(cursor: &mut Cursor<'_>) -> Option<Value> {
     let known = cursor.byte()? > 0;
     let variance = 0.5 * (covariance[0] + covariance[4]);
     let sigma_m = (known && variance > 0.0).then(|| variance.sqrt());
-    // Below zero the receiver has no fix: nothing that the log could not use.
+    // A status below zero means no fix; such a message is not an error.
     let degrees = if status < 0 { [f64::NAN; 2] } else { [latitude, longitude] };
     Some(Value::Position(Fix { degrees, sigma_m, velocity: None }))
 }
 
-/// Joints become signals TOPIC/NAME in rad/s: drivers of robots report their wheels so.
+/// Adds joints as signals TOPIC/NAME in rad/s; drivers of robots report their wheels as joints.
 fn joints(log: &mut Log, topic: &str, encoding: Encoding, bytes: &[u8], recorded: f64) {
     let parse = || {
         let mut cursor = Cursor::new(encoding, bytes)?;
@@ -85,14 +84,14 @@ fn joints(log: &mut Log, topic: &str, encoding: Encoding, bytes: &[u8], recorded
         Some((stamp, names?, rates?))
     };
     let Some((stamp, names, rates)) = parse() else {
-        return log.drop(format!("{topic}: no whole sensor_msgs/JointState"));
+        return log.drop(format!("{topic}: invalid or truncated sensor_msgs/JointState"));
     };
     for (name, rate) in names.iter().zip(rates) {
         log.add(&format!("{topic}/{name}"), if stamp > 0.0 { stamp } else { recorded }, Value::Number(rate));
     }
 }
 
-/// The rest of a message.
+/// A reader of a message's fields.
 struct Cursor<'a> {
     encoding: Encoding,
     big_endian: bool,
@@ -104,7 +103,7 @@ impl<'a> Cursor<'a> {
     fn new(encoding: Encoding, bytes: &'a [u8]) -> Option<Self> {
         let (big_endian, bytes) = match encoding {
             Encoding::Ros1 => (false, bytes),
-            // Plain CDR, version 1: the second byte is the order. Anything else is of another version.
+            // Plain CDR, version 1: the second byte is the byte order. Other encapsulations are not supported.
             Encoding::Cdr => match bytes {
                 [0, order @ (0 | 1), _, _, rest @ ..] => (*order == 0, rest),
                 _ => return None,
@@ -124,7 +123,7 @@ impl<'a> Cursor<'a> {
         self.take(1)?.first().copied()
     }
 
-    /// An unsigned number of up to eight bytes.
+    /// Reads an unsigned number of up to eight bytes.
     fn number(&mut self, size: usize) -> Option<u64> {
         if self.encoding == Encoding::Cdr {
             self.at = self.at.checked_next_multiple_of(size)?;
@@ -151,7 +150,7 @@ impl<'a> Cursor<'a> {
         Some(numbers)
     }
 
-    /// The number of elements that follow, no more than the bytes can hold.
+    /// Reads the number of elements that follow; `None` if the remaining bytes cannot hold them.
     fn count(&mut self, size: usize) -> Option<usize> {
         let count = self.u32()? as usize;
         (count <= self.bytes.len().saturating_sub(self.at) / size).then_some(count)
@@ -164,7 +163,7 @@ impl<'a> Cursor<'a> {
         Some(String::from_utf8_lossy(bytes).into_owned())
     }
 
-    /// The stamp of a header, s.
+    /// Reads a header and returns its time stamp, s.
     fn header(&mut self) -> Option<f64> {
         if self.encoding == Encoding::Ros1 {
             self.u32()?;

@@ -1,5 +1,5 @@
-//! The samples of a channel are in memory as far as they are few; beyond that they lie in a temporary file, so that a log
-//! of many gigabytes takes no more memory than a small one.
+//! Storage of a channel's samples: the newest in memory, the others in a temporary file, so that a log of many
+//! gigabytes needs no more memory than a small one.
 
 use super::value::{Fix, Kind, Sample, Value};
 use std::cell::OnceCell;
@@ -7,32 +7,32 @@ use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Write};
 use tempfile::NamedTempFile;
 
-/// A channel keeps at most this many numbers in memory: 256 KiB.
+/// Most numbers of a channel that are kept in memory: 256 KiB.
 const IN_MEMORY: usize = 1 << 15;
-/// A sample has at most this many numbers.
+/// Most numbers of a sample.
 const WIDEST: usize = 7;
 
-/// Holds the samples of a channel, all of one kind, in the order in which they came.
+/// The samples of a channel, all of one kind, in the order of the log.
 #[derive(Debug)]
 pub struct Samples {
-    /// The first and the last one.
+    /// The first and the last sample.
     ends: [Sample; 2],
     count: usize,
-    /// Whether more is kept than the ends and the count.
+    /// Whether all samples are kept, or only the ends and the count.
     kept: bool,
-    /// The newest ones, as numbers.
+    /// The newest samples, as numbers.
     memory: Vec<f64>,
-    /// Those before them.
+    /// The older samples.
     file: Option<NamedTempFile>,
-    /// The reason why the file could not be read back.
+    /// The reason why the temporary file could not be read back.
     failed: OnceCell<io::Error>,
 }
 
 impl Samples {
-    /// Begins with a first sample. Of those that are not `kept`, the first and the last are known, and how many they are.
+    /// Creates the storage with a first sample. Unless `kept`, only both ends and the count are stored.
     ///
     /// # Errors
-    /// The temporary file's.
+    /// The error of the temporary file.
     pub(super) fn new(first: Sample, kept: bool) -> io::Result<Self> {
         let mut samples = Self {
             ends: [first; 2],
@@ -46,10 +46,10 @@ impl Samples {
         Ok(samples)
     }
 
-    /// Adds a sample of the first one's kind.
+    /// Adds a sample of the same kind as the first one.
     ///
     /// # Errors
-    /// The temporary file's.
+    /// The error of the temporary file.
     pub(super) fn push(&mut self, sample: Sample) -> io::Result<()> {
         self.ends[1] = sample;
         self.count += 1;
@@ -101,7 +101,7 @@ impl Samples {
         let file =
             self.file.as_ref().map(|file| file.reopen().map(|file| BufReader::with_capacity(1 << 16, file)));
         let file = file.transpose().unwrap_or_else(|error| {
-            // The first reason stays.
+            // The first error is kept.
             let _ = self.failed.set(error);
             None
         });
@@ -128,7 +128,7 @@ impl<'a> IntoIterator for &'a Samples {
     }
 }
 
-/// Iterates over samples, first those in the file.
+/// An iterator over samples, first those in the file.
 #[derive(Debug)]
 pub struct Iter<'a> {
     samples: &'a Samples,
@@ -168,7 +168,7 @@ impl Iterator for Iter<'_> {
     }
 }
 
-/// Returns a sample as numbers, and how many they are. What is not known is NaN.
+/// Returns a sample as numbers, and their count. An unknown number is NaN.
 fn numbers((seconds, value): Sample) -> ([f64; WIDEST], usize) {
     match value {
         Value::Imu([fx, fy, fz], [wx, wy, wz]) => ([seconds, fx, fy, fz, wx, wy, wz], 7),
@@ -215,7 +215,7 @@ mod tests {
                 samples.push(sample(k)).unwrap();
             }
             assert!(samples.file.is_some() && !samples.memory.is_empty());
-            // Two at a time do not disturb each other.
+            // Two iterators at a time do not affect each other.
             for ((one, two), k) in samples.iter().zip(&samples).zip(0..) {
                 assert_eq!((one, two), (sample(k), sample(k)));
             }

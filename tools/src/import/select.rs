@@ -1,4 +1,4 @@
-//! The channels of several files that a drive is made of: by type where one fits, by name where several do.
+//! This module chooses the channels of a drive from several files: by type if only one fits, by name if several fit.
 
 use super::error::ImportError;
 use super::grid::Stream;
@@ -7,13 +7,13 @@ use super::samples::Samples;
 use super::value::{Fix, Kind, Sample, Value};
 use crate::drive::vehicle::Vehicle;
 
-/// The name with which a role is left out.
+/// The channel name that leaves a role empty.
 const NONE: &str = "none";
-/// The wheels of our own drives, in the order of their columns, and the reference yaw rate.
+/// Columns of the wheels and of the reference yaw rate in our own drives.
 pub const WHEELS: [&str; 4] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
 pub const REFERENCE: &str = "ref_gyr_z";
 
-/// A file that was read.
+/// A log file that was read.
 #[derive(Debug)]
 pub struct File {
     pub path: String,
@@ -40,7 +40,7 @@ pub struct Selection<'a> {
     pub wheels: [Option<Channel<'a>>; 4],
 }
 
-/// Returns the names of the plain numbers that [`select`] may choose.
+/// Returns the names of the plain number channels that [`select`] may choose.
 pub fn numbers(vehicle: &Vehicle) -> Vec<String> {
     let wheels = &vehicle.wheels;
     let named = [&wheels.front_right, &wheels.rear_right, &wheels.front_left, &wheels.rear_left];
@@ -67,7 +67,7 @@ pub fn select<'a>(files: &'a [File], vehicle: &'a Vehicle) -> Result<Selection<'
         names.map(|name| name.map(|name| by_name(files, "a wheel", name, Some(Kind::Number))).transpose());
     let wheels = [fr?, rr?, fl?, rl?];
     let odometry = match (&signals.odometry, wheels.iter().flatten().next()) {
-        // Wheels by name need no odometry.
+        // If wheels are found, no odometry is needed.
         (None, Some(_)) => None,
         (name, _) => by_type(files, Kind::Odometry, "odometry", name.as_deref())?,
     };
@@ -122,7 +122,7 @@ fn by_name<'a>(
         (Some(channel), None) => Ok(channel),
         (Some(_), Some(_)) => Err(ImportError::Unknown {
             role,
-            name: format!("{name}, which several files have: FILE:{name}"),
+            name: format!("{name} in one file only (several have it; write FILE:{name})"),
             candidates: Vec::new(),
         }),
         _ => Err(ImportError::Unknown { role, name: name.to_owned(), candidates: listed(files, fits) }),
@@ -140,7 +140,7 @@ fn channels(files: &[File]) -> impl Iterator<Item = Channel<'_>> {
     })
 }
 
-/// Lists at most twenty channels for a message.
+/// Returns at most twenty channels for a message.
 fn listed(files: &[File], fits: impl Fn(Kind) -> bool) -> Vec<String> {
     let catalogue = files.iter().flat_map(|file| file.log.catalogue());
     let fitting = catalogue.filter(|(_, kind, ..)| fits(*kind));
@@ -157,7 +157,7 @@ impl<'a> Channel<'a> {
         Box::new(self.samples.iter().filter_map(pick))
     }
 
-    /// Specific force and angular rate of each sample.
+    /// Returns specific force and angular rate of each sample.
     pub fn imu(&self) -> Stream<'a, 6> {
         self.stream(|value| match value {
             Value::Imu([fx, fy, fz], [wx, wy, wz]) => Some([fx, fy, fz, wx, wy, wz]),
@@ -165,7 +165,7 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// Speed and yaw rate of each sample of an odometry.
+    /// Returns speed and yaw rate of each sample of an odometry.
     pub fn odometry(&self) -> Stream<'a, 2> {
         self.stream(|value| match value {
             Value::Odometry(speed, rate) => Some([speed, rate]),
@@ -173,7 +173,7 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// The fixes.
+    /// Returns the GNSS fixes with their times.
     pub fn fixes(&self) -> Vec<(f64, Fix)> {
         let fix = |(seconds, value)| match value {
             Value::Position(fix) => Some((seconds, fix)),
@@ -182,7 +182,8 @@ impl<'a> Channel<'a> {
         self.samples.iter().filter_map(fix).collect()
     }
 
-    /// A wheel's speed, m/s or, in rad/s, its rate: by the unit, m/s without one.
+    /// Returns a wheel's speed, m/s, and false, or its rate, rad/s, and true. The unit decides; a channel without a
+    /// unit is in m/s.
     pub fn speed(&self) -> (Stream<'a, 1>, bool) {
         let unit = self.unit.trim().to_lowercase();
         let scale = match unit.as_str() {
@@ -191,7 +192,7 @@ impl<'a> Channel<'a> {
             "rpm" | "1/min" => std::f64::consts::TAU / 60.0,
             _ => 1.0,
         };
-        // A robot's joints come without a unit, in rad/s.
+        // A ROS joint (its name begins with the topic's slash) has no unit and is in rad/s.
         let is_rate = matches!(unit.as_str(), "rad/s" | "rpm" | "1/min")
             || unit.is_empty() && self.name.starts_with('/');
         let speed = move |value| match value {
@@ -201,7 +202,7 @@ impl<'a> Channel<'a> {
         (self.stream(speed), is_rate)
     }
 
-    /// The yaw rate of any channel that has one, rad/s to the left.
+    /// Returns the yaw rate of a channel, rad/s to the left.
     pub fn yaw_rate(&self) -> Stream<'a, 1> {
         let unit = self.unit.trim().to_lowercase();
         let degrees = matches!(unit.as_str(), "deg/s" | "°/s" | "degree/s" | "deg/sec" | "grad/s");

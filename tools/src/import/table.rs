@@ -1,7 +1,7 @@
-//! Text tables: a CSV of any names by a column map, and the export of Xsens MT Manager.
+//! This module reads text tables: a CSV with any column names, by a column map, and exports of Xsens MT Manager.
 //!
-//! Each column that is a number becomes a channel. Three of a gyro and three of an accelerometer become an IMU, latitude
-//! and longitude a position.
+//! Each column of numbers becomes a channel. Three gyro columns and three accelerometer columns become an IMU;
+//! latitude and longitude become a position.
 
 use super::input::{Input, read_line};
 use super::log::Log;
@@ -9,12 +9,12 @@ use super::select::{REFERENCE, WHEELS};
 use super::value::{Fix, Value};
 use crate::drive::vehicle::{Column, Columns};
 
-/// Longest line.
+/// Longest line, bytes.
 const MAX_LINE: u64 = 1 << 16;
-/// Lines of remarks before the header.
+/// Most comment lines before the header.
 const MAX_REMARKS: usize = 1_000;
 
-/// Our names, and those that common exports use for the same in the same unit.
+/// Our column names, and the names that common exports use for the same column in the same unit.
 const KNOWN: [(&str, &[&str]); 13] = [
     ("t_s", &["time_s", "timestamp_s", "timestamps"]),
     ("acc_x", &["Acc_X"]),
@@ -30,7 +30,7 @@ const KNOWN: [(&str, &[&str]); 13] = [
     ("ground_speed", &[]),
     ("course_sigma", &[]),
 ];
-/// Units and what one of them is in SI.
+/// Units and their values in SI.
 const UNITS: [(&str, f64); 15] = [
     ("s", 1.0),
     ("ms", 1e-3),
@@ -48,35 +48,35 @@ const UNITS: [(&str, f64); 15] = [
     ("mph", 0.447_04),
     ("rpm", std::f64::consts::TAU / 60.0),
 ];
-/// Units of angular rates, which are rad/s once they are read.
+/// Units of angular rates, which are converted to rad/s.
 const RATES: [&str; 3] = ["rad/s", "deg/s", "rpm"];
 
-/// The error of a table.
+/// The reason why a table cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    #[error("no format that is known: neither a bag, MCAP, ULog or CAN log, nor a table with a header")]
+    #[error("unknown format: neither a bag, MCAP, ULog or CAN log, nor a table with a header")]
     Unknown,
     #[error("no column {0}; the columns are {1}")]
     Column(String, String),
-    #[error("unknown unit {0:?}; known are {units}", units = UNITS.map(|(unit, _)| unit).join(", "))]
+    #[error("unknown unit {0:?}; known units are {units}", units = UNITS.map(|(unit, _)| unit).join(", "))]
     Unit(String),
     #[error(
-        "no column of time; name it in the vehicle file: [columns] t_s = {{ name = \"...\", unit = \"ms\" }}; the columns are {0}"
+        "no time column; name it in the vehicle file: [columns] t_s = {{ name = \"...\", unit = \"ms\" }}; the columns are {0}"
     )]
     Time(String),
     #[error("an Xsens DOT export, whose units differ by version; name its columns in the vehicle file")]
     Dot,
 }
 
-/// A source of the time.
+/// A column that gives the time.
 #[derive(Clone, Copy)]
 enum Time {
     Column(usize, f64),
     /// A counter of 32 bits, in units of 0.1 ms.
     Fine(usize),
-    /// A counter of 16 bits, and the samples of a second.
+    /// A counter of 16 bits, and the counts per second.
     Packets(usize, f64),
 }
 
@@ -90,7 +90,7 @@ impl Time {
 /// Reads a table.
 ///
 /// # Errors
-/// [`TableError`]. A row that is cut short or has text where a number should be is counted.
+/// [`TableError`]. A row that is truncated or has text instead of a number is counted.
 pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(), TableError> {
     let (header, rate) = header(input)?;
     let (header, separator) = header;
@@ -134,7 +134,7 @@ pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(
             Some(unit * row.get(at)?.parse::<f64>().ok()?)
         };
         if row.len() != names.len() {
-            log.drop("rows of another length than the header".to_owned());
+            log.drop("rows whose length differs from the header".to_owned());
             continue;
         }
         let Some(seconds) = clock.seconds(number) else {
@@ -148,7 +148,7 @@ pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(
         if let (Some(_), Some(_)) = (gx, ax) {
             match (vector([ax, ay, az]), vector([gx, gy, gz])) {
                 (Some(force), Some(rate)) => log.add("imu", seconds, Value::Imu(force, rate)),
-                _ => log.drop("rows whose IMU is not six numbers".to_owned()),
+                _ => log.drop("rows without six numbers for the IMU".to_owned()),
             }
         }
         if let (Some(latitude), Some(longitude)) = (number(lat), number(lon)) {
@@ -165,7 +165,7 @@ pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(
     Ok(())
 }
 
-/// The header with its separator, and the rate that a remark before it names, Hz.
+/// The header line, its separator, and the sample rate that a comment before it gives, Hz.
 type Header = ((String, Option<char>), Option<f64>);
 
 fn header(input: &mut Input<'_>) -> Result<Header, TableError> {
@@ -194,7 +194,7 @@ fn header(input: &mut Input<'_>) -> Result<Header, TableError> {
     Err(TableError::Unknown)
 }
 
-/// Splits a row; without a separator at white space.
+/// Splits a row at the separator, or else at white space.
 fn split(line: &str, separator: Option<char>) -> Vec<&str> {
     match separator {
         Some(separator) => line.split(separator).map(|field| field.trim().trim_matches('"')).collect(),
@@ -202,7 +202,7 @@ fn split(line: &str, separator: Option<char>) -> Vec<&str> {
     }
 }
 
-/// Says where a column of ours is, and its unit in SI.
+/// Returns the index of one of our columns, and its unit in SI.
 fn find(names: &[String], columns: &Columns, ours: &str) -> Result<Option<(usize, f64)>, TableError> {
     if let Some(Column { name, unit }) = columns.get(ours) {
         let at = names.iter().position(|column| column == name);
@@ -213,7 +213,7 @@ fn find(names: &[String], columns: &Columns, ours: &str) -> Result<Option<(usize
     Ok(names.iter().position(|name| name == ours || others.contains(&name.as_str())).map(|at| (at, 1.0)))
 }
 
-/// Latitude and longitude stay degrees.
+/// Returns the value of a unit in SI; latitude and longitude stay in degrees.
 fn scale(unit: Option<&str>, keeps_degrees: bool) -> Result<f64, TableError> {
     match unit {
         None => Ok(1.0),
@@ -226,7 +226,7 @@ fn scale(unit: Option<&str>, keeps_degrees: bool) -> Result<f64, TableError> {
     }
 }
 
-/// Columns beyond the known ones: each is a signal of its own name, in the unit that the map gives.
+/// Returns the index and the unit of the other columns, which become signals of the same name.
 fn named_others(
     names: &[String],
     columns: &Columns,
@@ -245,7 +245,8 @@ fn named_others(
     Ok(others)
 }
 
-/// Returns the unit of a column once it is read. Our own drives have rates of wheels and of the reference.
+/// Returns the unit of a column after conversion to SI, as far as it is an angular rate. In our own drives the wheels
+/// and the reference are rates.
 fn unit_of(name: &str, columns: &Columns) -> &'static str {
     let given = columns.values().find(|column| column.name == name).and_then(|column| column.unit.as_deref());
     match given {
@@ -257,7 +258,8 @@ fn unit_of(name: &str, columns: &Columns) -> &'static str {
 
 /// A clock whose counter wraps.
 struct Clock {
-    /// Its sources; once one has a value the others are forgotten. Exports have columns that are empty throughout.
+    /// The columns that may give the time. The first one with a value is used from then on: exports have columns that
+    /// are empty in every row.
     times: Vec<Time>,
     last: Option<f64>,
     turns: f64,
@@ -275,7 +277,7 @@ impl Clock {
             Time::Packets(at, rate) => (at, 65_536.0, rate),
         };
         let count = number(Some((at, 1.0)))?;
-        // A wrap goes back by more than half of all that can be counted; less is a clock that jumped.
+        // A wrap steps back by more than half of the counter's range; a smaller step is a jump of the clock.
         if self.last.is_some_and(|last| count < last - 0.5 * period) {
             self.turns += period;
         }
@@ -308,7 +310,7 @@ mod tests {
 
     #[test]
     fn columns_of_an_export_that_are_empty_throughout_do_no_harm() {
-        // As MT Manager 4.6 writes it for an MTw Awinda: the counter alone says when, and no row has a position.
+        // As MT Manager 4.6 exports an MTw Awinda: only the counter gives the time, and no row has a position.
         let text = "// Update Rate: 40.0Hz\r\nPacketCounter\tSampleTimeFine\tYear\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\t\
                     Latitude\tLongitude\r\n03583\t\t\t3.0\t5.2\t-7.7\t0.1\t0.2\t0.3\t\t\r\n\
                     03584\t\t\t3.0\t5.2\t-7.7\t0.1\t0.2\t0.3\t\t\r\n";
@@ -334,8 +336,8 @@ mod tests {
     #[test]
     fn what_cannot_be_a_table_is_refused_with_the_reason() {
         let message = |text: &str, map: &str| table(text, map).unwrap_err().to_string();
-        assert!(message("\u{1}\u{2}\u{3} x", "").starts_with("no format that is known"));
-        assert!(message("a,b\n1,2\n", "").starts_with("no column of time"));
+        assert!(message("\u{1}\u{2}\u{3} x", "").starts_with("unknown format"));
+        assert!(message("a,b\n1,2\n", "").starts_with("no time column"));
         assert_eq!(message("a,b\n", "t_s={name='c'}"), "no column c; the columns are a, b");
         assert!(
             message("a,b\n", "t_s={name='a',unit='fortnights'}").starts_with("unknown unit \"fortnights\"")

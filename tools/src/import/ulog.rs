@@ -1,6 +1,6 @@
-//! PX4 ULog, by PX4's own crate: the combined IMU and GNSS.
+//! This module reads PX4 ULog files with the `px4-ulog` crate: the combined IMU, GNSS and wheel encoders.
 //!
-//! PX4's body axes are x forward, y right, z down; they are turned to y left, z up here.
+//! PX4's body axes are x forward, y right, z down; they are converted to y left, z up.
 
 use super::input::{Input, read_up_to};
 use super::log::Log;
@@ -8,18 +8,18 @@ use super::value::{Fix, Value};
 use px4_ulog::stream_parser::LogParser;
 use px4_ulog::stream_parser::model::{DataMessage, FlattenedFieldType as Type};
 
-/// First bytes of a file.
+/// First bytes of a ULog file.
 pub const MAGIC: &[u8] = b"ULog\x01\x12\x35";
-/// Bytes of the file's head.
+/// Length of the file header, bytes.
 const HEAD: usize = 16;
 
-/// Reads a file from its magic on. Damage ends it: what was read until then is kept, and the reason counted.
+/// Reads a file, including its magic. Reading ends at the first damage, which is counted.
 ///
-/// The crate gets the records that a drive needs, one at a time and of the least length that their kind has: it panics on
-/// shorter ones.
+/// The crate panics on records that are too short, so it gets only the kinds of records that a drive needs, one at a
+/// time, after a check of their length.
 ///
 /// # Errors
-/// The reader's.
+/// The reader's error.
 pub fn read(input: &mut Input<'_>, log: &mut Log) -> std::io::Result<()> {
     let mut take = |message: &DataMessage<'_>| add(message, log);
     let mut parser = LogParser::default();
@@ -28,7 +28,7 @@ pub fn read(input: &mut Input<'_>, log: &mut Log) -> std::io::Result<()> {
     let mut record = read_up_to(input, HEAD)?;
     let damage = loop {
         if let Err(error) = parser.consume_bytes(&record) {
-            break Some(format!("damaged from here on: {}", error.description));
+            break Some(format!("corrupt from here on: {}", error.description));
         }
         record = read_up_to(input, 3)?;
         let [low, high, kind] = record[..] else {
@@ -53,7 +53,7 @@ pub fn read(input: &mut Input<'_>, log: &mut Log) -> std::io::Result<()> {
     };
     drop(parser);
     for _ in 0..short {
-        log.drop("records shorter than their kind".to_owned());
+        log.drop("records that are too short".to_owned());
     }
     if let Some(damage) = damage {
         log.drop(damage);
@@ -115,7 +115,7 @@ impl Fields<'_> {
         Some(Value::Imu(up(force?), up(rate?)))
     }
 
-    /// Latitude and longitude are 1e-7 degrees, or degrees in logs since version 1.15.
+    /// Returns the GNSS fix. Latitude and longitude are in 1e-7 degrees, or in degrees in logs since version 1.15.
     fn fix(&self) -> Option<Value> {
         let old = ["lat", "lon"].map(|name| Some(1e-7 * self.number(name)?));
         let new = ["latitude_deg", "longitude_deg"].map(|name| self.number(name));
@@ -124,7 +124,7 @@ impl Fields<'_> {
         let degrees = if fixed { [latitude?, longitude?] } else { [f64::NAN; 2] };
         let velocity = || {
             let variance = self.number("c_variance_rad")?;
-            // The field holds the receiver's standard deviation, its name notwithstanding.
+            // Despite its name, the field holds the receiver's standard deviation.
             Some([self.number("vel_m_s")?, self.number("cog_rad")?, variance])
         };
         Some(Value::Position(Fix { degrees, sigma_m: self.number("eph"), velocity: velocity() }))

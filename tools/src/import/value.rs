@@ -1,6 +1,6 @@
-//! A measurement of a log, in SI units.
+//! A measurement from a log, in SI units.
 
-/// One measurement. Axes are x forward, y left, z up, as far as the log says.
+/// A measurement of one channel. Axes are x forward, y left, z up, unless the log says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Value {
     /// Specific force, m/s^2, and angular rate, rad/s.
@@ -18,13 +18,13 @@ pub enum Value {
 pub struct Fix {
     /// Latitude and longitude, degrees.
     pub degrees: [f64; 2],
-    /// Standard deviation of the position in each horizontal direction, m, where the receiver gives one.
+    /// Standard deviation of the position in each horizontal direction, m, if the receiver gives one.
     pub sigma_m: Option<f64>,
-    /// Speed over ground, m/s, course in rad clockwise from north, and its standard deviation in rad.
+    /// Speed over ground, m/s, course, rad clockwise from north, and standard deviation of the course, rad.
     pub velocity: Option<[f64; 3]>,
 }
 
-/// The kinds of channels, which say what a channel is fit for.
+/// The kind of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Gyro and accelerometer.
@@ -38,7 +38,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Returns the word for messages.
+    /// Returns the name of the kind for messages.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -51,7 +51,7 @@ impl Kind {
 }
 
 impl Value {
-    /// Returns the kind of channel that it belongs to.
+    /// Returns the kind of channel that has such values.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self {

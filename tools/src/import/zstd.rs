@@ -1,14 +1,14 @@
-//! Chunks of an MCAP that are packed with zstd, by `ruzstd`: the MCAP crate's own way is a C library.
+//! This module decompresses the zstd chunks of an MCAP file with `ruzstd`; the MCAP crate uses a C library.
 
 use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::{McapError, McapResult};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 use std::io::Read;
 
-/// A whole block with its header and that of a frame.
+/// Length of the largest block with the headers of the block and of the frame, bytes.
 const ENOUGH: usize = (128 << 10) + 3 + 18 + 4;
 
-/// Unpacks one block at a time, so that no input can ask for more memory than its frame's window.
+/// A decompressor that decodes one block at a time, so that no input can need more memory than its frame's window.
 pub struct Zstd {
     decoder: FrameDecoder,
     in_frame: bool,

@@ -1,4 +1,4 @@
-//! The f32 checkpoints that `tools/train` exports: GyroNet's and FoGNet's, each with the tensors of its own layers.
+//! This module reads the f32 checkpoints of GyroNet and FoGNet that `tools/train` exports.
 
 pub use super::tensors::CheckpointError;
 
@@ -13,18 +13,18 @@ use gyronet::nn::reference::LstmWeights;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// A network that has checkpoints.
+/// A kind of network that a checkpoint can hold.
 pub trait Network {
-    /// Returns the names and shapes of the network's tensors; `found` gives the shapes in the file, where sizes may
-    /// vary.
+    /// Returns the names and shapes of the network's tensors; `found` gives the shapes in the file, from which
+    /// variable sizes are taken.
     fn shapes(found: Found<'_>) -> Vec<Shape>;
 }
 
-/// Stands for GyroNet: a linear part, or two LSTMs one above the other and a fully connected layer, or both.
+/// GyroNet: a linear part, or two stacked Bi-LSTMs and a fully connected layer, or both.
 #[derive(Debug, Clone)]
 pub struct GyroNet;
 
-/// Stands for FoGNet: two stacks of LSTMs, and four fully connected layers.
+/// FoGNet: two stacks of Bi-LSTMs and four fully connected layers.
 #[derive(Debug, Clone)]
 pub struct FogNet;
 
@@ -68,7 +68,7 @@ impl Network for FogNet {
     }
 }
 
-/// Holds a checkpoint in memory.
+/// A checkpoint in memory.
 #[derive(Debug, Clone)]
 pub struct Checkpoint<N> {
     tensors: Tensors,
@@ -84,7 +84,7 @@ impl<N: Network> Checkpoint<N> {
         Ok(Self { tensors: Tensors::read(path, N::shapes)?, network: PhantomData })
     }
 
-    /// Parses bytes; errors name them `name`.
+    /// Parses the bytes of a checkpoint; `name` is its name in errors.
     ///
     /// # Errors
     /// [`CheckpointError`] with that name.
@@ -103,11 +103,11 @@ impl<N: Network> Checkpoint<N> {
     }
 }
 
-/// GyroNet's linear part is the tensor of this name.
+/// Name of the tensor of GyroNet's linear part.
 const LINEAR: &str = "linear.weight";
 
 impl Checkpoint<GyroNet> {
-    /// Returns the parts that the network has.
+    /// Returns the shape of the network: the units of the Bi-LSTMs, and whether it has a linear part.
     #[must_use]
     pub fn shape(&self) -> blob::Shape {
         let units = self.bilstms().map_or(0, |network| network.lstm1[0].units());
@@ -150,7 +150,7 @@ impl Checkpoint<GyroNet> {
 }
 
 impl Checkpoint<FogNet> {
-    /// Returns whether a file is a checkpoint of FoGNet, by the tensors in it.
+    /// Returns whether a file is a checkpoint of FoGNet, by the names of its tensors.
     ///
     /// # Errors
     /// [`CheckpointError`], which names the file.

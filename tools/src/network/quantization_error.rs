@@ -1,12 +1,12 @@
-//! This module measures the error that quantisation adds: the integer network is compared with the f32 network, window
-//! by window.
+//! This module measures the error that quantisation adds, by comparing the integer and the f32 network on each
+//! window.
 
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::seconds::SecondsWindow;
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate, WindowNetwork};
 
-/// Runs two networks on every window, returns the first one's estimate and sums up their differences.
+/// A pair of networks that run on the same windows. It returns the integer estimates and sums the differences.
 #[derive(Debug)]
 pub struct Both<'n, I, F> {
     integer: &'n mut I,
@@ -14,12 +14,12 @@ pub struct Both<'n, I, F> {
     error: QuantizationError,
 }
 
-/// Sums the differences over all outputs of all windows.
+/// The differences of two networks, summed over all outputs of all windows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct QuantizationError {
-    /// Windows compared.
+    /// Number of windows that were compared.
     pub windows: u64,
-    /// Inputs that the integer network clamped.
+    /// Number of inputs that the integer network clamped.
     pub clamped_inputs: u64,
     squared_difference: f64,
     squared_reference: f64,
@@ -37,7 +37,7 @@ impl QuantizationError {
         }
     }
 
-    /// Returns the RMS of the scales' ratio less one; zero before the first window.
+    /// Returns the RMS of the ratio of the scales less one; zero before the first window.
     #[must_use]
     pub fn scale_rms(&self) -> f64 {
         if self.windows > 0 { (self.squared_scale / self.windows as f64).sqrt() } else { 0.0 }
@@ -45,7 +45,7 @@ impl QuantizationError {
 }
 
 impl<'n, I, F> Both<'n, I, F> {
-    /// Starts without a comparison.
+    /// Creates a pair that has compared no window yet.
     pub fn new(integer: &'n mut I, reference: &'n mut F) -> Self {
         Self { integer, reference, error: QuantizationError::default() }
     }

@@ -1,10 +1,9 @@
-//! Quantisation turns an f32 checkpoint into a weight file with int8 rows, packed in the order in which the kernels
+//! This module quantises an f32 checkpoint to a weight file with int8 rows, packed in the order in which the kernels
 //! read.
 //!
-//! A gate row gets one scale, chosen so that its largest weight becomes at most 127 and its multiplier is a whole
-//! number: the scale itself is then exact. Rows that share a halfword as the high part must not sum to more than 2^23
-//! for any input ([`gyronet::nn`]); where the scale of the largest weight would allow that, the scale is raised until
-//! it cannot happen.
+//! Each gate row has one scale. It is chosen so that the largest weight becomes at most 127 and the multiplier is an
+//! integer, which makes the scale itself exact. Rows in the high part of a halfword must not sum to more than 2^23
+//! for any input ([`gyronet::nn`]). If they could, the scale is raised until they cannot.
 
 pub mod fognet;
 mod rows;
@@ -18,21 +17,21 @@ use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2, linear::Linear};
 use gyronet::units::{AngularRate, SpecificForce};
 use serde_json::json;
 
-/// Network inputs are clamped to this many standard deviations; `gyronet quantize --drives` reports how many inputs
-/// are.
+/// Standard deviations to which network inputs are clamped; `gyronet quantize --drives` reports how many inputs are
+/// clamped.
 pub const INPUT_CLAMP_STD: f64 = 24.0;
 
 /// The reason why a checkpoint cannot be quantised.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum QuantizeError {
-    /// A row's weights are beyond +-3.96, the largest that int8 and a 16-bit multiplier hold.
+    /// A weight of a row is beyond +-3.96, the largest that int8 and a 16-bit multiplier can hold.
     #[error("layer {layer} row {row}: weight {weight} is too large for the int8 format (limit 3.96)")]
     WeightTooLarge {
-        /// Layer, 1 or 2; FoGNet's LSTM2 has 3 and 4.
+        /// Layer, 1 or 2; the layers of FoGNet's LSTM2 are 3 and 4.
         layer: usize,
-        /// PyTorch's row: gate x units + unit.
+        /// Row in PyTorch's order: gate x units + unit.
         row: usize,
-        /// The largest weight.
+        /// The largest weight of the row.
         weight: f64,
     },
     /// A normalisation constant does not fit its fixed-point field.
@@ -44,23 +43,25 @@ pub enum QuantizeError {
         value: f64,
     },
     /// The provenance does not name the gyro that FoGNet was trained for.
-    #[error("the checkpoint names no gyro: train with --gyro, and --serial where it is for one alone")]
+    #[error(
+        "the checkpoint does not name its gyro: train with --gyro, and with --serial if the weights are for one gyro only"
+    )]
     Gyro,
     /// The result does not pass the library's own checks.
     #[error(transparent)]
     Blob(#[from] blob::BlobError),
 }
 
-/// Holds the figures of a quantisation.
+/// The figures of a quantisation.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
-    /// Rows in all.
+    /// Number of gate rows.
     pub rows: usize,
-    /// Rows whose scale was raised to keep their sum inside 24 bits.
+    /// Number of rows whose scale was raised to keep their sum within the limit.
     pub raised: usize,
-    /// Largest factor by which one was raised.
+    /// Largest factor by which a scale was raised.
     pub largest_raise: f64,
-    /// Bytes of the file.
+    /// Length of the file, bytes.
     pub bytes: usize,
 }
 
@@ -70,7 +71,7 @@ impl Report {
     }
 }
 
-/// Makes GyroNet's weight file.
+/// Quantises a checkpoint of GyroNet; returns the weight file and its figures.
 ///
 /// # Errors
 /// [`QuantizeError`].
@@ -103,14 +104,14 @@ pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), Q
     file.extend(body);
     let words = seal(&mut file);
     report.bytes = file.len();
-    // The file must pass the same checks as in the firmware.
+    // The file must pass the checks of the firmware.
     Blob::new_checked(bytemuck::cast_slice(&words))?;
     Ok((file, report))
 }
 
-/// Writes the rows of the linear part; `units` converts codes of each feature to rate codes. The cumulative sums over
-/// the samples of each feature are rounded, from the oldest on: so a weight is off by at most an LSB, and weights that
-/// cancel for a constant input still do.
+/// Writes the rows of the linear part; `units` converts codes of each feature to rate codes. The cumulative sums of
+/// each feature's weights are rounded, from the oldest sample on. So a weight is off by at most an LSB, and weights
+/// that cancel for a constant input still cancel.
 fn linear(out: &mut Vec<u8>, weights: &[f32], units: &[f64; FEATURES]) -> Result<(), QuantizeError> {
     for row in weights.chunks_exact(LINEAR_INPUTS) {
         let mut sums = [(0.0, 0); FEATURES];
@@ -133,12 +134,12 @@ fn output(out: &mut Vec<u8>, tensors: &Tensors, shape: Shape) -> Result<(), Quan
     let bias = tensors.tensor("fc.bias");
     let unit = f64::from(tensors.tensor("output_scale")[0]) * f64::from(AngularRate::PER_RAD_PER_SEC);
     rows::dense(out, "gyro error", (error, bias[0]), (unit, Dense::SHIFT))?;
-    // The sum over the window is the mean of the logs.
+    // The factor 1 / WINDOW makes the sum over the window a mean.
     let log2 = f64::from(1 << exp2::FRACTION_BITS) * std::f64::consts::LOG2_E / WINDOW as f64;
     rows::dense(out, "log of the scale", (log_scale, bias[1]), (log2, Dense::SHIFT))
 }
 
-/// Makes the header that all networks have; `codes` of a feature make its unit.
+/// Returns the header that the weight files of all networks share; `codes` are each feature's codes per unit.
 fn header(
     tensors: &Tensors,
     [network, sizes @ .., linear]: Topology,
@@ -164,14 +165,14 @@ fn header(
     Ok(out)
 }
 
-/// Appends the checksum to a file; returns the file in whole words, as the library reads it.
+/// Appends the checksum to a file; returns the file in words, as the library reads it.
 fn seal(file: &mut Vec<u8>) -> Vec<u32> {
     let crc = blob::CRC.checksum(file);
     file.extend(crc.to_le_bytes());
     file.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
 }
 
-/// Rounds to int32; refuses a value that does not fit.
+/// Rounds to int32; returns an error if the value does not fit.
 fn fixed(what: &str, value: f64) -> Result<i32, QuantizeError> {
     let code = value.round();
     if code.is_finite() && code.abs() < f64::from(i32::MAX) {
@@ -181,7 +182,7 @@ fn fixed(what: &str, value: f64) -> Result<i32, QuantizeError> {
     }
 }
 
-/// Returns the provenance from training and the checkpoint's hash, padded to whole words.
+/// Returns the provenance from training and the hash of the checkpoint as JSON, padded to whole words.
 fn provenance(tensors: &Tensors) -> Vec<u8> {
     let training = serde_json::from_str(&tensors.provenance).unwrap_or(serde_json::Value::Null);
     let mut text = json!({ "checkpoint_sha256": tensors.sha256, "training": training }).to_string();

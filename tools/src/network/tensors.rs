@@ -1,5 +1,5 @@
-//! This module reads a checkpoint file (safetensors) and checks the tensors that a network needs: present, of the right
-//! shape, finite.
+//! This module reads a checkpoint file (safetensors) and checks that a network's tensors exist, fit and are
+//! finite.
 
 use gyronet::nn::reference::LstmWeights;
 use safetensors::{Dtype, SafeTensors};
@@ -34,7 +34,7 @@ pub enum CheckpointError {
         /// The tensor.
         tensor: String,
     },
-    /// A tensor has a different shape or element type from the network's.
+    /// A tensor does not have the shape and element type that the network needs.
     #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
     Shape {
         /// The file.
@@ -58,19 +58,19 @@ pub enum CheckpointError {
     },
 }
 
-/// Holds the name and shape of a tensor, as PyTorch has them.
+/// Name and shape of a tensor, as in PyTorch.
 pub type Shape = (String, Vec<usize>);
 
-/// Returns the shape of a tensor of the file at hand, if it is there.
+/// A function that returns the shape of a tensor in the file, if the file has it.
 pub type Found<'f> = &'f dyn Fn(&str) -> Option<Vec<usize>>;
 
-/// Describes a vector, or a matrix by rows.
+/// Returns the name and shape of one tensor: a vector, or a matrix in row-major order.
 pub(crate) fn tensor(name: &str, shape: &[usize]) -> Shape {
     (name.to_owned(), shape.to_vec())
 }
 
-/// Describes the tensors of a bidirectional LSTM: `units` in each direction, gates i, f, g, o below each other; a layer
-/// above another takes both its directions as input.
+/// Returns the tensors of a bidirectional LSTM with `units` in each direction. The rows of gates i, f, g and o follow
+/// each other; the input of a higher layer is both directions of the layer below.
 pub(crate) fn bilstm(name: &str, inputs: usize, units: usize, layers: usize) -> Vec<Shape> {
     let directions = (0..layers).flat_map(|layer| ["", "_reverse"].map(|direction| (layer, direction)));
     let tensors = directions.flat_map(|(layer, direction)| {
@@ -87,12 +87,12 @@ pub(crate) fn bilstm(name: &str, inputs: usize, units: usize, layers: usize) -> 
     tensors.collect()
 }
 
-/// Describes the tensors of a fully connected layer.
+/// Returns the tensors of a fully connected layer.
 pub(crate) fn dense(name: &str, inputs: usize, outputs: usize) -> [Shape; 2] {
     [tensor(&format!("{name}.weight"), &[outputs, inputs]), tensor(&format!("{name}.bias"), &[outputs])]
 }
 
-/// Holds the tensors of a network in memory.
+/// The tensors of a network.
 #[derive(Debug, Clone)]
 pub struct Tensors {
     tensors: BTreeMap<String, Vec<f32>>,
@@ -157,7 +157,7 @@ impl Tensors {
     /// Returns the values of a tensor, row-major.
     ///
     /// # Panics
-    /// For a name that the network does not have.
+    /// If the network has no tensor of this name.
     #[must_use]
     pub fn tensor(&self, name: &str) -> &[f32] {
         self.tensors.get(name).unwrap_or_else(|| panic!("the network has no tensor {name}"))

@@ -1,4 +1,4 @@
-//! This module reads a weight file (`.blob`) from disk, aligned as the library needs it.
+//! This module reads a weight file (`.blob`) from disk into memory with the alignment that the library needs.
 
 use gyronet::model::{Blob, BlobError, FogBlob};
 use std::path::Path;
@@ -15,7 +15,7 @@ pub enum WeightFileError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The library refuses it.
+    /// The library rejects the file.
     #[error("{path}: {source}")]
     Blob {
         /// The file.
@@ -25,11 +25,11 @@ pub enum WeightFileError {
     },
 }
 
-/// Holds the bytes of a weight file that has passed all of the library's checks.
+/// A weight file that has passed all of the library's checks.
 #[derive(Debug, Clone)]
 pub struct WeightFile {
     path: String,
-    /// Whole words, for their alignment; the last one may be padded.
+    /// The bytes of the file, in words for alignment; the last word may be padded.
     words: Vec<u32>,
     len: usize,
 }
@@ -51,7 +51,7 @@ impl WeightFile {
         Self::parse_fognet(&path.display().to_string(), &bytes(path)?)
     }
 
-    /// Checks the bytes of a weight file of GyroNet; errors name it `path`.
+    /// Checks the bytes of a weight file of GyroNet; `path` is its name in errors.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`] with that path.
@@ -61,7 +61,7 @@ impl WeightFile {
         Ok(file)
     }
 
-    /// Checks the bytes of a weight file of FoGNet; errors name it `path`.
+    /// Checks the bytes of a weight file of FoGNet; `path` is its name in errors.
     ///
     /// # Errors
     /// [`WeightFileError::Blob`] with that path.

@@ -1,5 +1,5 @@
-//! This module runs a sequence through the coprocessor, for the turns that the board sends with FoGNet or without, and
-//! through FoGNet alone on the turns of the sequence.
+//! This module runs a sequence through the coprocessor, to get the rates that the board sends with or without FoGNet,
+//! and through FoGNet alone, to correct the turns of the sequence.
 
 use crate::drive::DT;
 use crate::drive::wheel_frames;
@@ -9,7 +9,7 @@ use gyronet::bias::Latitude;
 use gyronet::coprocessor::{Clock, Config, Coprocessor};
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::{
-    FogConfig, FogCorrector, FogCounters, FogErrors, FogNetUse, NotForThisGyro, check_training,
+    FogConfig, FogCorrector, FogCounters, FogErrors, FogNetUse, GyroMismatch, check_training,
 };
 use gyronet::model::fognet::MinuteNetwork;
 use gyronet::model::fognet_blob::{Gyro, Training};
@@ -18,27 +18,27 @@ use gyronet::model::window::Features;
 use gyronet::sample::{FogSample, ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
 
-/// Static initialisation takes this many steps: 3 s.
+/// Number of steps of static initialisation: 3 s.
 const STATIC_STEPS: usize = 300;
 
-/// Holds the results of a sequence.
+/// Holds the results of FoGNet on a sequence.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FogReplay {
     /// Corrected turn of each step, rad.
     pub turns: Vec<f64>,
     /// Steps with a correction.
     pub corrected: u64,
-    /// Windows run.
+    /// Number of windows that FoGNet estimated.
     pub windows: u64,
     /// Input values that were clamped.
     pub clamped_inputs: u64,
     /// Estimates that were rejected as implausible.
     pub implausible: u64,
-    /// Windows that a gap ended.
+    /// Windows broken by a gap.
     pub broken: u64,
 }
 
-/// Runs a sequence through FoGNet alone; `tick` is called for each step.
+/// Runs a sequence through FoGNet alone; `tick` is called once per step.
 pub fn run(
     sequence: &Sequence,
     network: &mut impl MinuteNetwork,
@@ -86,12 +86,12 @@ pub fn default_config(sequence: &Sequence) -> FogConfig {
     FogConfig { errors, latitude, ..FogConfig::DEFAULT }
 }
 
-/// Returns whether weights are for the gyro of a sequence. A simulated one has the number of its device; a recorded one is
-/// taken for the one that the weights name.
+/// Checks that weights are for the gyro of a sequence. A simulated gyro has its device number as serial number; a
+/// recorded gyro is assumed to have the serial number that the weights name.
 ///
 /// # Errors
-/// [`NotForThisGyro`].
-pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), NotForThisGyro> {
+/// [`GyroMismatch`].
+pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), GyroMismatch> {
     let part = match sequence.layout {
         Layout::Kaist => Gyro::Dsp1760,
         Layout::Nclt => Gyro::Dsp3000,
@@ -100,8 +100,9 @@ pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), NotFo
     check_training(trained, part, serial, FogNetUse::Simulated)
 }
 
-/// Runs a sequence through the coprocessor, wheels by frames as the board receives them, and FoGNet where it is given;
-/// returns the rate that is sent for each step (zero for the first, whose beginning no sample has), and the counters.
+/// Runs a sequence through the coprocessor, with wheel speeds in frames as the board receives them, and with FoGNet
+/// if it is given. Returns the rate sent for each step (zero for the first, whose begin no sample marks), and the
+/// counters.
 #[must_use]
 pub fn run_board(
     sequence: &Sequence,
@@ -130,7 +131,7 @@ pub fn run_board(
             let [left, right] = way.map(|way| Some(way.abs() / (wheel_frames::FRAME_ROWS as f64 * DT) * 3.6));
             way = [0.0; 2];
             if let Some(frame) = wheel_frames::frame([left, right, left, right]) {
-                // A speed that does not fit a frame is not sent as valid, so the wheels become silent.
+                // A speed that does not fit a frame gives no frame, so the wheels are silent.
                 let _ = coprocessor.can(&frame, time);
             }
         }
@@ -142,7 +143,7 @@ pub fn run_board(
                 temperature: None,
                 validity: Validity::Good,
             };
-            // Times are in order, so no sample is refused.
+            // Times ascend, so no sample is refused.
             let _ = coprocessor.imu(sample, time);
         }
         let increment = [None, None, Some(angle(step.fog))];
@@ -156,15 +157,15 @@ pub fn run_board(
         }
         if let (Some(network), Some((number, window))) = (&mut fognet, coprocessor.fog_window()) {
             let estimate = network.estimate(&window);
-            // It comes in time.
+            // The estimate is in time, so it is not refused.
             let _ = coprocessor.deliver_fog(number, estimate);
         }
     }
     (sent, *coprocessor.fog_counters())
 }
 
-/// Returns the sequence with the gyro less the Earth's rate and its bias, as the board computes it and FoGNet receives
-/// it.
+/// Returns the sequence with the Earth's rate and the bias subtracted from the gyro, as the board computes it and
+/// FoGNet receives it.
 #[must_use]
 pub fn after_lane(sequence: &Sequence) -> Sequence {
     let (sent, _) = run_board(sequence, default_config(sequence), None);
@@ -175,15 +176,15 @@ pub fn after_lane(sequence: &Sequence) -> Sequence {
     corrected
 }
 
-/// Returns the inertial sensor's reading in codes; `None` beyond the range of any part.
+/// Returns the inertial sensor's reading in codes; `None` if it is beyond the range of all parts.
 fn codes(step: &Step) -> Option<Features> {
     let [fx, fy, fz] = step.specific_force.map(|f| SpecificForce::from_metre_per_sec2(f).ok());
     let [rx, ry, rz] = step.angular_rate.map(|rate| AngularRate::from_rad_per_sec(rate).ok());
     Some([fx?.0, fy?.0, fz?.0, rx?.0, ry?.0, rz?.0])
 }
 
-/// Returns the inertial sensor's features of each step, its gyro less its mean over the first 3 s; `None` for a reading
-/// beyond the range of any part.
+/// Returns the inertial sensor's features of each step, with the gyro's mean over the first 3 s subtracted; `None`
+/// for a reading beyond the range of all parts.
 fn features(sequence: &Sequence) -> Vec<Option<Features>> {
     let mut features: Vec<Option<Features>> = sequence.steps.iter().map(codes).collect();
     let first = || features.iter().take(STATIC_STEPS).flatten();
@@ -199,7 +200,7 @@ fn features(sequence: &Sequence) -> Vec<Option<Features>> {
     features
 }
 
-/// Returns the nearest code of an angle in rad; a double's 53 bits are more than the gyro's.
+/// Returns the nearest code of an angle in rad; an f64 has more bits than the gyro.
 fn angle(rad: f64) -> Angle {
     Angle((rad * f64::from(Angle::PER_RAD)).round() as i64)
 }
@@ -231,7 +232,7 @@ mod tests {
         let fog = run(&sequence, &mut Bias, FogConfig::DEFAULT, || {});
         assert_eq!((fog.windows, fog.broken), (39, 0));
         let raw: f64 = sequence.steps.iter().map(|step| step.fog).sum();
-        // 1e-7 rad in each corrected step, whatever the gyro says.
+        // 1e-7 rad in each corrected step, whatever the gyro reads.
         let taken = 1e-7 * fog.corrected as f64;
         let off = raw - fog.turns.iter().sum::<f64>();
         assert!((off - taken).abs() < 1e-9 && fog.corrected > 3_000, "{off} {taken}");

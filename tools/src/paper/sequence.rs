@@ -1,10 +1,9 @@
 //! This module reads sequences of KAIST Complex Urban and NCLT, real or simulated: it merges several files of different
 //! rates into one drive on a 100 Hz grid.
 //!
-//! Files are read side by side, a row of each at a time: an hour of a 1 kHz gyro needs no more
-//! memory than its 100 Hz steps. The grid begins with the first row of the inertial sensor that
-//! all other files have reached and ends with the file that ends first. In between, values are
-//! on the straight line between neighbouring rows; angles of the gyro and ways of the wheels are
+//! Files are read in parallel, one row at a time: an hour of a 1 kHz gyro needs no more memory than its 100 Hz steps.
+//! The grid begins with the first row of the inertial sensor for which all other files have data, and ends where the
+//! first file ends. Values in between are interpolated linearly. Angles of the gyro and distances of the wheels are
 //! interpolated as sums, so that nothing is lost or counted twice.
 
 mod export;
@@ -35,27 +34,28 @@ use track::Stream;
 
 /// A value interpolated across a longer gap than this is marked, s.
 pub const MAX_GAP: f64 = 0.1;
-/// The wheels may turn by this much during static initialisation, m.
+/// Largest distance that the wheels may roll during static initialisation, m.
 const STANDING: f64 = 0.01;
-/// A sequence must last at least this long: static initialisation and a second, s.
+/// Minimum length of a sequence, s: static initialisation and one second.
 const NEEDED: f64 = 4.0;
 
-/// Holds a step of the grid. Axes are x forward, y left, z up; heading is counter-clockwise from east.
+/// A step of the grid. Axes are x forward, y left, z up; heading is counter-clockwise from east.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Specific force, m/s^2.
     pub specific_force: [f32; 3],
     /// Angular rate, rad/s.
     pub angular_rate: [f32; 3],
-    /// The inertial sensor was silent around here for longer than [`MAX_GAP`].
+    /// True if the inertial sensor was silent around this step for longer than [`MAX_GAP`].
     pub imu_gap: bool,
-    /// The gyro, the wheels or the truth were silent around here for longer than [`MAX_GAP`].
+    /// True if the fibre-optic gyro, the wheels or the truth were silent around this step for longer than
+    /// [`MAX_GAP`].
     pub other_gap: bool,
-    /// The turn of the fibre-optic gyro since the step before, rad.
+    /// Angle turned since the previous step by the fibre-optic gyro, rad.
     pub fog: f64,
-    /// Way of the left and the right wheel since the step before, m.
+    /// Distances of the left and the right wheel since the previous step, m.
     pub wheels: [f64; 2],
-    /// True position, m from the first step's, east and north.
+    /// True position relative to the first step, m, east and north.
     pub position: [f64; 2],
     /// True heading, not wrapped, rad.
     pub yaw: f64,
@@ -66,29 +66,29 @@ pub struct Step {
 /// Holds a drive on the 100 Hz grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
-    /// Name of its folder.
+    /// Name of the sequence's folder.
     pub name: String,
-    /// Its folder.
+    /// Path of the sequence's folder.
     pub path: PathBuf,
-    /// The data set whose layout it has.
+    /// The data set whose layout the files have.
     pub layout: Layout,
-    /// The specification that it was simulated from, if it is simulated.
+    /// The specification of a simulated sequence; `None` for a recorded one.
     pub simulated: Option<Spec>,
     /// Says whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
     pub has_gyro: bool,
     /// Says whether [`Step::vendor_yaw`] comes from a vendor's filter.
     pub has_vendor: bool,
-    /// Distance of the wheels, m, if the data contain it.
+    /// Distance between the left and the right wheel, m, if the data contain it.
     pub wheel_base: Option<f64>,
-    /// Latitude of the first pose, deg, where poses are in UTM.
+    /// Latitude of the first pose, deg, if poses are in UTM.
     pub latitude: Option<f64>,
     /// The time of the first step, s since 1970.
     pub start_s: f64,
-    /// The place of the first step in the truth's frame, m, east and north.
+    /// Position of the first step in the truth's frame, m, east and north.
     pub origin: [f64; 2],
     /// The steps, 10 ms apart.
     pub steps: Vec<Step>,
-    /// Steps with a gap of the inertial sensor, the gyro, the wheels and the truth.
+    /// Numbers of steps in a gap of the inertial sensor, the gyro, the wheels and the truth.
     pub in_gap: [u64; 4],
     /// The summaries of the files: inertial sensor, gyro, wheels, truth.
     pub files: [StreamSummary; 4],
@@ -96,7 +96,7 @@ pub struct Sequence {
 
 /// Holds the open files of either layout.
 struct Files {
-    /// The time that the streams count from, s since 1970.
+    /// Time zero of the streams, s since 1970.
     epoch_s: f64,
     imu: Box<dyn Stream<7>>,
     fog: Box<dyn Stream<1>>,
@@ -110,7 +110,7 @@ struct Files {
 /// Returns the data set whose layout a folder has.
 ///
 /// # Errors
-/// [`DataFault::UnknownLayout`], or [`DataFault::Io`] where there is no folder.
+/// [`DataFault::UnknownLayout`], or [`DataFault::Io`] if there is no folder.
 pub fn layout(folder: &Path) -> Result<Layout, DataError> {
     if folder.join("sensor_data").is_dir() {
         Ok(Layout::Kaist)
@@ -122,7 +122,7 @@ pub fn layout(folder: &Path) -> Result<Layout, DataError> {
     }
 }
 
-/// Finds the sequences of a folder: the folder itself, or those directly below it, by name.
+/// Finds the sequences of a folder: the folder itself, or the folders directly below it, sorted by name.
 ///
 /// # Errors
 /// [`DataError`] if neither is a sequence.
@@ -140,7 +140,7 @@ pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     if found.is_empty() { Err(error(DataFault::UnknownLayout)) } else { Ok(found) }
 }
 
-/// Returns the files of a sequence of either layout that are there.
+/// Returns the existing files of a sequence of either layout.
 #[must_use]
 pub fn files(folder: &Path) -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = kaist::PATHS.iter().chain(&nclt::PATHS).map(|p| folder.join(p)).collect();
@@ -157,7 +157,7 @@ pub fn size(folder: &Path) -> u64 {
 }
 
 impl Sequence {
-    /// Reads a folder. `watch` is called from time to time with the number of bytes read.
+    /// Reads the sequence in a folder. `watch` is called every 1024 steps with the number of bytes read.
     ///
     /// # Errors
     /// [`DataError`], which names the file and, where there is one, the line.
@@ -169,7 +169,7 @@ impl Sequence {
             Layout::Kaist => kaist::open(folder, &progress)?,
             Layout::Nclt => nclt::open(folder, &progress)?,
         };
-        // In a simulated sequence the heading beside the sensor's data comes from no vendor's filter.
+        // The heading beside the sensor's data in a simulated sequence does not come from a vendor's filter.
         let has_vendor = files.has_vendor && simulated.is_none();
         let begin = files.begin()?;
         let mut steps = Vec::new();
@@ -218,7 +218,7 @@ impl Sequence {
         })
     }
 
-    /// Returns the length, s.
+    /// Returns the length of the sequence, s.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         self.steps.len() as f64 * DT
@@ -229,7 +229,7 @@ impl Sequence {
     #[must_use]
     pub fn latitude_deg(&self) -> f64 {
         let made = self.layout.vehicle().world.latitude_deg;
-        // A simulated world turns by the latitude of its settings, wherever its map lies.
+        // A simulated world rotates as at the latitude of its settings, whatever the position of its map.
         self.latitude.filter(|_| self.simulated.is_none()).unwrap_or(made)
     }
 
@@ -250,7 +250,7 @@ impl Sequence {
     }
 
     /// Converts the drive to a recording, as the other commands use it. Steps in a gap of the inertial sensor are left
-    /// out, because a board would not receive them. Wheels are rear right and rear left.
+    /// out, because a board would not receive them. The wheels become the rear right and rear left ones.
     ///
     /// # Errors
     /// [`DataFault::NoGyro`].
@@ -263,7 +263,7 @@ impl Sequence {
             let [wx, wy, wz] = step.angular_rate.map(AngularRate::from_rad_per_sec);
             let sample = ImuSample {
                 time: Micros(k as u64 * PERIOD_US),
-                // A reading beyond any part's range counts as no sample: the pipeline counts the gap.
+                // A reading beyond the range of all parts gives no sample, and the pipeline counts a gap.
                 specific_force: [fx.ok()?, fy.ok()?, fz.ok()?],
                 angular_rate: [wx.ok()?, wy.ok()?, wz.ok()?],
                 temperature: None,
@@ -278,7 +278,7 @@ impl Sequence {
         Ok(Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() })
     }
 
-    /// Checks that the wheels stand during static initialisation.
+    /// Checks that the vehicle stands during static initialisation.
     ///
     /// # Errors
     /// [`DataFault::Rolling`].
@@ -326,7 +326,7 @@ impl Values {
 }
 
 impl Files {
-    /// Returns the time of the first row of the inertial sensor that all files have reached.
+    /// Returns the time of the first row of the inertial sensor for which all files have data.
     fn begin(&mut self) -> Result<f64, DataError> {
         let others = [self.fog.first(), self.wheels.first(), self.truth.first()];
         let begin = others.into_iter().fold(self.imu.first(), f64::max);
@@ -334,7 +334,7 @@ impl Files {
         Ok(self.imu.reached().max(begin))
     }
 
-    /// Returns the values at a time and which of them lie in a gap; `None` where a file has ended.
+    /// Returns the values at a time, and which of them are in a gap; `None` if a file has ended.
     fn at(&mut self, time: f64) -> Result<Option<(Values, [bool; 4])>, DataError> {
         let Some(imu) = self.imu.at(time)? else { return Ok(None) };
         let Some(fog) = self.fog.at(time)? else { return Ok(None) };

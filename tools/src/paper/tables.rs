@@ -1,8 +1,9 @@
-//! These modules make the paper's tables for given sequences, beside the paper's own figures.
+//! These modules compute the paper's tables for given sequences, beside the paper's own results.
 //!
-//! [`estimates`] makes an [`estimate`] of a sequence by each method, [`given`] takes other programs' trajectories, [`joint`] fits wheels
-//! and gyro, [`results`] compares all with the truth and takes means over a [`group`], [`table`] lays them out as the paper's tables, beside its figures ([`paper`]), [`text`]
-//! and [`html`] write them, [`pictures`] draws.
+//! [`estimates`] computes an [`estimate`] of a sequence by each method, [`given`] reads other programs' trajectories,
+//! and [`joint`] fits wheels and gyro. [`results`] compares all of them with the truth and averages over a [`group`].
+//! [`table`] builds the paper's tables, beside the paper's own results ([`paper`]). [`text`] and [`html`] write the
+//! tables, and [`pictures`] draws the figures.
 
 pub mod estimate;
 pub mod estimates;

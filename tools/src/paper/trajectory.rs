@@ -1,6 +1,6 @@
-//! This module reads trajectories in the format of TUM's RGB-D benchmark, as evo reads and writes them: rows of `time x y
-//! z qx qy qz qw`, separated by spaces; time in s since 1970, ascending, m, and the attitude as a quaternion. Rows that
-//! begin with # are remarks.
+//! This module reads trajectories in the format of TUM's RGB-D benchmark, as evo reads and writes them. A row is
+//! `time x y z qx qy qz qw`, separated by spaces: time in s since 1970, ascending, position in m, and attitude as a
+//! quaternion. Rows that begin with # are comments.
 
 use super::sequence::yaw;
 use crate::drive::error::{DataError, DataFault, ValueError};
@@ -11,19 +11,19 @@ use std::path::Path;
 
 /// The columns of a row.
 const COLUMNS: [&str; 8] = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"];
-/// A value beyond this is refused: metres of UTM are some 4e6, seconds since 1970 some 2e9.
+/// A value beyond this is refused: UTM coordinates are about 4e6 m, times since 1970 about 2e9 s.
 const MAX_VALUE: f64 = 1e12;
-/// A quaternion's norm is 1 but for the digits that it is printed with.
+/// Tolerance of a quaternion's norm, which differs from 1 by the rounding of the printed digits.
 const NORM_TOLERANCE: f64 = 0.01;
 
 /// Holds a pose in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// The line of the file.
+    /// Line number in the file.
     pub line: u64,
     /// The time, s since 1970.
     pub time: f64,
-    /// East and north, or whatever the file's x and y are, m.
+    /// The file's x and y, usually east and north, m.
     pub position: Point,
     /// Heading, not wrapped, rad.
     pub yaw: f64,
@@ -32,7 +32,7 @@ pub struct Pose {
 /// Holds the trajectory of a file: at least one pose, times ascending.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// The file.
+    /// Path of the file.
     pub path: String,
     /// The poses.
     pub poses: Vec<Pose>,

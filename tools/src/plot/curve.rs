@@ -1,6 +1,6 @@
 //! This module thins the points of a curve and finds their range.
 
-/// Returns every n-th point so that about `most` are left, and the last one.
+/// Returns every n-th point so that at most `most` are left, and the last point.
 pub fn thinned(
     points: impl ExactSizeIterator<Item = (f64, f64)> + DoubleEndedIterator + Clone,
     most: usize,
@@ -10,14 +10,13 @@ pub fn thinned(
     points.step_by(step).chain(last)
 }
 
-/// Returns the least and the greatest value with a share of their distance as a margin on either side; 0 to 1 for no
-/// values.
+/// Returns the least and the greatest value, with `air` times their difference as margins; 0 to 1 for no values.
 pub fn range(values: impl Iterator<Item = f64>, air: f64) -> (f64, f64) {
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
     if low > high {
         return (0.0, 1.0);
     }
-    // A level curve has some height, too.
+    // The range of a level curve must not be empty.
     let air = (air * (high - low)).max(1e-7);
     (low - air, high + air)
 }

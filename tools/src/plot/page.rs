@@ -1,4 +1,4 @@
-//! This module writes an HTML page that loads nothing from elsewhere and can be read without a script; the script adds
+//! This module writes an HTML page that loads no other files. The page is readable without a script; the script adds
 //! zooming.
 
 pub mod chart;
@@ -7,10 +7,10 @@ use std::fmt::{Display, Write};
 
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/zoom.js");
-/// A page with charts says this once.
+/// The hint of a page with charts.
 pub const HINT: &str = "Drag over a chart, or press + and - on it, to zoom; tap a name to hide its curve.";
 
-/// Returns a whole page around its body.
+/// Returns a complete page around its body.
 #[must_use]
 pub fn document(title: &str, body: &str) -> String {
     format!(
@@ -22,7 +22,7 @@ pub fn document(title: &str, body: &str) -> String {
     )
 }
 
-/// Returns a table with a caption above it, which may be empty. Its first column is text, the others are figures.
+/// Returns a table; an empty caption is left out. The first column is text, the others are figures.
 #[must_use]
 pub fn table<C: Display>(
     class: &str,
@@ -56,7 +56,7 @@ pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Returns a count with its thousands apart: 1,162,256.
+/// Formats a count with thousands separators: 1,162,256.
 #[must_use]
 pub fn grouped(count: u64) -> String {
     let digits = count.to_string();

@@ -1,7 +1,7 @@
 //! This module draws figures as SVG: panels of lines, bars or dots under a title and a legend.
 //!
-//! A figure does not depend on drives or faults: the caller gives points, ranges and names. Lines are thinned to about
-//! one point for each pixel and cut at the edges of their panel, because SVG would draw them beyond.
+//! The caller gives points, ranges and names. Lines are thinned to about one point per pixel, and cut at the edges of
+//! their panel, because SVG would draw them beyond it.
 
 use super::curve::thinned;
 use plotters::coord::Shift;
@@ -9,7 +9,7 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::Color as _;
 
-/// Holds a colour.
+/// The colour of a line, bar or dot.
 pub type Color = RGBColor;
 type Failure = DrawingAreaErrorKind<std::io::Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -24,7 +24,7 @@ const LEGEND_ROW: u32 = 26;
 const LEGEND_COLUMNS: usize = 3;
 const FONT: &str = "sans-serif";
 const GREY: Color = RGBColor(90, 90, 90);
-/// The colour-blind can distinguish these colours (Okabe and Ito, 2008).
+/// Colours that the colour-blind can distinguish (Okabe and Ito, 2008).
 pub const COLORS: [Color; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -35,10 +35,10 @@ pub const COLORS: [Color; 8] = [
     RGBColor(150, 150, 150),
     RGBColor(120, 80, 30),
 ];
-/// Once all colours are used, lines have these dashes and gaps, pixels.
+/// Dashes and gaps of lines once all colours are used, pixels.
 const DASHES: [(u32, u32); 2] = [(12, 6), (3, 5)];
 
-/// Describes the look of a line.
+/// The colour, width and dashes of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stroke {
     color: Color,
@@ -47,7 +47,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// The truth is drawn like this: black.
+    /// The stroke of the truth: black.
     pub const TRUTH: Self = Self::solid(BLACK, 3);
 
     /// Returns a solid line of a width in pixels.
@@ -56,14 +56,14 @@ impl Stroke {
         Self { color, width, dash: None }
     }
 
-    /// Returns looks that all differ: all colours solid, then all of them dashed.
+    /// Returns distinct strokes: all colours solid, then all dashed, then the same again.
     pub fn distinct() -> impl Iterator<Item = Self> {
         let dashes = [None].into_iter().chain(DASHES.map(Some));
         dashes.flat_map(|dash| COLORS.map(|color| Self { color, width: 2, dash })).cycle()
     }
 }
 
-/// Holds the marks of one series.
+/// The marks of one series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Marks {
     /// A line through points.
@@ -74,17 +74,17 @@ pub enum Marks {
     Dots(Vec<(f64, f64, Color)>),
 }
 
-/// Describes one axis of a panel.
+/// An axis of a panel.
 pub struct Axis<'a> {
     /// The quantity and its unit.
     pub label: &'a str,
-    /// The values at its ends; a reversed axis has the larger one first.
+    /// The values at the ends; a reversed axis has the larger value first.
     pub range: (f64, f64),
-    /// The number of labels, about.
+    /// The approximate number of labels.
     pub ticks: usize,
-    /// Writes the label of a value.
+    /// Formats the label of a value.
     pub format: &'a dyn Fn(&f64) -> String,
-    /// The room for its labels, pixels.
+    /// The space for the labels, pixels.
     pub room: u32,
 }
 
@@ -96,27 +96,27 @@ impl<'a> Axis<'a> {
     }
 }
 
-/// Holds one coordinate system.
+/// A coordinate system with its series.
 pub struct Panel<'a> {
-    /// The axis to the right.
+    /// The horizontal axis.
     pub x: Axis<'a>,
-    /// The axis upwards.
+    /// The vertical axis.
     pub y: Axis<'a>,
     /// The series, from back to front.
     pub series: Vec<Marks>,
 }
 
-/// Describes a figure.
+/// A figure of one or more panels.
 pub struct Figure<'a> {
-    /// The text above it.
+    /// The title above the panels.
     pub title: &'a str,
-    /// Its width and height, pixels.
+    /// Width and height of the figure, pixels.
     pub size: (u32, u32),
-    /// Says whether its panels stand side by side; otherwise they stand one below the other.
+    /// Whether the panels are side by side; otherwise they are one below the other.
     pub side_by_side: bool,
-    /// The names of its lines.
+    /// The name and stroke of each line.
     pub legend: Vec<(String, Stroke)>,
-    /// Its panels.
+    /// The panels.
     pub panels: Vec<Panel<'a>>,
 }
 
@@ -124,14 +124,14 @@ impl Figure<'_> {
     /// Returns the figure as SVG.
     ///
     /// # Errors
-    /// [`PlotError`], when the plotting library refuses.
+    /// [`PlotError`], if the plotting library fails.
     pub fn svg(&self) -> Result<String, PlotError> {
         let mut svg = String::new();
         self.draw(&mut svg)?;
         Ok(svg)
     }
 
-    /// Widens the ranges of the only panel until both axes have the same scale.
+    /// Widens the ranges of the only panel so that both axes have the same scale.
     pub fn square(&mut self) {
         let (width, height) = (self.size.0, self.size.1 - TITLE_HEIGHT - legend_height(self.legend.len()));
         for Panel { x, y, .. } in &mut self.panels {
@@ -232,7 +232,7 @@ impl Panel<'_> {
     }
 }
 
-/// Returns the wider of two ranges, so that both have the same length for a pixel.
+/// Widens one of two ranges, so that a pixel has the same length on both axes.
 fn square(x: (f64, f64), y: (f64, f64), (width, height): (u32, u32)) -> ((f64, f64), (f64, f64)) {
     let per_pixel = ((x.1 - x.0) / f64::from(width)).max((y.1 - y.0) / f64::from(height));
     let around = |(low, high): (f64, f64), pixels: u32| {
@@ -242,7 +242,7 @@ fn square(x: (f64, f64), y: (f64, f64), (width, height): (u32, u32)) -> ((f64, f
     (around(x, width), around(y, height))
 }
 
-/// Returns the pieces of a line between two heights, cut exactly at them.
+/// Returns the pieces of a line between two values of y, cut exactly there.
 fn inside(points: &[(f64, f64)], bottom: f64, top: f64) -> Vec<Vec<(f64, f64)>> {
     let (bottom, top) = (bottom.min(top), bottom.max(top));
     let is_inside = |y: f64| (bottom..=top).contains(&y);
@@ -272,7 +272,7 @@ fn inside(points: &[(f64, f64)], bottom: f64, top: f64) -> Vec<Vec<(f64, f64)>> 
     pieces
 }
 
-/// Returns a number with as few decimals as it needs, and at most two.
+/// Formats a number with at most two decimals, without trailing zeros.
 pub(crate) fn number(value: &f64) -> String {
     let text = format!("{:.2}", value + 0.0);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -1,7 +1,7 @@
-//! This module moves the car: on a plane, with road grade and bank and a body on springs.
+//! This module simulates the motion of the car on a plane, with road grade and bank and a body on springs.
 //!
-//! Axes: x forward, y left, z up; heading, pitch and roll in that order. The part sits at the
-//! centre: no lever arm. Formulas: any text on vehicle dynamics, for example Rajamani, Vehicle
+//! Axes are x forward, y left, z up; rotations are heading, pitch and roll in that order. The sensor is at the
+//! centre, without a lever arm. The formulas are in any text on vehicle dynamics, for example Rajamani, Vehicle
 //! Dynamics and Control, chapter 2.
 
 use super::DT;
@@ -23,11 +23,11 @@ pub struct Config {
     pub track: f64,
     /// Noise of a wheel's rate, rad/s: standing wheels of the recordings show 0.005 to 0.02.
     pub wheel_noise: f64,
-    /// Pulling away, m/s^2: a calm driver.
+    /// Acceleration when pulling away, m/s^2: a calm driver.
     pub acceleration: f64,
-    /// Braking, m/s^2: a calm driver.
+    /// Deceleration when braking, m/s^2: a calm driver.
     pub braking: f64,
-    /// The time that a pedal takes to act, s.
+    /// Time constant of a pedal's effect, s.
     pub pedal_lag: f64,
     /// Roll to the outside, rad per m/s^2: 4 deg/g, a common passenger car.
     pub roll_gradient: f64,
@@ -35,14 +35,14 @@ pub struct Config {
     pub pitch_gradient: f64,
     /// Natural frequency of the body on its springs, Hz.
     pub suspension_hz: f64,
-    /// Its damping ratio.
+    /// Damping ratio of the body on its springs.
     pub suspension_damping: f64,
     /// Amplitude of the road's grade, rad: a town on nearly level ground.
     pub road_grade: f64,
     /// Amplitude of the road's bank, rad: the same.
     pub road_bank: f64,
-    /// Wave lengths of the bank, m. If grade and bank share one, pitch and roll stay in phase for hours, and their
-    /// product makes a gyro drift by several deg/h, which no real road does.
+    /// Wavelengths of the bank, m. If grade and bank share one, pitch and roll stay in phase for hours, and their
+    /// product makes a gyro drift by several deg/h, unlike a real road.
     pub bank_waves: [f64; 2],
 }
 
@@ -61,7 +61,7 @@ impl Config {
         suspension_damping: 0.35,
         road_grade: 0.008,
         road_bank: 0.008,
-        // In 90 s, with these amplitudes, the drift from the shared wave is far below the gyro's bias.
+        // In 90 s and with these amplitudes, the drift from the shared wavelengths is far below the gyro's bias.
         bank_waves: GRADE_WAVES,
     };
 }
@@ -71,13 +71,13 @@ impl Config {
 pub struct Motion {
     /// Specific force, m/s^2.
     pub specific_force: [f64; 3],
-    /// rad/s.
+    /// Angular rate, rad/s.
     pub angular_rate: [f64; 3],
-    /// Forward, m/s.
+    /// Speed, forward positive, m/s.
     pub speed: f64,
-    /// About the vertical, rad/s.
+    /// Rate of the heading, about the vertical, rad/s.
     pub heading_rate: f64,
-    /// Along the road, m/s^2.
+    /// Acceleration along the road, m/s^2.
     pub acceleration: f64,
     /// Slope of the road along the way, downhill positive, rad.
     pub grade: f64,
@@ -87,7 +87,7 @@ pub struct Motion {
     pub roll: f64,
 }
 
-/// Simulates an angle on a spring, which follows its target and swings.
+/// Simulates an angle on a damped spring, which follows its target and oscillates.
 #[derive(Debug, Clone, Copy, Default)]
 struct Spring {
     angle: f64,
@@ -103,7 +103,7 @@ impl Spring {
     }
 }
 
-/// Describes a slope of the road along the way: two waves.
+/// A slope of the road as a function of the distance: the sum of two waves.
 #[derive(Debug, Clone, Copy)]
 struct Slope {
     amplitude: f64,
@@ -111,7 +111,7 @@ struct Slope {
     phase: [f64; 2],
 }
 
-/// The grade has these wave lengths, m.
+/// Wavelengths of the grade, m.
 const GRADE_WAVES: [f64; 2] = [310.0, 97.0];
 
 impl Slope {
@@ -119,7 +119,7 @@ impl Slope {
         Self { amplitude, waves, phase: [random.between(0.0, TAU), random.between(0.0, TAU)] }
     }
 
-    /// Returns the angle at a place and its change per metre.
+    /// Returns the angle at a distance and its change per metre.
     fn at(&self, metres: f64) -> (f64, f64) {
         let (mut angle, mut change) = (0.0, 0.0);
         for (wave, phase) in self.waves.into_iter().zip(self.phase) {
@@ -131,14 +131,14 @@ impl Slope {
     }
 }
 
-/// Simulates a car on its way.
+/// Simulates a car that follows a route.
 #[derive(Debug, Clone)]
 pub struct Car {
     config: Config,
     way: Way,
     leg: Leg,
     next: Leg,
-    /// The position in the leg: metres of a road, seconds of a stand.
+    /// Position in the leg: metres on a road, seconds of a wait.
     along: f64,
     travelled: f64,
     speed: f64,
@@ -151,13 +151,13 @@ pub struct Car {
 }
 
 impl Car {
-    /// Starts at rest on the short course.
+    /// Starts at rest on the short course of [`Route`].
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         Self::on(config, Way::Course(Route::new(seed)), seed)
     }
 
-    /// Starts at rest on a way.
+    /// Starts at rest on a route.
     #[must_use]
     pub fn on(config: &Config, mut way: Way, seed: u64) -> Self {
         let mut road = Purpose::Road.stream(seed);
@@ -213,7 +213,7 @@ impl Car {
         })
     }
 
-    /// Advances speed and place.
+    /// Advances the speed and the position by 10 ms.
     fn drive(&mut self) {
         let command = match self.leg {
             Leg::Stand { seconds } => {
@@ -228,9 +228,9 @@ impl Car {
             Leg::Road { metres, speed, .. } => {
                 let left = (metres - self.along).max(0.0);
                 let brake_in_time = (self.next.speed().powi(2) + 2.0 * self.config.braking * left).sqrt();
-                // The car creeps over the line, so that every leg ends.
+                // The car never stops before the end of a leg, so that every leg ends.
                 let wanted = speed.min(brake_in_time).max(0.5);
-                // A difference is made up for in 0.8 s, by a calm driver.
+                // A calm driver corrects a speed difference in 0.8 s.
                 ((wanted - self.speed) / 0.8).clamp(-1.5 * self.config.braking, self.config.acceleration)
             }
         };
@@ -254,14 +254,14 @@ impl Car {
     }
 }
 
-/// Returns a vector of the level frame in the axes of a body that is pitched, then rolled.
+/// Converts a vector from the level frame to the axes of a body that is pitched, then rolled.
 pub(super) fn turned_in([x, y, z]: [f64; 3], pitch: f64, roll: f64) -> [f64; 3] {
     let (sp, cp, sr, cr) = (libm::sin(pitch), libm::cos(pitch), libm::sin(roll), libm::cos(roll));
     let (x, z) = (x * cp - z * sp, x * sp + z * cp);
     [x, y * cr + z * sr, -y * sr + z * cr]
 }
 
-/// Returns the body rates from heading rate and (angle, rate) of pitch and roll.
+/// Returns the body rates from the heading rate and the (angle, rate) of pitch and roll.
 fn body_rates(heading: f64, (pitch, pitch_rate): (f64, f64), (roll, roll_rate): (f64, f64)) -> [f64; 3] {
     let (sp, cp, sr, cr) = (libm::sin(pitch), libm::cos(pitch), libm::sin(roll), libm::cos(roll));
     [roll_rate - heading * sp, pitch_rate * cr + heading * cp * sr, -pitch_rate * sr + heading * cp * cr]

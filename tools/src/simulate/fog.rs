@@ -1,17 +1,17 @@
-//! This module simulates a fibre-optic gyro: angle random walk, a bias that wanders, scale, misalignment.
+//! This module simulates a fibre-optic gyro with angle random walk, bias random walk, scale error and misalignment.
 
 use super::mems::{axes, seen};
 use super::purpose::Purpose;
 use crate::random::Random;
 
-/// Holds the sizes of its errors. Those marked sigma are drawn for each device or run, and axis.
+/// Holds the sizes of the gyro's errors. Those marked sigma are drawn for each device or run, and axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Angle random walk, rad/sqrt(s).
     pub angle_walk: f64,
     /// Bias of the device, sigma, rad/s.
     pub device_bias: f64,
-    /// Bias of one run beside it, sigma, rad/s.
+    /// Additional bias of one run, sigma, rad/s.
     pub run_bias: f64,
     /// Bias random walk, rad/s/sqrt(s).
     pub bias_walk: f64,
@@ -31,10 +31,10 @@ pub struct Fog {
 }
 
 impl Fog {
-    /// Makes the device of one seed in the run of another.
+    /// Creates the gyro with the seed `device`, in the run with the seed `run`.
     #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
-        // The stream differs from that of the other part with the same device seed.
+        // This stream differs from that of the MEMS part with the same device seed.
         let mut fixed = Purpose::Fog.stream(device);
         let mut random = Purpose::Fog.stream(run);
         let matrix = axes(config.scale, config.misalignment, &mut fixed);
@@ -46,7 +46,7 @@ impl Fog {
         Self { config: *config, random, matrix, bias }
     }
 
-    /// Returns the measured turn, rad, of a motion at this rate for so many seconds.
+    /// Returns the measured turn, rad, of a motion at this rate for this many seconds.
     pub fn increment(&mut self, rate: [f64; 3], seconds: f64) -> [f64; 3] {
         let seen = seen(&self.matrix, rate);
         let (noise, root) = (self.random.normals(), seconds.sqrt());
@@ -55,7 +55,7 @@ impl Fog {
         })
     }
 
-    /// Advances the bias by so many seconds: once for many increments.
+    /// Advances the bias by this many seconds; once per several increments is enough.
     pub fn wander(&mut self, seconds: f64) {
         let walk = self.random.normals();
         for (bias, walk) in self.bias.iter_mut().zip(walk) {

@@ -1,10 +1,10 @@
-//! This module writes whole sequences in the layouts of KAIST Complex Urban and NCLT: the same folders, with the truth
-//! known exactly.
+//! This module writes simulated sequences in the layouts of KAIST Complex Urban and NCLT, with an exactly known
+//! truth.
 //!
-//! Everything about a sequence follows from its [`Spec`]: the run's seed makes route, road, traffic, tyres, noise and
-//! the biases at power-on; the device's seed makes scale, misalignment and the lasting bias of both gyros. Sequences of
-//! one data set share a device, as the paper's do. Beside the data lies [`MARKER`], which says that they are simulated
-//! and gives the specification.
+//! A sequence is completely determined by its [`Spec`]. The run's seed determines route, road, traffic, tyres, noise
+//! and the biases at power-on. The device's seed determines the scale and misalignment of the sensors, and the
+//! constant bias of the fibre-optic gyro. Sequences of one data set share a device, as the paper's do. The file
+//! [`MARKER`] beside the data says that they are simulated, and holds the specification.
 
 mod delay;
 mod kaist;
@@ -25,10 +25,10 @@ use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::Path;
 
-/// This file in a sequence's folder says that it is simulated.
+/// Name of the file that marks a sequence's folder as simulated.
 pub const MARKER: &str = "simulated.json";
 
-/// Names the layout of a data set.
+/// The layout of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
@@ -49,29 +49,29 @@ impl Layout {
     }
 }
 
-/// Specifies a sequence; it is written into [`MARKER`].
+/// The specification of a sequence, which is written to [`MARKER`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spec {
-    /// The data set whose layout it has.
+    /// The layout of the files.
     pub layout: Layout,
-    /// The sequence's name, and its folder's.
+    /// Name of the sequence and of its folder.
     pub name: String,
     /// Length, s.
     pub seconds: u32,
-    /// Seed of the parts.
+    /// Seed of the sensors.
     pub device: u64,
     /// Seed of everything else.
     pub run: u64,
 }
 
-/// Names a set of sequences.
+/// A set of sequences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Set {
     /// Eight sequences, as the paper's urban06 to 13.
     Train,
-    /// Four more of the same devices, as the paper's urban14 to 17.
+    /// Four more sequences of the same devices, as the paper's urban14 to 17.
     Test,
-    /// Four of other devices of the same kind.
+    /// Four sequences of other devices of the same kind.
     Transfer,
 }
 
@@ -79,7 +79,7 @@ pub enum Set {
 pub const SECONDS: u32 = 20 * 60;
 
 impl Set {
-    /// Returns the specifications of its sequences. No run is in two sets.
+    /// Returns the specifications of the set's sequences. No run is in two sets.
     #[must_use]
     pub fn specs(self, layout: Layout) -> Vec<Spec> {
         let (word, count, device, first) = match self {
@@ -93,7 +93,7 @@ impl Set {
     }
 }
 
-/// Simulates all parts of the vehicle on a drive.
+/// Simulates all sensors of a vehicle on a drive.
 struct Drive {
     world: World,
     mems: Mems,
@@ -125,7 +125,7 @@ impl Drive {
         self.mems.measure(self.mems.tilt(force), self.mems.tilt(rate))
     }
 
-    /// Returns the reading of a magnetometer in a field of the world, with noise of that size.
+    /// Returns the reading of a magnetometer, with noise, in a field given in the world's axes.
     fn magnetic(&mut self, truth: &Truth, field: [f64; 3], noise: f64) -> [f64; 3] {
         let seen = truth.in_vehicle(field);
         let normals = self.magnetometer.normals();
@@ -133,7 +133,7 @@ impl Drive {
     }
 }
 
-/// Writes a sequence into a folder, which is made. `tick` is called for each 10 ms.
+/// Creates a folder and writes a sequence into it. `tick` is called for every 10 ms.
 ///
 /// # Errors
 /// The file system's error.

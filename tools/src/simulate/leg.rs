@@ -1,20 +1,20 @@
-//! A leg is a piece of the way, straight or bent.
+//! A leg is a straight or curved piece of a route, or a wait.
 
-/// Describes a piece of the way.
+/// A piece of a route.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Leg {
     /// The vehicle waits.
     Stand {
-        /// The duration.
+        /// Duration, s.
         seconds: f64,
     },
     /// The vehicle drives.
     Road {
-        /// Length.
+        /// Length, m.
         metres: f64,
         /// The speed, m/s.
         speed: f64,
-        /// Change of heading on the way, left positive, rad.
+        /// Change of heading over the leg, left positive, rad.
         turn: f64,
     },
 }
@@ -29,7 +29,8 @@ impl Leg {
         }
     }
 
-    /// Returns the curvature at a place of the leg, 1/m: the driver steers in and back smoothly, as sine squared.
+    /// Returns the curvature at a distance along the leg, 1/m. It is a sine squared: the driver steers in and back
+    /// smoothly.
     #[must_use]
     pub fn curvature(&self, along: f64) -> f64 {
         match *self {

@@ -1,21 +1,21 @@
-//! This module adds the errors of the MEMS part: a bias that wanders, white noise, scale, misalignment.
+//! This module adds the errors of the MEMS sensor: bias random walk, white noise, scale error, misalignment.
 //!
-//! This is the paper's sensor model (equations 1 and 2) with scale, misalignment and, where the configuration has it,
-//! the gyro's sensitivity to force.
+//! The model is the paper's sensor model (equations 1 and 2) with scale error, misalignment and, if configured, the
+//! gyro's sensitivity to specific force.
 
 use super::DT;
 use super::car::turned_in;
 use super::purpose::Purpose;
 use crate::random::Random;
 
-/// Holds the sizes of a part's errors. Those marked sigma are drawn for each seed and axis.
+/// Holds the sizes of the errors. Those marked sigma are drawn for each seed and axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// White noise, rad/s/sqrt(Hz): the Xsens MTi of the KAIST drives as OpenVINS has it
+    /// White noise, rad/s/sqrt(Hz): that of the Xsens MTi of the KAIST drives in OpenVINS
     /// (`config/kaist/kalibr_imu_chain.yaml`).
     pub gyro_noise: f64,
-    /// Bias random walk, rad/s^2/sqrt(Hz): the same file. Over a minute it comes to 16 deg/h,
-    /// the class of some 10 deg/h that the paper names for MEMS (section III-C).
+    /// Bias random walk, rad/s^2/sqrt(Hz): the same file. It is 16 deg/h over a minute, the class of about 10 deg/h
+    /// that the paper names for MEMS (section III-C).
     pub gyro_walk: f64,
     /// White noise, m/s^2/sqrt(Hz): the same file.
     pub accel_noise: f64,
@@ -23,17 +23,16 @@ pub struct Config {
     pub accel_walk: f64,
     /// Bias at power-on, sigma, rad/s: the recordings' part shows 0.004 to 0.018.
     pub gyro_bias: f64,
-    /// Bias at power-on, sigma, m/s^2: some milli-g, common for MEMS.
+    /// Bias at power-on, sigma, m/s^2: a few milli-g, common for MEMS.
     pub accel_bias: f64,
     /// Scale error, sigma: the recordings' part is off by 0.001 against their reference.
     pub scale: f64,
-    /// Misalignment of each axis, sigma, rad: 0.05 deg, the class of a part calibrated at the
-    /// factory.
+    /// Misalignment of each axis, sigma, rad: 0.05 deg, the class of a factory-calibrated part.
     pub misalignment: f64,
-    /// The sensitivity of a gyro axis to a force, sigma for each pair of axes, rad/s per m/s^2.
+    /// Sensitivity of a gyro axis to specific force, sigma for each pair of axes, rad/s per m/s^2.
     pub gyro_per_force: f64,
-    /// The pitch and roll of the part's mounting, rad: the recordings' part leans to one side so that y shows about
-    /// -0.8 m/s^2 at rest.
+    /// Pitch and roll of the part's mounting, rad: the recordings' part is tilted so that y reads about -0.8 m/s^2 at
+    /// rest.
     pub mount: [f64; 2],
 }
 
@@ -53,13 +52,13 @@ impl Config {
     };
 }
 
-/// Holds the errors of three axes of one kind.
+/// The three axes of a gyro or accelerometer, with their errors.
 #[derive(Debug, Clone, Copy)]
 struct Triad {
     /// The matrix from a vector to the readings of the axes.
     matrix: [[f64; 3]; 3],
     bias: [f64; 3],
-    /// Standard deviations per sample.
+    /// Standard deviations per sample of the noise and of the bias random walk.
     noise: f64,
     walk: f64,
 }
@@ -82,7 +81,7 @@ pub(super) fn seen(matrix: &[[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
 impl Triad {
     fn new(matrix: [[f64; 3]; 3], noise: f64, walk: f64, bias: f64, random: &mut Random) -> Self {
         let bias = random.normals().map(|n| bias * n);
-        // A density over the 50 Hz that 100 samples a second can show.
+        // The density is integrated over the 50 Hz bandwidth of 100 samples a second.
         Self { matrix, bias, noise: noise / DT.sqrt(), walk: walk * DT.sqrt() }
     }
 
@@ -102,13 +101,13 @@ pub struct Mems {
     random: Random,
     gyro: Triad,
     accel: Triad,
-    /// Rad/s per m/s^2.
+    /// Sensitivity of the gyro to specific force, rad/s per m/s^2.
     gyro_of_force: [[f64; 3]; 3],
     mount: [f64; 2],
 }
 
 impl Mems {
-    /// Makes the part of a seed.
+    /// Creates the part of a seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Mems.stream(seed);
@@ -121,8 +120,8 @@ impl Mems {
         Self { random, gyro, accel, gyro_of_force: [[0.0; 3]; 3], mount: config.mount }
     }
 
-    /// Makes the part of a device seed in one run: scale, misalignment and the gyro's sensitivity to force come from
-    /// the device, bias at power-on and noise from the run.
+    /// Creates the part of a device seed in one run: scale, misalignment and the gyro's sensitivity to force come
+    /// from the device, bias at power-on and noise from the run.
     #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
         let mut fixed = Purpose::Device.stream(device);
@@ -137,7 +136,7 @@ impl Mems {
         Self { random, gyro, accel, gyro_of_force, mount: config.mount }
     }
 
-    /// Returns a vector of the car in the part's nominal axes.
+    /// Converts a vector from the car's axes to the part's nominal axes.
     #[must_use]
     pub fn tilt(&self, vector: [f64; 3]) -> [f64; 3] {
         let [pitch, roll] = self.mount;

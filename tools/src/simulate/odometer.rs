@@ -1,8 +1,8 @@
-//! This module simulates the wheel encoders of a rear axle: wheels differ in size from the calibration, and slip when
-//! they drive or brake.
+//! This module simulates the wheel encoders of a rear axle. The wheels' diameters differ from the calibration, and
+//! the wheels slip when they drive or brake.
 //!
-//! Slip is in proportion to the force: slip = a / (g k), with the normalised stiffness k of the
-//! tyres (Rajamani, Vehicle Dynamics and Control, chapter 4).
+//! Slip is proportional to the force: slip = a / (g k), with the normalised stiffness k of the tyres
+//! (Rajamani, Vehicle Dynamics and Control, chapter 4).
 
 use super::car::GRAVITY;
 use super::purpose::Purpose;
@@ -17,9 +17,9 @@ pub struct Config {
     pub base: f64,
     /// Error common to both diameters, sigma, relative.
     pub common_error: f64,
-    /// Further error of each diameter, sigma, relative.
+    /// Additional error of each diameter, sigma, relative.
     pub wheel_error: f64,
-    /// Normalised longitudinal stiffness: longitudinal acceleration over g that gives a slip of 1.
+    /// Normalised longitudinal stiffness: longitudinal acceleration, divided by g, that gives a slip of 1.
     pub slip_stiffness: f64,
 }
 
@@ -29,12 +29,12 @@ pub struct Odometer {
     config: Config,
     /// True diameters, m.
     diameter: [f64; 2],
-    /// Turned since the start, revolutions.
+    /// Revolutions since the start.
     turns: [f64; 2],
 }
 
 impl Odometer {
-    /// Draws the tyres of one run, because pressure and load change from day to day.
+    /// Draws the true diameters for one run, because pressure and load change from day to day.
     #[must_use]
     pub fn new(config: &Config, run: u64) -> Self {
         let mut random = Purpose::Odometer.stream(run);
@@ -43,7 +43,7 @@ impl Odometer {
         Self { config: *config, diameter, turns: [0.0; 2] }
     }
 
-    /// Moves for so many seconds at a speed along the road (m/s), an acceleration (m/s^2) and a heading rate (rad/s).
+    /// Advances by a time (s) at a speed along the road (m/s), an acceleration (m/s^2) and a heading rate (rad/s).
     pub fn step(&mut self, speed: f64, acceleration: f64, heading_rate: f64, seconds: f64) {
         let slip = acceleration / (GRAVITY * self.config.slip_stiffness);
         let half = heading_rate * self.config.base / 2.0;
@@ -58,7 +58,7 @@ impl Odometer {
         self.turns
     }
 
-    /// Returns the way since the start, left and right, computed from the revolutions with the calibration, m.
+    /// Returns the distance since the start, left and right, computed from the revolutions with the calibration, m.
     #[must_use]
     pub fn metres(&self) -> [f64; 2] {
         std::array::from_fn(|wheel| self.turns[wheel] * PI * self.config.diameter[wheel])

@@ -1,9 +1,9 @@
-//! Each purpose in a simulation has a stream of random numbers of its own, so that a change of one leaves the others as
-//! they are.
+//! Each purpose in a simulation has its own stream of random numbers, so that changing one stream does not change the
+//! others.
 
 use crate::random::Random;
 
-/// Names the purpose of a stream.
+/// The purpose of a stream of random numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Purpose {
     Route,

@@ -1,6 +1,6 @@
-//! This module makes the driver's route: streets with bends, wide corners and stops, one after another.
+//! This module generates the driver's route: streets with bends, wide corners and stops, one after another.
 //!
-//! The car turns by at most some 0.3 rad/s, as in the recordings, and never parks.
+//! The car turns at no more than about 0.3 rad/s, as in the recordings, and never parks.
 
 use super::leg::Leg;
 use super::purpose::Purpose;
@@ -8,17 +8,17 @@ use super::town::Town;
 use crate::random::Random;
 use std::f64::consts::FRAC_PI_2;
 
-/// Gives the legs of a drive.
+/// The source of the legs of a drive.
 #[derive(Debug, Clone)]
 pub enum Way {
     /// The short course of [`Route`].
     Course(Route),
-    /// A way through a town.
+    /// A route through a town.
     Town(Town),
 }
 
 impl Way {
-    /// Returns the next leg; if there is none, a stand without end.
+    /// Returns the next leg; after the last one, an endless wait.
     pub(super) fn next_leg(&mut self) -> Leg {
         let next = match self {
             Self::Course(route) => route.next(),
@@ -28,7 +28,7 @@ impl Way {
     }
 }
 
-/// Generates a route without end.
+/// An endless iterator over the legs of a route.
 #[derive(Debug, Clone)]
 pub struct Route {
     random: Random,
@@ -38,7 +38,7 @@ pub struct Route {
 }
 
 impl Route {
-    /// Makes the route of a seed.
+    /// Creates the route of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
@@ -50,7 +50,7 @@ impl Route {
 impl Iterator for Route {
     type Item = Leg;
 
-    /// Returns the next leg: standing first, then street, corner, street with a bend, stop, and so on.
+    /// Returns the next leg: a stop first, then streets, corners and a bend, a stop, and so on.
     fn next(&mut self) -> Option<Leg> {
         let between = |random: &mut Random, low, high| random.between(low, high);
         let random = &mut self.random;

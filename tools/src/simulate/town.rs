@@ -1,8 +1,7 @@
-//! This module makes a way through a town: blocks of streets of different speed, some bent, and junctions at which the
-//! driver waits, goes straight on, or turns.
+//! This module generates a route through a town: blocks of streets with different speed limits, some curved, and
+//! junctions where the driver waits, drives straight on, or turns.
 //!
-//! Corners are as fast as comfort allows: the tightest point of a corner and the lateral
-//! acceleration give the speed.
+//! The speed in a corner follows from the curvature at its tightest point and the comfortable lateral acceleration.
 
 use super::leg::Leg;
 use super::purpose::Purpose;
@@ -15,25 +14,25 @@ use std::f64::consts::FRAC_PI_2;
 pub struct Config {
     /// Speed limits, m/s, each with the share of the streets that have it.
     pub limits: [(f64, f64); 3],
-    /// Length of a block, m, from and to; the faster streets have the longer ones.
+    /// Smallest and largest length of a block in the slowest streets, m; faster streets have longer blocks.
     pub block: [f64; 2],
-    /// Share of the blocks that bend.
+    /// Share of the blocks that are curved.
     pub bends: f64,
-    /// Share of the junctions at which one has to wait.
+    /// Share of the junctions where the driver waits.
     pub stops: f64,
-    /// The duration of a wait, s, from and to.
+    /// Shortest and longest wait, s.
     pub wait: [f64; 2],
-    /// Share of the junctions at which one turns, to the left and to the right.
+    /// Shares of the junctions where the driver turns left, and right.
     pub turns: [f64; 2],
-    /// Length of a left and of a right corner, m, from and to.
+    /// Smallest and largest length of a left corner and of a right corner, m.
     pub corner: [[f64; 2]; 2],
     /// Comfortable lateral acceleration, m/s^2.
     pub lateral: f64,
-    /// The time at rest before it sets off, s, from and to.
+    /// Shortest and longest time at rest before the vehicle sets off, s.
     pub before: [f64; 2],
 }
 
-/// Generates a way through a town without end.
+/// An endless iterator over the legs of a route through a town.
 #[derive(Debug, Clone)]
 pub struct Town {
     config: Config,
@@ -42,7 +41,7 @@ pub struct Town {
 }
 
 impl Town {
-    /// Makes the way of a seed.
+    /// Creates the route of a seed.
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);

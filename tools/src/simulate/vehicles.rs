@@ -1,7 +1,7 @@
-//! This module holds the vehicles and parts of the two data sets, with the source of every number.
+//! This module defines the vehicles and sensors of the two data sets, with the source of every parameter.
 //!
-//! None of the numbers was chosen by a result. (M) marks what was written down from memory of a data sheet that was not
-//! available; (A) marks assumptions, where nothing is published.
+//! No parameter was tuned to a result. (M) marks values recalled from a data sheet that was not available; (A) marks
+//! assumptions where nothing is published.
 //!
 //! | what | value | source |
 //! |---|---|---|
@@ -11,7 +11,7 @@
 //! | KAIST IMU: scale; misalignment; gyro on force | 0.001; 0.05 deg; 0.003 deg/s/g | MTi 100 series data sheet (M) |
 //! | KAIST FoG: angle random walk; bias stability | 0.012 deg/sqrt(h); 0.05 deg/h | KVH DSP-1760 data sheet; the second also in the paper, section III-C |
 //! | KAIST FoG: bias offset | 0.5 deg/h, taken as 2 sigma | DSP-1760 data sheet (M) |
-//! | KAIST FoG: bias random walk | 0.05 deg/h in an hour: the stability, once more | (A) |
+//! | KAIST FoG: bias random walk | 0.05 deg/h in an hour: equal to the stability | (A) |
 //! | KAIST FoG: scale; misalignment | 200 ppm; 0.4 mrad | DSP-1760 data sheet (M) |
 //! | KAIST wheels: diameters, base, 4096 counts | 0.623022, 0.622356, 1.5285 m | a published EncoderParameter.txt |
 //! | KAIST wheels: error of both diameters, of each | 0.0006, 0.00003 | spread of three published calibrations of that car |
@@ -21,10 +21,10 @@
 //! | waiting at a junction; share of junctions | 5 to 45 s; 0.4 | signal cycles of 60 to 120 s (A) |
 //! | acceleration, braking, comfort in corners | 2.0, 1.8, 2.0 m/s^2 | as [`super::car::Config::DEFAULT`]; calm drivers |
 //! | grade, bank | 0.03, 0.015 rad | streets are drained by 1.5 to 2 % of bank; grades up to 3 % (A) |
-//! | wave lengths of the bank | 223 and 71 m | (A): other ones than the grade's, see [`super::car::Config::bank_waves`] |
-//! | shaking | [`super::vibration::Config::DEFAULT`] | measured on a car (WID recordings) |
+//! | wavelengths of the bank | 223 and 71 m | (A): different from the grade's, see [`super::car::Config::bank_waves`] |
+//! | vibration | [`super::vibration::Config::DEFAULT`] | measured on a car (WID recordings) |
 //! | KAIST latitude | 36.37 deg N | Daejeon |
-//! | KAIST delay of a stamp | 0.1 ms, exponential | (A): the paper's Fig. 11 shows it small |
+//! | KAIST delay of a stamp | 0.1 ms, exponential | (A): it is small in the paper's Fig. 11 |
 //! | NCLT IMU: gyro noise; bias stability; initial bias | 0.03 deg/s/sqrt(Hz); 18 deg/h in an hour; 0.25 deg/s, taken as 2 sigma | MicroStrain 3DM-GX3-45 data sheet (M) |
 //! | NCLT IMU: accelerometer noise, bias; scale; misalignment | 80 ug/sqrt(Hz), 0.002 g; 0.0005; 0.05 deg | the same (M) |
 //! | NCLT FoG: noise; bias stability; offset | 4 deg/h/sqrt(Hz); 1 deg/h; 20 deg/h, taken as 2 sigma | KVH DSP-3000 manual 54-0215 (M) |
@@ -36,42 +36,42 @@
 
 use super::{car, fog, mems, odometer, town, vibration, world};
 
-/// 1 deg/h is this in rad/s.
+/// 1 deg/h in rad/s.
 const DEG_PER_HOUR: f64 = std::f64::consts::PI / 180.0 / 3600.0;
-/// 1 deg is this in rad, 1 deg/s in rad/s.
+/// 1 deg in rad; 1 deg/s in rad/s.
 const DEG: f64 = std::f64::consts::PI / 180.0;
-/// sqrt(1 h) is this in sqrt(s).
+/// sqrt(1 h) in sqrt(s).
 const ROOT_HOUR: f64 = 60.0;
 
-/// Describes the delays of messages.
+/// The delays of messages by the logger.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delays {
     /// The mean delay, s.
     pub mean: f64,
-    /// Mean time between two blockages, s, and their mean length, s; with an infinite time there are none.
+    /// Mean time between two blockages, s, and their mean length, s; an infinite time means no blockages.
     pub blockage: [f64; 2],
     /// The longest blockage, s.
     pub longest: f64,
 }
 
-/// Describes a vehicle with its parts.
+/// The parameters of a vehicle and its sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {
-    /// Its motion.
+    /// The vehicle's motion and environment.
     pub world: world::Config,
-    /// The town that it drives in.
+    /// The town that the vehicle drives in.
     pub town: town::Config,
-    /// Its inertial sensor.
+    /// The inertial sensor.
     pub mems: mems::Config,
-    /// Its fibre-optic gyro.
+    /// The fibre-optic gyro.
     pub fog: fog::Config,
-    /// Its wheels.
+    /// The wheels.
     pub wheels: odometer::Config,
-    /// Its logger.
+    /// The logger's delays.
     pub delays: Delays,
 }
 
-/// Describes the car of KAIST Complex Urban.
+/// The car of KAIST Complex Urban.
 pub const KAIST: Vehicle = Vehicle {
     world: world::Config {
         car: car::Config {
@@ -124,7 +124,7 @@ pub const KAIST: Vehicle = Vehicle {
     delays: Delays { mean: 1e-4, blockage: [f64::INFINITY, 0.0], longest: 0.0 },
 };
 
-/// Describes the Segway of NCLT. Its parts shake as the car's do, for want of better data.
+/// The Segway of NCLT. Its vibration is that of the car, because no better data are available.
 pub const NCLT: Vehicle = Vehicle {
     world: world::Config {
         car: car::Config {
@@ -132,7 +132,7 @@ pub const NCLT: Vehicle = Vehicle {
             track: 0.6,
             acceleration: 0.5,
             braking: 0.5,
-            // It leans in the direction of acceleration, much more than a car.
+            // A Segway pitches in the direction of acceleration, much more than a car.
             pitch_gradient: 0.05,
             suspension_hz: 0.8,
             road_grade: 0.03,
@@ -168,7 +168,7 @@ pub const NCLT: Vehicle = Vehicle {
         mount: [0.0, 0.0],
     },
     fog: fog::Config {
-        // A density over one hertz, two-sided.
+        // Two-sided noise density, over 1 Hz.
         angle_walk: 4.0 * DEG_PER_HOUR,
         device_bias: 10.0 * DEG_PER_HOUR,
         run_bias: 1.0 * DEG_PER_HOUR,

@@ -1,8 +1,9 @@
-//! This module shakes the part: by the idling engine, and by the road.
+//! This module simulates the vibration of the sensor by the idling engine and by the road.
 //!
-//! Each source is a narrow band of noise (a damped oscillator driven by white noise) that moves all axes at once, each
-//! with its own size and phase. The angle shakes, and the rate is its change from sample to sample. So the shaking rate
-//! adds up to zero, as on a car, and its effect on a yaw after one second is an angle of about rate / (2 pi f).
+//! Each source is a narrow band of noise (a damped oscillator driven by white noise) that moves all axes, each with
+//! its own amplitude and phase. The source defines the angle; the rate is the change of the angle from sample to
+//! sample. The vibration's rate thus sums to zero, as on a car, and its effect on the yaw after one second is about
+//! rate / (2 pi f).
 
 use super::DT;
 use super::purpose::Purpose;
@@ -12,9 +13,9 @@ use std::f64::consts::{PI, TAU};
 /// Describes a source of vibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
-    /// Middle of its band, Hz.
+    /// Centre frequency of the band, Hz.
     pub hz: f64,
-    /// Width of its band, Hz.
+    /// Width of the band, Hz.
     pub bandwidth: f64,
     /// Standard deviation of the angular rate, rad/s.
     pub angular_rate: [f64; 3],
@@ -22,15 +23,15 @@ pub struct Source {
     pub specific_force: [f64; 3],
 }
 
-/// Holds all sources of vibration. The sizes are those of the recordings: standing 0.006 to 0.009 rad/s and 0.1 to 0.45
-/// m/s^2, moving about 0.02 rad/s and 0.5 m/s^2; the bands are those that stand out in their spectra.
+/// Holds all sources of vibration. The amplitudes are those of the recordings: 0.006 to 0.009 rad/s and 0.1 to 0.45
+/// m/s^2 at standstill, about 0.02 rad/s and 0.5 m/s^2 in motion. The bands are the peaks of their spectra.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// The engine, at the same strength whether the car stands or not.
+    /// Vibration from the engine, equally strong at standstill and in motion.
     pub engine: Source,
-    /// The vibration from the road at [`Config::road_speed`], in proportion at other speeds.
+    /// Vibration from the road at [`Config::road_speed`]; it is proportional to the speed.
     pub road: [Source; 3],
-    /// The speed for which `road` is given, m/s.
+    /// Speed for which `road` is given, m/s.
     pub road_speed: f64,
 }
 
@@ -44,14 +45,14 @@ impl Config {
             specific_force: [0.40, 0.09, 0.10],
         },
         road: [
-            // Body on its springs.
+            // The body on its springs.
             Source {
                 hz: 1.6,
                 bandwidth: 0.8,
                 angular_rate: [0.010, 0.010, 0.0004],
                 specific_force: [0.10, 0.15, 0.25],
             },
-            // Wheels on their tyres.
+            // The wheels on their tyres.
             Source {
                 hz: 17.0,
                 bandwidth: 3.0,
@@ -70,16 +71,17 @@ impl Config {
     };
 }
 
-/// Holds the shaking at one moment.
+/// Holds the vibration at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shake {
-    /// m/s^2.
+    /// Specific force of the vibration, m/s^2.
     pub specific_force: [f64; 3],
-    /// rad/s.
+    /// Angular rate of the vibration, rad/s.
     pub angular_rate: [f64; 3],
 }
 
-/// Simulates a narrow band of noise: a phasor that turns and decays under white noise. Both parts have variance 1.
+/// Simulates a narrow band of noise: a phasor that rotates, decays, and is driven by white noise. Both of its parts
+/// have variance 1.
 #[derive(Debug, Clone, Copy)]
 struct Band {
     re: f64,
@@ -96,9 +98,8 @@ impl Band {
         self.im = keep * im + fresh * random.normal();
     }
 
-    /// Returns the band with a phase for each axis.
+    /// Returns the band's value for each axis, with a different phase for each.
     fn axes(&self, phase: f64) -> [f64; 3] {
-        // The three phases are far from each other.
         [phase, phase + 2.0, phase + 4.2].map(|p| self.re * libm::cos(p) + self.im * libm::sin(p))
     }
 }
@@ -118,7 +119,7 @@ impl Shaker {
 
     fn step(&mut self, strength: f64, random: &mut Random, shake: &mut Shake) {
         self.band.step(&self.source, random);
-        // The factor is the angle's amplitude over the rate's, for a sine sampled at the grid.
+        // Ratio of the angle's amplitude to the rate's, for a sine sampled on the grid.
         let angle_per_rate = DT / (2.0 * libm::sin(PI * self.source.hz * DT));
         let (turn, push) = (self.band.axes(0.0), self.band.axes(1.0));
         for axis in 0..3 {
@@ -147,7 +148,7 @@ impl Vibration {
         let engine = Shaker::new(config.engine, &mut random);
         let road = config.road.map(|source| Shaker::new(source, &mut random));
         let mut vibration = Self { random, engine, road, road_speed: config.road_speed };
-        // The first angle has no predecessor, so no sample is made of it.
+        // The first angle has no predecessor to compute a rate from, so discard the first step.
         vibration.step(0.0);
         vibration
     }

@@ -1,19 +1,18 @@
-//! This module computes the truth: position and heading of the vehicle, and the readings of perfect parts.
+//! This module computes the truth: position and heading of the vehicle, and the readings of perfect sensors.
 //!
 //! The world's axes are x east, y north, z up. Heading is counted from east to the left, pitch is nose down, roll is
 //! left side up, in that order. Rates are constant over each 10 ms, so the truth at the grid steps is exact: the yaw is
 //! the sum of the heading rates.
 //!
-//! The tyres of the rear axle slip sideways in a turn, by an angle in proportion to the lateral
-//! acceleration (Rajamani, Vehicle Dynamics and Control, chapter 2): the vehicle does not go
-//! exactly where it points.
+//! The tyres of the rear axle slip sideways in a turn, by an angle proportional to the lateral acceleration
+//! (Rajamani, Vehicle Dynamics and Control, chapter 2): the course over ground differs from the heading.
 
 use super::DT;
 use super::car::{self, Car, GRAVITY, Motion};
 use super::route::Way;
 use super::vibration::{self, Shake, Vibration};
 
-/// The Earth rotates at this rate, rad/s (WGS 84).
+/// Rotation rate of the Earth, rad/s (WGS 84).
 pub const EARTH_RATE: f64 = 7.292_115e-5;
 
 /// Holds the parameters of the drive's world.
@@ -29,25 +28,25 @@ pub struct Config {
     pub latitude_deg: f64,
 }
 
-/// Holds the truth at one moment.
+/// Holds the truth at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// Since the start, s.
+    /// Time since the start, s.
     pub seconds: f64,
-    /// Relative to the start, m.
+    /// Position relative to the start, m.
     pub position: [f64; 3],
     /// Heading, not wrapped, rad.
     pub yaw: f64,
     /// The motion of the vehicle.
     pub motion: Motion,
-    /// Angular rate against the stars, vehicle axes, rad/s, without shaking.
+    /// Angular rate relative to inertial space, in vehicle axes and without vibration, rad/s.
     pub inertial_rate: [f64; 3],
-    /// Shaking.
+    /// The vibration of the sensor.
     pub shake: Shake,
 }
 
 impl Truth {
-    /// Returns a vector of the world in the vehicle's axes.
+    /// Converts a vector from the world's axes to the vehicle's.
     #[must_use]
     pub fn in_vehicle(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let (sin, cos) = (libm::sin(self.yaw), libm::cos(self.yaw));
@@ -61,7 +60,7 @@ impl Truth {
     }
 }
 
-/// Generates the truth of a drive every 10 ms, without end.
+/// An endless iterator over the truth of a drive, every 10 ms.
 #[derive(Debug, Clone)]
 pub struct World {
     config: Config,
@@ -73,7 +72,7 @@ pub struct World {
 }
 
 impl World {
-    /// Starts at rest with a heading.
+    /// Starts at rest with the heading `yaw`.
     #[must_use]
     pub fn new(config: &Config, way: Way, yaw: f64, run: u64) -> Self {
         Self {

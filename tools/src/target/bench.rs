@@ -1,8 +1,8 @@
 //! This module runs the bench image in the emulator and reads the counts in its output.
 //!
-//! With a C compiler at hand, QEMU's plugin `tools/bench/m4count.c` counts instructions exactly and models Cortex-M4
-//! cycles. Without one, instructions come from the image's own SysTick under `-icount shift=0`, where an instruction
-//! takes a nanosecond: that is accurate to 6 instructions.
+//! With a C compiler, QEMU's plugin `tools/bench/m4count.c` counts instructions exactly and models Cortex-M4 cycles.
+//! Without one, the image counts instructions with its own SysTick under `-icount shift=0`, where an instruction
+//! takes a nanosecond. That count is accurate to 6 instructions.
 
 use std::ffi::OsStr;
 use std::io::Read;
@@ -11,18 +11,18 @@ use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// SysTick of the emulated STM32F405 counts this many ticks per 1000 instructions (168 MHz, 1 instruction/ns).
+/// SysTick ticks of the emulated STM32F405 per 1000 instructions (168 MHz, 1 instruction/ns).
 const TICKS_PER_1000: u64 = 168;
-/// A hung image or build is ended after this time.
+/// Timeout of an image's run or a build.
 const LIMIT: Duration = Duration::from_secs(900);
 const POLL: Duration = Duration::from_millis(5);
-/// These images count, one after the other.
+/// The images that are measured, in order.
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
-/// These images are flashed.
+/// The images that are built to be flashed, optimised for size.
 const FLASHED: [&str; 2] = ["coprocessor", "bringup"];
 /// The emulated board.
 pub const MACHINE: &str = "netduinoplus2";
-/// The image's target.
+/// The Rust target of the image.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The reason why a bench cannot be run.
@@ -58,15 +58,15 @@ pub enum BenchError {
 /// Holds the counts of one region of the image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Count {
-    /// The image's name for it.
+    /// The image's name for the region.
     pub name: String,
-    /// Executed instructions.
+    /// Number of executed instructions.
     pub instructions: u64,
-    /// Modelled Cortex-M4 cycles at zero wait states, with the plugin.
+    /// Modelled Cortex-M4 cycles at zero wait states; `None` without the plugin.
     pub cycles: Option<u64>,
     /// Modelled cycles on an STM32F405 at 168 MHz: flash with 5 wait states, empty caches at the start.
     pub cycles_5ws: Option<u64>,
-    /// Bytes of stack below the caller.
+    /// Bytes of stack used below the caller.
     pub stack: u64,
 }
 
@@ -75,7 +75,7 @@ pub struct Count {
 pub struct Counts {
     /// The regions in the order in which they ran.
     pub regions: Vec<Count>,
-    /// Name and bytes.
+    /// The sizes: name and bytes.
     pub sizes: Vec<(String, u64)>,
 }
 
@@ -92,13 +92,13 @@ impl Counts {
         self.regions.iter().find(|count| count.name == name)
     }
 
-    /// Returns whether instructions were counted one by one; otherwise they are accurate to six.
+    /// Returns whether instructions were counted exactly; otherwise the counts are accurate to six.
     #[must_use]
     pub fn exact(&self) -> bool {
         self.regions.iter().all(|count| count.cycles.is_some())
     }
 
-    /// Returns whether all windows of a network cost the same, as they must for any input.
+    /// Returns whether all windows of a network have the same instruction count, as they must for any input.
     #[must_use]
     pub fn constant(&self) -> bool {
         let tolerance = if self.exact() { 0 } else { 12 };
@@ -115,20 +115,20 @@ impl Counts {
     }
 }
 
-/// Returns the root of the workspace that this crate was built in: images are built from there.
+/// Returns the root of the workspace that this crate was built in; images are built from there.
 #[must_use]
 pub fn workspace() -> PathBuf {
     let tools = Path::new(env!("CARGO_MANIFEST_DIR"));
     tools.parent().unwrap_or(tools).to_owned()
 }
 
-/// Returns the folder that cargo builds in: the one that this program lies in if cargo has built it there, so that
-/// `cargo fw` and the commands share one build; otherwise that of the workspace.
+/// Returns cargo's target folder. It is the folder that contains this program if cargo built the program there, so
+/// that `cargo fw` and the commands share one build; otherwise it is the workspace's.
 #[must_use]
 pub fn target_folder() -> PathBuf {
     let program = std::env::current_exe().ok();
     let folder = program.as_deref().and_then(|program| program.ancestors().nth(2));
-    // Cargo marks its folder with this file.
+    // Cargo marks its target folder with this file.
     let cargo = folder.filter(|folder| folder.join("CACHEDIR.TAG").is_file());
     cargo.map_or_else(|| workspace().join("target"), Path::to_owned)
 }
@@ -136,10 +136,10 @@ pub fn target_folder() -> PathBuf {
 /// Checks that rustc has a standard library for the target.
 ///
 /// # Errors
-/// A sentence that says what is missing.
+/// A message that says what is missing.
 pub fn target_installed(target: &str) -> Result<(), String> {
     if !workspace().join("memory.x").is_file() {
-        return Err("the repository that this program was built in is gone".into());
+        return Err("the repository that this program was built in no longer exists".into());
     }
     let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
     let output = Command::new(rustc)
@@ -176,7 +176,7 @@ pub fn build_for(
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
     cargo.current_dir(workspace).args(["build", "--release", "--quiet", "-p", "gyronet", "--bin", image]);
     if FLASHED.contains(&image) {
-        // `cargo fw` and `cargo bringup` do the same.
+        // As `cargo fw` and `cargo bringup` build them.
         cargo.args(["--config", "profile.release.opt-level='s'"]);
     }
     cargo.args(["--features", board, "--target", target, "--target-dir"]).arg(folder);
@@ -184,7 +184,7 @@ pub fn build_for(
     Ok(folder.join(target).join("release").join(image))
 }
 
-/// Runs the bench image with the instruction counter, or without it if it cannot be built or loaded.
+/// Runs the bench image with the plugin that counts instructions, or without it if it cannot be built or loaded.
 ///
 /// # Errors
 /// [`BenchError`].
@@ -196,8 +196,8 @@ pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
     }
 }
 
-/// Lists the policies of the flash accelerator that ST's manual leaves open: a name, and the counter's options for it.
-/// The model uses the first one.
+/// The policies of the flash accelerator that ST's manual leaves open, with the plugin's options for each. The model
+/// uses the first one.
 pub const POLICIES: [(&str, &str); 4] = [
     ("least recently used", ""),
     ("first in, first out", ",policy=fifo"),
@@ -208,7 +208,7 @@ pub const POLICIES: [(&str, &str); 4] = [
 /// Returns the counts of the bench image under each of [`POLICIES`].
 ///
 /// # Errors
-/// [`BenchError`], also where there is no C compiler.
+/// [`BenchError`], also without a C compiler.
 pub fn measure_policies(workspace: &Path, image: &Path) -> Result<Vec<Counts>, BenchError> {
     let plugin = plugin(workspace).ok_or_else(|| BenchError::Line("no instruction counter".into()))?;
     let counts = POLICIES.iter().map(|(_, options)| {
@@ -219,7 +219,7 @@ pub fn measure_policies(workspace: &Path, image: &Path) -> Result<Vec<Counts>, B
     counts.collect()
 }
 
-/// Compiles the instruction counter; `None` without a C compiler.
+/// Compiles the plugin that counts instructions; returns `None` without a C compiler.
 pub fn plugin(workspace: &Path) -> Option<PathBuf> {
     let folder = workspace.join("target");
     std::fs::create_dir_all(&folder).ok()?;
@@ -231,7 +231,7 @@ pub fn plugin(workspace: &Path) -> Option<PathBuf> {
     run(&mut cc).is_ok().then_some(library)
 }
 
-/// Runs the bench image and pairs its lines with the counts.
+/// Runs the bench image and combines its output with the plugin's counts.
 fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
     let (stdout, stderr) = match plugin {
         Some(plugin) => emulate(MACHINE, image, &["-plugin", &plugin.display().to_string()])?,
@@ -273,7 +273,7 @@ pub fn emulate(machine: &str, image: &Path, arguments: &[&str]) -> Result<(Strin
     run(qemu.args(arguments).arg("-kernel").arg(image))
 }
 
-/// Returns the number behind `key` in a line.
+/// Returns the number after `key` in a line.
 pub(crate) fn field(line: &str, key: &str) -> Option<u64> {
     let (_, rest) = line.split_once(key)?;
     rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
@@ -292,7 +292,7 @@ fn run(command: &mut Command) -> Result<(String, String), BenchError> {
             break status;
         }
         if Instant::now() > until {
-            // It may have ended by itself by now.
+            // The program may have ended by itself by now, so errors are ignored.
             let _ = child.kill();
             let _ = child.wait();
             return Err(BenchError::TooLong { program });
@@ -303,11 +303,11 @@ fn run(command: &mut Command) -> Result<(String, String), BenchError> {
     if status.success() { Ok((stdout, stderr)) } else { Err(BenchError::Failed { program, output: stderr }) }
 }
 
-/// Reads to the end in a thread, because a full pipe would block the program.
+/// Reads a pipe to its end in a thread, because a full pipe would block the program.
 fn collect(source: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
-        // Output that cannot be read is only missing from the message.
+        // A read error only truncates the output, so it is ignored.
         let _ = source.map(|mut source| source.read_to_end(&mut bytes));
         String::from_utf8_lossy(&bytes).into_owned()
     })

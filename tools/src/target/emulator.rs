@@ -1,10 +1,10 @@
 //! This module runs the emulated board: QEMU's `netduinoplus2`, an STM32F405 with its serial lines on TCP.
 //!
-//! This side listens on ports that the system picks, and QEMU connects to them before the machine starts: no port is
-//! guessed, and nothing that the board sends is lost. Bytes sent to a receiver that the image has not switched on yet
-//! would be lost, as on real hardware; so [`Board::send`] first checks its enable bits through QEMU's test port. Every
-//! wait has a limit, and QEMU is killed when the [`Board`] is dropped. Bytes travel at the host's pace, not at a baud
-//! rate.
+//! This module listens on ports that the system chooses, and QEMU connects to them before the machine starts: no port
+//! is guessed, and no byte from the board is lost. Bytes sent to a receiver that the image has not enabled yet would
+//! be lost, as on real hardware; so [`Board::send`] first checks the receiver's enable bits through QEMU's test port.
+//! Every wait has a timeout, and QEMU is killed when the [`Board`] is dropped. Bytes are transferred at the host's
+//! speed, not at a baud rate.
 
 mod process;
 
@@ -17,17 +17,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const PROGRAM: &str = "qemu-system-arm";
-/// QEMU must connect its lines, and the image switch a receiver on, within this time.
+/// Timeout of QEMU's connections, and of the image enabling a receiver.
 const START: Duration = Duration::from_secs(20);
 const POLL: Duration = Duration::from_millis(5);
-/// A client must send first within this time.
+/// Time for which a client's first byte is awaited.
 const HELLO: Duration = Duration::from_secs(2);
 
-/// Control register 1 of USART 1 to 6 is at these addresses (RM0090, table 1 and 30.6.4); its bits UE and RE follow.
+/// Addresses of control register 1 of USART 1 to 6 (RM0090, table 1 and 30.6.4), and its bits UE and RE.
 const CR1: [u32; 6] = [0x4001_100C, 0x4000_440C, 0x4000_480C, 0x4000_4C0C, 0x4000_500C, 0x4001_140C];
 const RECEIVER_ENABLED: u32 = 1 << 13 | 1 << 2;
-/// The status register lies this far before control register 1; its bit TXE follows. The emulated register takes a word
-/// beyond ten bits as a mask, any other as a value with TXE set.
+/// Distance of the status register before control register 1, and all its bits except TXE. The emulated register
+/// treats a word of more than ten bits as a mask, and any other word as a value with TXE set.
 const SR_BEFORE_CR1: u32 = 0x0C;
 const ALL_BUT_TXE: u32 = !(1 << 7);
 
@@ -38,13 +38,13 @@ pub enum EmulatorError {
     /// QEMU is missing or cannot be started.
     #[error("{PROGRAM} cannot be run: {0}")]
     Start(io::Error),
-    /// A socket of one of its lines failed.
+    /// A socket of one of QEMU's lines failed.
     #[error("a socket on the loopback: {0}")]
     Socket(#[from] io::Error),
     /// QEMU or the image failed.
     #[error("{PROGRAM}: {what}\nits standard error:\n{errors}")]
     Failed {
-        /// The event that did not come.
+        /// Description of the failure.
         what: String,
         /// The output of QEMU, and of the image through semihosting.
         errors: String,
@@ -63,7 +63,7 @@ pub fn available() -> Result<()> {
     version.map(drop).map_err(EmulatorError::Start)
 }
 
-/// Returns whole lines without their ends.
+/// Splits bytes into complete lines without their ends.
 fn split(bytes: &[u8], end: u8) -> Vec<Vec<u8>> {
     let mut lines: Vec<Vec<u8>> = bytes.split(|byte| *byte == end).map(<[u8]>::to_vec).collect();
     lines.pop();
@@ -79,8 +79,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts QEMU with an image and its first `usarts` serial lines (1 to 6) connected; `arguments` come after the
-    /// default ones and override them.
+    /// Starts QEMU with an image and its first `usarts` serial lines (1 to 6) connected. `arguments` follow the
+    /// default arguments and override them.
     ///
     /// # Errors
     /// [`EmulatorError`], with QEMU's own message.
@@ -92,14 +92,14 @@ impl Board {
         let mut command = Command::new(PROGRAM);
         command
             .args(["-machine", "netduinoplus2", "-nographic"])
-            // An instruction takes a nanosecond: the board's time does not depend on how busy the host is.
+            // An instruction takes 1 ns, so the board's time does not depend on the host's load.
             .args(["-icount", "shift=0"])
             .args(["-semihosting-config", "enable=on,target=native"])
             .args(["-monitor", "stdio", "-qtest-log", "/dev/null"])
             .args(["-qtest", &format!("tcp:127.0.0.1:{}", port(&registers)?)])
             .args(arguments);
-        // A multiplexer with one client buffers up to 32 bytes, so that QEMU need not be woken for each of them, which
-        // takes longer the busier the host is. Its escape character is no byte value.
+        // A multiplexer with one client buffers up to 32 bytes, so that QEMU need not be woken for each byte, which
+        // is slow on a busy host. The escape character 256 is not a byte value, so nothing is escaped.
         command.args(["-echr", "256"]);
         for (n, listener) in listeners.iter().enumerate() {
             let socket =
@@ -116,10 +116,10 @@ impl Board {
         Ok(Self { process, registers, usarts })
     }
 
-    /// Sends bytes into USART `n` (1 to 6) once its receiver is on, waiting while the board accepts none.
+    /// Sends bytes to USART `n` (1 to 6) once its receiver is enabled; waits while the board accepts no bytes.
     ///
     /// # Errors
-    /// When the receiver stays off, or takes no byte for `limit`.
+    /// If the receiver stays disabled, or accepts no byte for `limit`.
     pub fn send(&mut self, n: usize, bytes: &[u8], limit: Duration) -> Result<()> {
         let until = Instant::now() + START;
         while self.word(CR1[n - 1])? & RECEIVER_ENABLED != RECEIVER_ENABLED {
@@ -134,20 +134,20 @@ impl Board {
     /// Waits until `enough` accepts the bytes that USART `n` has sent since the start.
     ///
     /// # Errors
-    /// When that does not happen within `limit`.
+    /// If that does not happen within `limit`.
     pub fn await_sent(&self, n: usize, limit: Duration, enough: impl FnMut(&[u8]) -> bool) -> Result<()> {
         if self.usarts[n - 1].received.holds(limit, enough) {
             Ok(())
         } else {
-            Err(self.process.failed(format!("USART{n} did not send in {limit:?} what is awaited")))
+            Err(self.process.failed(format!("USART{n} did not send what is awaited within {limit:?}")))
         }
     }
 
-    /// Returns everything that USART `n` has sent since the start once it holds `count` lines (ends of line `end`).
-    /// Each line is without its end, and an unfinished one is left out.
+    /// Waits until USART `n` has sent `count` lines, which end with `end`, and returns all lines since the start.
+    /// Lines are without their ends; an unfinished line is left out.
     ///
     /// # Errors
-    /// When they do not come within `limit`; the message says how many did.
+    /// If the lines do not arrive within `limit`; the message says how many did.
     pub fn lines(&self, n: usize, end: u8, count: usize, limit: Duration) -> Result<Vec<Vec<u8>>> {
         let ends = |bytes: &[u8]| bytes.iter().filter(|byte| **byte == end).count();
         let (bytes, enough) = self.usarts[n - 1].received.wait(limit, |bytes| ends(bytes) >= count);
@@ -163,7 +163,7 @@ impl Board {
     /// Returns the lines of USART `n` once `enough` accepts them.
     ///
     /// # Errors
-    /// When that does not happen within `limit`.
+    /// If that does not happen within `limit`.
     pub fn lines_until(
         &self,
         n: usize,
@@ -173,36 +173,38 @@ impl Board {
     ) -> Result<Vec<Vec<u8>>> {
         let (bytes, is_enough) = self.usarts[n - 1].received.wait(limit, |bytes| enough(&split(bytes, end)));
         if !is_enough {
-            return Err(self.process.failed(format!("USART{n} did not send in {limit:?} what is awaited")));
+            return Err(self
+                .process
+                .failed(format!("USART{n} did not send what is awaited within {limit:?}")));
         }
         Ok(split(&bytes, end))
     }
 
-    /// Makes USART `n` accept no more bytes from the image (its transmit register stays full), or accept them again.
+    /// Makes USART `n` refuse bytes from the image (its transmit register stays full), or accept them again.
     ///
     /// # Errors
-    /// When QEMU does not answer.
+    /// If QEMU does not answer.
     pub fn stall(&mut self, n: usize, stalled: bool) -> Result<()> {
         let value = if stalled { ALL_BUT_TXE } else { 0 };
         self.ask(&format!("writel {:#x} {value:#x}", CR1[n - 1] - SR_BEFORE_CR1)).map(drop)
     }
 
-    /// Returns an address at which one TCP client can talk to USART `n` and reads everything that it has sent since the
-    /// start. The bytes come once the client has sent something, or has been quiet for a while: pyserial discards what
-    /// is there when it opens a line.
+    /// Returns an address at which one TCP client can talk to USART `n`. The client receives all bytes that the USART
+    /// has sent since the start, but only after the client has sent a byte, or after 2 s: pyserial discards received
+    /// bytes when it opens a line.
     ///
     /// # Errors
-    /// When the system provides no port.
+    /// If the system provides no port.
     pub fn serve(&mut self, n: usize) -> Result<SocketAddr> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         let address = listener.local_addr()?;
         let Line { stream, received } = &self.usarts[n - 1];
         let (mut board, received) = (stream.try_clone()?, Arc::clone(received));
-        // Both threads end with the client or, at the latest, with the board's end of the line.
+        // Both threads end when the client or the board closes its connection.
         std::thread::spawn(move || {
             let Ok((client, _)) = listener.accept() else { return };
             let Ok(mut from_client) = client.try_clone() else { return };
-            // Frames are short, and a tester waits for each.
+            // Frames are short, and a tester waits for each frame.
             let _ = client.set_nodelay(true);
             let _ = client.set_read_timeout(Some(HELLO));
             let _ = client.peek(&mut [0]);
@@ -217,7 +219,7 @@ impl Board {
     /// Returns a word of the board's memory or registers.
     ///
     /// # Errors
-    /// When QEMU does not answer.
+    /// If QEMU does not answer.
     pub fn word(&mut self, address: u32) -> Result<u32> {
         let answer = self.ask(&format!("readl {address:#x}"))?;
         let word = answer.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
@@ -242,7 +244,7 @@ impl Board {
     /// Waits until QEMU ends by itself (semihosting) and returns its exit code.
     ///
     /// # Errors
-    /// When it does not within `limit`, or is killed by a signal.
+    /// If QEMU does not end within `limit`, or is killed by a signal.
     pub fn exit_code(&mut self, limit: Duration) -> Result<i32> {
         let until = Instant::now() + limit;
         loop {
@@ -257,12 +259,12 @@ impl Board {
     /// semihosting, have written to standard error.
     ///
     /// # Errors
-    /// When it does not end.
+    /// If QEMU does not end.
     pub fn quit(mut self) -> Result<String> {
         self.process.quit()
     }
 
-    /// Returns an error of the caller, with QEMU's output.
+    /// Creates an error of the caller that contains QEMU's output.
     #[must_use]
     pub fn failed(&self, what: impl std::fmt::Display) -> EmulatorError {
         self.process.failed(what)

@@ -1,5 +1,5 @@
-//! This module prepares the flash of an emulated board that runs the largest model it can, the paper's GyroNet, from a
-//! slot: deadlines are measured with it.
+//! This module prepares the flash of an emulated board so that the board runs the largest possible model, the paper's
+//! GyroNet, from a slot. Deadlines are measured with this model.
 
 use crate::target::ram_flash::RamFlash;
 use gyronet::model::weights::GYRONET;
@@ -23,7 +23,7 @@ pub enum PrepareError {
     Io(#[from] std::io::Error),
 }
 
-/// Writes the records and the slots into files of a folder; returns the emulator's arguments that load them.
+/// Writes the records and the slots to files in a folder; returns the emulator's arguments that load the files.
 ///
 /// # Errors
 /// [`PrepareError`].

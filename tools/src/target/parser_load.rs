@@ -2,10 +2,10 @@
 
 use crate::target::bench::Counts;
 
-/// The STM32F405 runs at this clock, Hz.
+/// Clock of the STM32F405, Hz.
 pub const CLOCK_HZ: f64 = 168e6;
 
-/// Lists the kinds of frames that the image measures, and how many of each come in a second.
+/// The kinds of frames that the image measures, and the number of each in a second.
 pub const FRAMES: [(&str, u32); 8] = [
     ("sensor/dsp1760_frame", 1_000),
     ("sensor/dsp1760_timed_frame", 1_000),
@@ -20,22 +20,22 @@ pub const FRAMES: [(&str, u32); 8] = [
 /// Holds the cost of one kind of frame.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ParserLoad {
-    /// The image's name for it.
+    /// The image's name for the kind of frame.
     pub name: String,
-    /// Bytes of a frame.
+    /// Bytes per frame.
     pub bytes: u64,
-    /// Frames a second.
+    /// Frames per second.
     pub hertz: u32,
-    /// Instructions of a frame.
+    /// Instructions per frame.
     pub instructions: u64,
-    /// Modelled cycles for a frame at zero wait states, where they were counted.
+    /// Modelled cycles per frame at zero wait states; `None` if only instructions were counted.
     pub cycles: Option<u64>,
-    /// Modelled cycles with flash at 5 wait states.
+    /// Modelled cycles per frame with flash at 5 wait states.
     pub cycles_5ws: Option<u64>,
 }
 
 impl ParserLoad {
-    /// Returns the costs of all kinds that the image has measured.
+    /// Returns the costs of all kinds of frames that the image measured.
     #[must_use]
     pub fn all(counts: &Counts) -> Vec<Self> {
         let load = |(name, hertz): (&str, u32)| {
@@ -53,7 +53,7 @@ impl ParserLoad {
         FRAMES.into_iter().filter_map(load).collect()
     }
 
-    /// Returns the share of the processor's time, modelled at 5 wait states.
+    /// Returns the parser's share of the processor's time, modelled at 5 wait states.
     #[must_use]
     pub fn share(&self) -> Option<f64> {
         self.cycles_5ws.map(|cycles| cycles as f64 * f64::from(self.hertz) / CLOCK_HZ)

@@ -1,4 +1,4 @@
-//! This module keeps a flash in RAM, fast enough for fuzzing; it does not check the rules of the real one.
+//! This module simulates a flash in RAM. It is fast enough for fuzzing and does not check the rules of a real flash.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
@@ -11,13 +11,13 @@ pub struct RamFlash<const SECTOR: usize> {
 }
 
 impl<const SECTOR: usize> RamFlash<SECTOR> {
-    /// Returns an erased flash for weight files.
+    /// Creates an erased flash for weight files.
     #[must_use]
     pub fn for_weights() -> Self {
         Self { words: vec![u32::MAX; SLOTS.end as usize / 4] }
     }
 
-    /// Returns a flash of two sectors that begins with these bytes and is erased behind them.
+    /// Creates a flash of two sectors that begins with these bytes and is erased after them.
     #[must_use]
     pub fn new(content: &[u8]) -> Self {
         let mut flash = Self { words: vec![u32::MAX; 2 * SECTOR / 4] };

@@ -1,9 +1,9 @@
-//! This module computes the response time of every task of the image from its cost and how often it can be activated,
+//! This module computes the worst-case response time of every task of the image from its cost and activation rate,
 //! for fixed priorities (Joseph and Pandya 1986; Audsley and others 1993).
 //!
-//! Deadlines are judged by the cycles with wait states, each activation starting with empty caches. A task's cost
-//! includes the delay of the task that it preempts: as many lines to read again as it has put into the caches. (A loop
-//! that fills the whole cache could lose more than that; the kernels' loops do not.)
+//! Deadlines are checked with the cycles that include wait states, and each activation starts with empty caches. A
+//! task's cost includes the delay of the task that it preempts, which must read again as many lines as the task
+//! loaded into the caches. (A loop that fills the entire cache could lose more lines; the kernels' loops do not.)
 
 mod cost;
 mod demands;
@@ -15,59 +15,59 @@ use crate::target::parser_load::CLOCK_HZ;
 use crate::target::tasks::{Cycles, Handler, Tasks};
 use demands::{Burst, DEMANDS, Demand, FRAMES_LATE, LAST};
 
-/// This share of a deadline must be left.
+/// Share of a deadline that must remain unused.
 const SPARE: f64 = 0.25;
-/// Idle blocks priorities up to this while it shares data with the output task.
+/// The idle task blocks priorities up to this one while it accesses data that it shares with the output task.
 const SHARED: u8 = 2;
 
 /// Holds a task and its response times.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Task {
-    /// The image's name for it.
+    /// Name of the task.
     pub name: &'static str,
-    /// Priority; a larger one is more urgent.
+    /// Priority; higher is more urgent.
     pub priority: u8,
     /// Shortest time between two activations, us.
     pub period_us: f64,
-    /// The limit of activations in bursts.
+    /// Limit of the activations in a burst.
     #[serde(skip)]
     burst: Option<Burst>,
-    /// The cycles of each activation of a burst, where the worst one does the work of several.
+    /// Cycles of each of many activations; less than the worst if the worst one does the work of several.
     #[serde(skip)]
     each: Cycles,
     /// Deadline, us.
     pub deadline_us: f64,
-    /// The reason for the deadline.
+    /// Event that sets the deadline.
     pub why: &'static str,
-    /// Activations counted; with 0 the task never ran, and its cost is a bound from its code.
+    /// Number of counted activations; if 0, the task never ran, and its cost is a bound from its code.
     pub runs: u64,
     /// Instructions of the longest activation.
     pub instructions: u64,
-    /// Cycles in a period at worst, modelled at zero wait states, with entry and exit.
+    /// Worst-case cycles per period, modelled at zero wait states, with entry and exit.
     pub cycles: u64,
-    /// The same cycles with wait states, and with the cost to the preempted task.
+    /// Worst-case cycles per period with wait states, and with the cost to the preempted task.
     pub cycles_5ws: u64,
-    /// Worst response at zero wait states, us; `None` if later than ten times the deadline.
+    /// Worst-case response at zero wait states, us; `None` if later than ten times the deadline.
     pub response_us: Option<f64>,
-    /// Worst response with wait states.
+    /// Worst-case response with wait states, us.
     pub response_5ws_us: Option<f64>,
 }
 
 impl Task {
-    /// Returns whether the task always meets its deadline with a quarter of it to spare.
+    /// Returns whether the task always meets its deadline with a quarter of the deadline to spare.
     #[must_use]
     pub fn met(&self) -> bool {
         self.response_5ws_us.is_some_and(|response| response <= (1.0 - SPARE) * self.deadline_us)
     }
 
-    /// Returns the share of the processor, with wait states.
+    /// Returns the task's share of the processor's time, with wait states.
     #[must_use]
     pub fn share(&self) -> f64 {
         let period = self.burst.map_or(self.period_us, |Burst { count, span, .. }| span / count);
         self.each.five as f64 / (period * 1e-6 * CLOCK_HZ)
     }
 
-    /// Returns the most activations in a time, us.
+    /// Returns the largest number of activations within a time, us.
     fn within(&self, time: f64) -> f64 {
         let most = (time / self.period_us).ceil();
         self.burst
@@ -80,8 +80,9 @@ impl Task {
 pub struct Schedule(pub Vec<Task>);
 
 impl Schedule {
-    /// Makes the table from the counts; `fognet` are the instructions and cycles of one of FoGNet's windows, which idle
-    /// runs piece by piece. `None` if the image has a task that is not in the table.
+    /// Computes the schedule from the counts. `fognet` holds the instructions and cycles of one of FoGNet's windows,
+    /// which the idle task runs piece by piece. Returns `None` if the image has a task that is not in the table of
+    /// demands.
     #[must_use]
     pub fn new(tasks: &Tasks, fognet: Option<(u64, Cycles)>) -> Option<Self> {
         let Tasks { handlers, all_off, some_off } = tasks;
@@ -121,7 +122,7 @@ impl Schedule {
         Some(Self(tasks))
     }
 
-    /// Returns whether every task is always done in time, and frames are not later than assumed.
+    /// Returns whether every task always meets its deadline, and frames are not delayed by more than assumed.
     #[must_use]
     pub fn met(&self) -> bool {
         let output = self.0.iter().filter(|task| task.name == "output");
@@ -129,15 +130,15 @@ impl Schedule {
         !late && self.0.iter().all(Task::met)
     }
 
-    /// Returns the share of the processor that all tasks take together.
+    /// Returns the share of the processor's time that all tasks use together.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.0.iter().map(Task::share).sum()
     }
 }
 
-/// Returns the row of FoGNet's window, which runs in the time that all tasks leave: one begins with each second, and
-/// its estimate is used in the next.
+/// Returns the row of FoGNet's window, which runs in the time that all other tasks leave. A window begins with each
+/// second, and its estimate is used in the next second.
 fn in_idle((instructions, cycles): (u64, Cycles)) -> Task {
     Task {
         name: "fognet",
@@ -156,8 +157,8 @@ fn in_idle((instructions, cycles): (u64, Cycles)) -> Task {
     }
 }
 
-/// Returns the worst response of a task, us: its own cost, its blocking, and all activations of tasks at least as
-/// urgent that can come meanwhile. `cost` gives the cycles of the worst activation and of each of many.
+/// Returns the worst-case response of a task, us: its own cost, its blocking, and all activations of equally or more
+/// urgent tasks that can occur meanwhile. `cost` returns the cycles of the worst activation and of each of many.
 fn response(tasks: &[Task], k: usize, blocked: u64, cost: fn(&Task) -> [u64; 2]) -> Option<f64> {
     let own = &tasks[k];
     let us = |cycles: u64| cycles as f64 / CLOCK_HZ * 1e6;

@@ -3,17 +3,17 @@
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
 
-/// An image must stay within these limits, bytes: flash (sectors 8 and 9), static RAM, stack.
+/// Budgets of an image, bytes: flash (sectors 8 and 9), static RAM, stack.
 pub const BUDGETS: [u64; 3] = [256 << 10, 96 << 10, 12 << 10];
 
 /// Holds the sizes of one image, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ImageSize {
-    /// Vectors, code, constants and the initial values of data.
+    /// Flash: vectors, code, constants and the initial values of data.
     pub flash: u64,
-    /// The part of the flash that the two assembly kernels take.
+    /// Size of the two assembly kernels, which is part of `flash`.
     pub kernels: u64,
-    /// Statics in SRAM, and the code that runs from there.
+    /// Statics in SRAM, and the code that runs from SRAM.
     pub static_ram: u64,
     /// Statics in CCM.
     pub ccm: u64,

@@ -1,14 +1,14 @@
 //! This module computes the deepest stack that a firmware image can need, from its machine code alone.
 //!
-//! A function's own need is the sum of its pushes and subtractions from the stack pointer; its calls are read from its
-//! branches. A call through a register may go to any function whose address stands anywhere in the image. Recursion,
-//! and a stack pointer moved by a register, have no bound and are errors. Interrupts: every handler of the vector table
-//! may interrupt every other one once, except those of its own priority, each on top of the largest frame that the
-//! processor pushes. An RTIC image initialises with interrupts off, so no handler adds to the stack until that frame is
-//! left.
+//! A function's own stack use is the sum of its pushes and subtractions from the stack pointer; its calls are read
+//! from its branches. An indirect call may go to any function whose address is anywhere in the image. Recursion, and
+//! a stack pointer moved by a register, have no bound and are errors. Every handler of the vector table may interrupt
+//! every other handler once, except those of its own priority, each on top of the largest frame that the processor
+//! pushes. An RTIC image initialises with interrupts off, so handlers do not add to the stack of the functions that
+//! initialise it.
 //!
-//! The result is an upper bound. It trusts the symbol table: code that no symbol covers, or
-//! addresses computed at run time, would escape it; the images have neither.
+//! The result is an upper bound. The analysis relies on the symbol table: code without a symbol, or addresses
+//! computed at run time, would be missed; the images have neither.
 
 mod barrier;
 mod code;
@@ -20,15 +20,14 @@ pub use barrier::handlers_without_barrier;
 use code::Code;
 use std::collections::{BTreeMap, HashMap};
 
-/// The processor pushes this many bytes at an exception: registers, floating-point registers, alignment (ARMv7-M,
-/// B1.5.6).
+/// Bytes that the processor pushes at an exception: registers, floating-point registers, alignment (ARMv7-M, B1.5.6).
 const EXCEPTION_FRAME: u32 = 32 + 72 + 4;
-/// The image starts with this function.
+/// Name of the function that starts the image.
 const RESET: &str = "Reset";
-/// RTIC runs this function with interrupts off; its last step switches them on.
+/// End of the name of the function that RTIC runs with interrupts off; its last step switches them on.
 const MASKED: &str = "__rtic_init_resources";
 
-/// The reason why no bound of an image's stack is found.
+/// The reason why no bound of an image's stack can be computed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StackError {
     /// The file is not a firmware image.
@@ -45,61 +44,61 @@ pub enum StackError {
         /// The address of the instruction.
         address: u32,
     },
-    /// A call goes to an address that is not a function's.
+    /// A call goes to an address where no function begins.
     #[error("{function} calls {target:#010x}, where no function begins")]
     Target {
         /// The function.
         function: String,
-        /// The address that it calls.
+        /// The called address.
         target: u32,
     },
 }
 
-/// Lists the functions of the deepest call chain, outermost first, each with its own need.
+/// The functions of the deepest call chain, outermost first, each with its own stack use in bytes.
 pub type Way = Vec<(String, u32)>;
 
-/// Holds the handler of a priority that needs the most stack.
+/// The handler of a priority that needs the most stack.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Handler {
-    /// Priority, higher is more urgent; a handler without one stands alone.
+    /// Priority, higher is more urgent; a handler without a priority may interrupt everything.
     pub priority: Option<u8>,
-    /// Bytes that it needs, the processor's frame included.
+    /// Stack of the handler in bytes, the processor's frame included.
     pub bytes: u32,
-    /// Its deepest call chain.
+    /// The handler's deepest call chain.
     pub deepest: Way,
 }
 
-/// Holds the deepest stack of an image.
+/// The worst-case stack of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageStack {
-    /// Bytes of the main program while handlers can come.
+    /// Bytes of the main program while interrupts are on.
     pub main: u32,
-    /// Bytes of the main program before handlers can come.
+    /// Bytes of the main program while interrupts are still off.
     pub start: u32,
-    /// The interrupt and exception handlers, one inside the other, the most urgent one first.
+    /// The nested interrupt and exception handlers, the most urgent one first.
     pub handlers: Vec<Handler>,
-    /// Calls through a register.
+    /// Number of indirect calls.
     pub indirect_calls: usize,
-    /// The deepest call chain before handlers can come.
+    /// The deepest call chain while interrupts are still off.
     pub deepest: Way,
-    /// The deepest call chain while handlers can come.
+    /// The deepest call chain while interrupts are on.
     pub deepest_main: Way,
 }
 
 impl ImageStack {
-    /// Returns the worst stack, bytes.
+    /// Returns the worst-case stack, bytes.
     #[must_use]
     pub fn worst(&self) -> u32 {
         self.start.max(self.main + self.handlers())
     }
 
-    /// Returns the bytes of all handlers together.
+    /// Returns the bytes of all nested handlers together.
     #[must_use]
     pub fn handlers(&self) -> u32 {
         self.handlers.iter().map(|handler| handler.bytes).sum()
     }
 
-    /// Reads an image.
+    /// Computes the stack of an image.
     ///
     /// # Errors
     /// [`StackError`].
@@ -126,7 +125,7 @@ impl ImageStack {
     }
 }
 
-/// Returns numbers and priorities of the exceptions that an image lists; higher is more urgent.
+/// Returns the numbers and priorities of the exceptions that an image lists; higher is more urgent.
 ///
 /// # Errors
 /// [`StackError::Format`].

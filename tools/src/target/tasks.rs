@@ -1,5 +1,6 @@
-//! This module counts the cost of every task and interrupt of the flashed image while it runs in the emulator: it sends
-//! one sample after the other, with wheel speeds, requests on the service line and a host's commands among them.
+//! This module counts the cost of every task and interrupt of the flashed image while the image runs in the emulator.
+//! The image receives samples one by one, with wheel speeds, requests on the service line and a host's commands in
+//! between.
 
 mod drive;
 mod symbols;
@@ -10,22 +11,22 @@ use crate::target::largest_model;
 use std::path::Path;
 use symbols::Symbols;
 
-/// A handler has this many kinds of activations, by the bytes moved or samples processed; the last kind is that many or
-/// more.
+/// Number of kinds of a handler's activations. Kind k moved k bytes or processed k samples; the last kind includes
+/// larger numbers.
 pub const KINDS: usize = 5;
 
 /// Holds all counts of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tasks {
-    /// Its handlers.
+    /// The image's handlers.
     pub handlers: Vec<Handler>,
     /// The longest time with all interrupts off.
     pub all_off: Cycles,
-    /// The longest time for which idle kept the output task out.
+    /// The longest time for which the idle task blocked the output task.
     pub some_off: Cycles,
 }
 
-/// Holds modelled cycles: the largest at zero wait states, and the largest on an STM32F405 at 168 MHz.
+/// Modelled cycles: the largest number at zero wait states, and the largest on an STM32F405 at 168 MHz.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Cycles {
     /// Cycles at zero wait states.
@@ -34,12 +35,12 @@ pub struct Cycles {
     pub five: u64,
 }
 
-/// Holds the cheapest of some activations without preemption; zero if there was none.
+/// The cheapest activation of a handler, without what preempts it; zero if there was none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Least {
     /// The cycles of the cheapest activation.
     pub cycles: Cycles,
-    /// Lines that it has put into the caches.
+    /// Lines that it loaded into the caches.
     pub fills: u64,
 }
 
@@ -50,7 +51,7 @@ impl std::fmt::Display for Least {
 }
 
 impl Cycles {
-    /// Returns the larger of each.
+    /// Returns the larger value of each field.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self { zero: self.zero.max(other.zero), five: self.five.max(other.five) }
@@ -84,28 +85,28 @@ impl std::fmt::Display for Cycles {
 pub struct Handler {
     /// The name in the vector table.
     pub name: String,
-    /// Priority; a larger one is more urgent.
+    /// Priority; higher is more urgent.
     pub priority: u8,
     /// The worst activation of each kind.
     pub activations: [Option<Activation>; KINDS],
     /// The cheapest activation.
     pub least: Least,
-    /// The cheapest activation that checks every line and processes no sample, if there is one.
+    /// The cheapest activation that checks all lines and processes no sample, if there is one.
     pub looking: Least,
-    /// Halfwords of its code, without the functions that it calls.
+    /// Size of the handler's code in halfwords, without the functions that it calls.
     pub code: u64,
 }
 
-/// Holds the worst of a handler's activations, without preemption.
+/// Worst-case costs of a handler's activations of one kind, without what preempts them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Activation {
-    /// The number of activations.
+    /// Number of activations.
     pub runs: u64,
-    /// Instructions of the longest one.
+    /// Instructions of the longest activation.
     pub instructions: u64,
-    /// The cycles of the most expensive one.
+    /// Cycles of the most expensive activation.
     pub cycles: Cycles,
-    /// Lines that the one with most has put into the caches.
+    /// Largest number of lines that an activation loaded into the caches.
     pub fills: u64,
 }
 
@@ -134,7 +135,7 @@ impl std::fmt::Display for Handler {
 impl std::fmt::Display for Tasks {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.handlers.iter().try_for_each(|handler| writeln!(f, "{handler}"))?;
-        write!(f, "interrupts off: {}; output kept out by idle: {}", self.all_off, self.some_off)
+        write!(f, "interrupts off: {}; output blocked by idle: {}", self.all_off, self.some_off)
     }
 }
 

@@ -1,4 +1,4 @@
-//! This module says whether a drive can be trained on, and if not, why.
+//! This module checks whether a drive can be trained on.
 
 use crate::drive::DT;
 use crate::drive::error::DataError;
@@ -11,87 +11,87 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::{PERIOD_US, RATE_HZ};
 use std::path::{Path, PathBuf};
 
-/// A drive needs at least so much time after static initialisation, s.
+/// Shortest length of a drive after static initialisation, s.
 pub const SHORTEST_S: f64 = 30.0;
-/// Times between samples may differ from 10 ms by at most this, microseconds.
+/// Largest difference of a sample period from 10 ms, microseconds.
 const JITTER_US: u64 = 1_000;
-/// A second turns if its reference does so by more than this, rad: a standing gyro's noise is no turn.
+/// Least angle of the reference in a second that counts as turning, rad; noise at rest must not count.
 const TURNING_RAD: f64 = 0.02;
-/// Rows in which static initialisation is over.
+/// Rows that are enough for static initialisation.
 const STARTED: usize = STATIC_SAMPLES as usize + RATE_HZ as usize;
 
 /// The reason why a drive cannot be trained on.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
-    /// It is no drive.
+    /// The file is not a drive.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// It does not stand still in the first 3 s.
+    /// The vehicle does not stand still in the first 3 s.
     #[error(transparent)]
     Start(#[from] ReplayError),
-    /// It has no true yaw rate.
-    #[error("{path}: line {line}: no ref_gyr_z, the true yaw rate, which a training needs in every row{}", advice(*course))]
+    /// The drive has no true yaw rate.
+    #[error("{path}: line {line}: no ref_gyr_z (true yaw rate), which training needs in every row{}", advice(*course))]
     NoReference {
         /// The recording.
         path: String,
-        /// The first line without it.
+        /// The first line without a true yaw rate.
         line: u64,
-        /// Whether it has a course instead.
+        /// Whether the drive has a course instead.
         course: bool,
     },
     /// Rows are missing.
-    #[error("{path}: line {line}: {ms:.1} ms after the row before; a training needs a row every 10 ms")]
+    #[error("{path}: line {line}: {ms:.1} ms after the previous row; training needs a row every 10 ms")]
     Gap {
         /// The recording.
         path: String,
         /// The line after the first gap.
         line: u64,
-        /// The time from the row before.
+        /// The time since the previous row, ms.
         ms: f64,
     },
-    /// It is too short.
-    #[error("{path}: {seconds:.0} s after the 3 s at rest; a training needs {SHORTEST_S:.0}")]
+    /// The drive is too short.
+    #[error("{path}: {seconds:.0} s after the 3 s at rest; training needs {SHORTEST_S:.0} s")]
     TooShort {
         /// The recording.
         path: String,
-        /// Its length after static initialisation.
+        /// Length of the drive after static initialisation, s.
         seconds: f64,
     },
-    /// Gyro and reference do not belong together.
+    /// The gyro and the reference disagree.
     #[error(
-        "{path}: ref_gyr_z turns otherwise than gyr_z, by {rad:.2} rad in 10 s: another unit or sign (rad/s, positive to \
-         the left), or another drive"
+        "{path}: ref_gyr_z disagrees with gyr_z by {rad:.2} rad in 10 s: wrong unit or sign (rad/s, positive to the left), \
+        or another drive"
     )]
     Disagrees {
         /// The recording.
         path: String,
-        /// The typical difference.
+        /// The typical difference in 10 s, rad.
         rad: f64,
     },
 }
 
-/// Returns the training that a drive with a course alone can have.
+/// Returns advice for a drive whose only reference is a course.
 fn advice(course: bool) -> &'static str {
     if course { "; its ref_yaw trains the linear part: python -m gyronet_train.linear --course" } else { "" }
 }
 
-/// Describes a drive that can be trained on.
+/// A drive that can be trained on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Examined {
     /// The file.
     pub path: PathBuf,
     /// The file's name without `.csv`.
     pub name: String,
-    /// Its length after static initialisation, s.
+    /// Length of the drive after static initialisation, s.
     pub seconds: f64,
-    /// The turns to either side together, rad.
+    /// Sum of the turns to both sides, rad.
     pub turned_rad: f64,
 }
 
 /// Examines a drive.
 ///
 /// # Errors
-/// [`Refusal`], which names the file and, where there is one, the line.
+/// [`Refusal`], which names the file and, if known, the line.
 pub fn examine(path: &Path) -> Result<Examined, Refusal> {
     let mut recording = Recording::read(path)?;
     let named = || recording.path.clone();
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use std::fmt::Write;
 
-    /// Examines a made drive with a row every 10 ms of (yaw rate, reference) by second of the drive.
+    /// Examines a drive with a row every 10 ms; `rates` gives the yaw rate and the reference at a time, s.
     fn examined(name: &str, seconds: u32, rates: impl Fn(f64) -> (f64, String)) -> Result<Examined, String> {
         let mut csv = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,ref_yaw\n");
         let course = if name == "course" { "0.1" } else { "" };
@@ -140,7 +140,7 @@ mod tests {
             let noise = 1e-3 * f64::from(k % 3) - 1e-3;
             let time = f64::from(k) * DT;
             let (gyro, reference) = rates(time);
-            // Every axis flickers as a sensor does; equal readings are stuck ones.
+            // Every axis varies as a sensor's does; equal readings count as stuck.
             let (up, gyro) = (9.8 + 10.0 * noise, gyro + noise);
             // Writing to a string does not fail.
             let _ =
@@ -153,7 +153,7 @@ mod tests {
         result
     }
 
-    /// Half a turn a minute, from the fourth second on.
+    /// Returns half a turn per minute, from the fourth second on.
     fn turn(time: f64) -> f64 {
         if time < 3.0 { 0.0 } else { 0.05 }
     }
@@ -172,9 +172,9 @@ mod tests {
         for (name, seconds, reason, rates) in [
             ("blind", 63, "line 2002: no ref_gyr_z", &without as &dyn Fn(f64) -> (f64, String)),
             ("course", 63, "its ref_yaw trains the linear part", &without),
-            ("short", 20, "17 s after the 3 s at rest; a training needs 30", &|time| same(turn(time))),
+            ("short", 20, "17 s after the 3 s at rest; training needs 30 s", &|time| same(turn(time))),
             ("moving", 63, "starts moving: line ", &|time: f64| same((2.0 * time).sin())),
-            ("mirrored", 63, "another unit or sign", &|time: f64| {
+            ("mirrored", 63, "wrong unit or sign", &|time: f64| {
                 (30.0 * turn(time), (-30.0 * turn(time)).to_string())
             }),
         ] {

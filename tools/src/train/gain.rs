@@ -1,20 +1,20 @@
-//! This module computes what weights gain on drives that chose nothing in their training.
+//! This module computes what weights gain on drives that had no part in their training.
 
 use crate::evaluate::methods::Method;
 use crate::evaluate::report::DriveErrors;
 use serde::Serialize;
 
-/// Holds the mean over drives, and the standard deviation between them; none for one drive.
+/// The mean over drives and the standard deviation between them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// The mean.
     pub mean: f64,
-    /// The standard deviation.
+    /// The standard deviation; `None` for one drive.
     pub deviation: Option<f64>,
 }
 
 impl Spread {
-    /// Returns that of some values; `None` where there are none.
+    /// Returns the spread of some values; `None` if there are none.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = (!values.is_empty()).then_some(values.len() as f64)?;
@@ -32,30 +32,30 @@ impl std::fmt::Display for Spread {
     }
 }
 
-/// Holds the 1 s error of a method over that of static initialisation.
+/// The 1 s error of a method over that of static initialisation.
 #[derive(Debug, Clone, Serialize)]
 pub struct Ratio {
     /// The method's name.
     pub method: &'static str,
-    /// The gain on each drive.
+    /// The ratio on each drive.
     pub drives: Vec<f64>,
-    /// Over all of them.
+    /// The spread over the drives.
     pub all: Spread,
 }
 
-/// Holds the gain on some drives.
+/// The gain on some drives.
 #[derive(Debug, Clone, Serialize)]
 pub struct Gain {
     /// The drives' names.
     pub drives: Vec<String>,
-    /// The methods, in the order of the tables.
+    /// The ratio of each method to static initialisation, in the order of [`Gain::METHODS`].
     pub over_static: Vec<Ratio>,
-    /// The rate for navigation over the best classical method of each drive.
+    /// The error of the navigation rate over that of the best classical method of each drive.
     pub over_best_classical: Option<Spread>,
 }
 
 impl Gain {
-    /// The methods that are compared. What stands for the library's own weights is left out.
+    /// The methods that are compared; methods that use the library's own weights are left out.
     pub const METHODS: [Method; 6] = [
         Method::STATIC_ZERO_RATE,
         Method::FIR,
@@ -65,7 +65,7 @@ impl Gain {
         Method::NAVIGATION,
     ];
 
-    /// Computes it.
+    /// Computes the gain on some drives.
     #[must_use]
     pub fn new(drives: &[DriveErrors]) -> Self {
         let over_static = Self::METHODS.into_iter().filter_map(|method| {
@@ -85,7 +85,7 @@ impl Gain {
         }
     }
 
-    /// Returns the ratio of what is sent for navigation.
+    /// Returns the ratio of the navigation rate.
     #[must_use]
     pub fn sent(&self) -> Option<Spread> {
         self.over_static.iter().find(|ratio| ratio.method == Method::NAVIGATION.name).map(|ratio| ratio.all)

@@ -1,4 +1,4 @@
-//! The page of a training.
+//! This module writes the page about a training.
 
 use super::examine::Examined;
 use super::gain::Gain;
@@ -10,18 +10,18 @@ use crate::plot::page::{document, escaped, grouped, table};
 /// Classes of the seeds' curves in the style sheet; further seeds are not drawn.
 const SEEDS: [&str; 5] = ["default", "gyronet_int", "static_zero_rate", "gyronet_f32", "raw"];
 
-/// Holds what the page of a training shows.
+/// The contents of the page about a training.
 #[derive(Debug)]
 pub struct Training<'a> {
     /// The name of the folder.
     pub name: String,
-    /// The drives.
+    /// The drives and their roles.
     pub roles: &'a Roles,
-    /// The course.
+    /// The history of the training.
     pub history: &'a History,
-    /// The gain on the drives held out.
+    /// The gain on the held-out drives.
     pub gain: &'a Gain,
-    /// The gain on the drive that chose the epoch.
+    /// The gain on the validation drive, which chose the epoch.
     pub validation: &'a Gain,
     /// The size of the weight file, bytes.
     pub bytes: usize,
@@ -32,7 +32,7 @@ pub struct Training<'a> {
 pub fn page(training: &Training<'_>) -> String {
     let Training { name, roles, history, gain, validation, bytes } = training;
     let mut body = format!(
-        "<h1>{}</h1>\n<p class=\"lead\">Weights trained on {}, and what they gain on drives that chose nothing. Written by \
+        "<h1>{}</h1>\n<p class=\"lead\">Weights trained on {}, and what they gain on held-out drives. Written by \
          <code>gyronet train</code> {}.</p>\n",
         escaped(name),
         match roles.train.len() {
@@ -74,14 +74,16 @@ fn gains(gain: &Gain, validation: &Gain) -> String {
         row
     });
     let one = match gain.drives.len() {
-        1 => " One drive is held out, so there is no spread: <code>--hold-out</code> names more.",
+        1 => {
+            " Only one drive is held out, so there is no spread; hold out more with <code>--hold-out</code>."
+        }
         _ => "",
     };
     format!(
-        "{}<p class=\"note\">The angle that a rate is wrong by after 1 s, on average, over that of the gyro less its bias at rest: \
-         below 1 is better. Mean and standard deviation over the drives held out; the last column is the drive that chose \
-         the epoch, and flatters. The last two rows are what the board sends with these weights, in integers; the others \
-         need none.{one}</p>\n",
+        "{}<p class=\"note\">The mean angle error of a rate after 1 s, over that of the gyro less its bias at rest: below 1 is \
+         better. Mean and standard deviation over the held-out drives. The last column is the validation drive: it chose the \
+         epoch, so its error is too optimistic. The last two rows are the rates that the board sends with these weights, in \
+         integers; the other methods use no weights.{one}</p>\n",
         table("methods", "", &header, rows)
     )
 }
@@ -114,10 +116,10 @@ fn courses(history: &History) -> String {
         in_scale: true,
     });
     let axes = "mrad in 1 s, over epochs";
-    Chart { title: "Error on the drive that chooses", axes, same_scale: false, curves: errors }.html()
+    Chart { title: "Error on the validation drive", axes, same_scale: false, curves: errors }.html()
         + &Chart {
             title: "Loss on the training drives",
-            axes: "error, in the gyro error's deviation, and a tenth of the expected error's log loss; over epochs",
+            axes: "error, in standard deviations of the gyro error, plus a tenth of the expected error's log loss; over epochs",
             same_scale: false,
             curves: curves(|seed| &seed.loss, 1.0),
         }
@@ -133,8 +135,8 @@ fn drives(roles: &Roles) -> String {
             format!("{:.0} s, turns of {turned:.0} degrees", drive.seconds),
         ]
     };
-    let mut rows: Vec<_> = roles.train.iter().map(|drive| row("trains", drive)).collect();
-    rows.push(row("chooses the epoch", &roles.validate));
+    let mut rows: Vec<_> = roles.train.iter().map(|drive| row("training", drive)).collect();
+    rows.push(row("validation, chooses the epoch", &roles.validate));
     rows.extend(roles.held_out.iter().map(|drive| row("held out", drive)));
     rows.extend(roles.refused.iter().map(|refusal| {
         let text = refusal.to_string();
@@ -142,5 +144,5 @@ fn drives(roles: &Roles) -> String {
         let name = std::path::Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         vec![name, "left out".to_owned(), reason.to_owned()]
     }));
-    table("costs", "", &["drive", "for", "length after 3 s at rest"], rows)
+    table("costs", "", &["drive", "role", "length after 3 s at rest"], rows)
 }

@@ -1,19 +1,19 @@
-//! This module chooses what each drive of a folder is for: to train, to choose the best epoch, or to be held out.
+//! This module chooses the role of each drive of a folder: training, validation (chooses the epoch), or held out.
 
 use super::examine::{Examined, Refusal, examine};
 use std::path::{Path, PathBuf};
 
-/// Two drives train at least; one chooses the epoch, one is held out.
+/// Fewest drives: two for training, one for validation, one held out.
 const FEWEST: usize = 4;
-/// The training drives together need at least this many seconds. Less has never been tried.
+/// Least time of all training drives together, s. Less has never been tried.
 const LEAST_S: f64 = 300.0;
-/// The training drives together need to turn by at least this, rad: a full circle.
+/// Least turn of all training drives together, rad: a full circle.
 const LEAST_TURNED_RAD: f64 = std::f64::consts::TAU;
 
 /// The reason why a folder cannot be trained on.
 #[derive(Debug, thiserror::Error)]
 pub enum RolesError {
-    /// It cannot be listed.
+    /// The folder cannot be listed.
     #[error("{folder}: {source}")]
     Folder {
         /// The folder.
@@ -22,7 +22,7 @@ pub enum RolesError {
         source: std::io::Error,
     },
     /// Too few drives can be used.
-    #[error("{folder}: {usable} drives can be used, needed are {needed}{}", listed(refused))]
+    #[error("{folder}: {usable} drives can be used, but {needed} are needed{}", listed(refused))]
     TooFew {
         /// The folder.
         folder: String,
@@ -30,69 +30,69 @@ pub enum RolesError {
         usable: usize,
         /// The number that is needed.
         needed: usize,
-        /// The others.
+        /// The drives left out.
         refused: Vec<Refusal>,
     },
     /// The training drives are too short.
     #[error(
-        "{folder}: the training drives have {seconds:.0} s together, needed are {LEAST_S:.0}{}",
+        "{folder}: the training drives have {seconds:.0} s together, but {LEAST_S:.0} s are needed{}",
         listed(refused)
     )]
     TooShort {
         /// The folder.
         folder: String,
-        /// Their length.
+        /// Length of the training drives together, s.
         seconds: f64,
         /// The drives left out.
         refused: Vec<Refusal>,
     },
-    /// The training drives do not turn.
+    /// The training drives turn too little.
     #[error(
-        "{folder}: no turns: the training drives turn by {:.0} degrees together, needed are {:.0}",
+    "{folder}: too few turns: the training drives turn by {:.0} degrees together, but {:.0} are needed",
         turned_rad.to_degrees(),
         LEAST_TURNED_RAD.to_degrees()
     )]
     NoTurns {
         /// The folder.
         folder: String,
-        /// Their turns.
+        /// Turns of the training drives together, rad.
         turned_rad: f64,
     },
-    /// A name on the command line belongs to no drive, or to several.
-    #[error("{folder}: {found} drives for the name {name:?}{}", listed(refused))]
+    /// A name on the command line matches no drive, or several.
+    #[error("{folder}: {found} drives match the name {name:?}{}", listed(refused))]
     Name {
         /// The folder.
         folder: String,
         /// The name.
         name: String,
-        /// The number of drives with it.
+        /// The number of drives that match the name.
         found: usize,
         /// The drives left out.
         refused: Vec<Refusal>,
     },
 }
 
-/// Returns refusals, a line each.
+/// Formats refusals, one line each.
 fn listed(refused: &[Refusal]) -> String {
     refused.iter().map(|refusal| format!("\n  left out: {refusal}")).collect()
 }
 
-/// Holds the drives of a folder by what they are for.
+/// The drives of a folder, by role.
 #[derive(Debug)]
 pub struct Roles {
-    /// These train; none, where shards do.
+    /// Training drives; empty if shards are used.
     pub train: Vec<Examined>,
-    /// This one chooses the epoch and the seed.
+    /// The validation drive, which chooses the epoch and the seed.
     pub validate: Examined,
-    /// These are judged at the end, and choose nothing.
+    /// Held-out drives, on which the result is evaluated.
     pub held_out: Vec<Examined>,
-    /// These cannot be used.
+    /// Reasons why the other drives cannot be used.
     pub refused: Vec<Refusal>,
 }
 
 impl Roles {
-    /// Examines the folder's drives and chooses. By default the last quarter by name is held out, the drive before it
-    /// validates and the others train; with `shards` none of the folder's train.
+    /// Examines the drives of a folder and chooses their roles. By default the last quarter by name is held out, the
+    /// drive before it validates, and the others train. With `shards` no drive of the folder trains.
     ///
     /// # Errors
     /// [`RolesError`].
@@ -166,7 +166,8 @@ fn csv_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Returns the place of the drive of that name, or of the only one whose name contains it; else how many there are.
+/// Returns the index of the drive of that name, or of the only drive whose name contains it. Otherwise returns the
+/// number of drives whose names contain it.
 fn find(drives: &[Examined], name: &str) -> Result<usize, usize> {
     if let Some(at) = drives.iter().position(|drive| drive.name == name) {
         return Ok(at);

@@ -1,11 +1,11 @@
-//! This module simulates drives of one device: trips through a town, and half an hour on a motorway without a stop.
+//! This module simulates drives of one device: trips in town, and half an hour on a motorway without a stop.
 //!
 //! | what | value | source |
 //! |---|---|---|
 //! | gyro bias by temperature | 0.005 deg/s per kelvin, sigma; over 30 K it bends by 0.03 deg/s, sigma | ICM-42688-P, DS-000347, table 1; the bend is assumed |
 //! | gyro bias at power-on | 0.02 deg/s, sigma, beside the device's own 0.25 deg/s | assumed; [`crate::simulate::vehicles`] |
-//! | drift on the motorway | 10 K in half an hour, and 0.01 deg/s per hour of another cause | issue of this measurement |
-//! | town | stands 12 s in 70; the sensor warms up by 15 K with 10 min, from 5 to 25 deg C | assumed |
+//! | drift on the motorway | 10 K in half an hour, and 0.01 deg/s per hour from another cause | issue of this measurement |
+//! | town | stands 12 s in 70; the sensor warms up by 15 K with a time constant of 10 min, from 5 to 25 deg C | assumed |
 //! | tyres, each | radius 0.1 % off, and 0.3 % more once warm (10 min) | assumed |
 //! | tyres, left and right | differ by 0.03 % once warm, sigma; in curves by 1.7e-4 per m/s^2; in slip by 3 %, sigma, of a driven axle | assumed |
 //! | slip | acceleration over 30 g | as [`crate::simulate::vehicles`] |
@@ -23,24 +23,24 @@ const DEG: f64 = std::f64::consts::PI / 180.0;
 const GRAVITY: f64 = 9.806_65;
 /// Distance between the rear wheels, m.
 pub const TRACK: f64 = 1.5;
-/// The length of a trip through the town, s.
+/// Length of a trip in town, s.
 const TOWN_S: f64 = 1_200.0;
-/// On the motorway the drive begins in the town, s.
+/// Time in town before the motorway, s.
 pub const MOTORWAY_FROM_S: f64 = 600.0;
 const MOTORWAY_S: f64 = 1_800.0;
 const PERIOD_S: f64 = 70.0;
 const STANDING_S: f64 = 12.0;
 
-/// The errors of a device that its drives share.
+/// The errors that all drives of a device share.
 #[derive(Debug, Clone, Copy)]
 pub struct Device {
     seed: u64,
-    /// Bias, rad/s, per kelvin, and per square kelvin around 25 deg C, of each axis.
+    /// Bias of each axis at 25 deg C, rad/s, and its changes per kelvin and per square kelvin.
     bias: [[f64; 3]; 3],
 }
 
 impl Device {
-    /// Draws a device.
+    /// Creates a device with random errors.
     pub fn new(seed: u64) -> Self {
         let mut random = Random::new(seed, 101);
         let mut axis = || [0.25 * DEG, 0.005 * DEG, 0.03 * DEG / 900.0].map(|sigma| sigma * random.normal());
@@ -53,31 +53,31 @@ impl Device {
     }
 }
 
-/// Names the kind of drive.
+/// The kind of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trip {
     /// Twenty minutes with a stop every 70 s.
     Town,
-    /// Ten minutes of that, then half an hour without a stop.
+    /// Ten minutes in town, then half an hour without a stop.
     Motorway,
 }
 
-/// Holds a simulated drive with what only a simulation knows.
+/// A simulated drive with its true yaw rate and bias.
 pub struct Drive {
     pub recording: Recording,
-    /// The truth of each row: yaw rate and the bias about z, rad/s.
+    /// True yaw rate and true bias about z at each row, rad/s.
     pub yaw_rate: Vec<f64>,
     pub yaw_bias: Vec<f64>,
 }
 
-/// The motion at one moment.
+/// The motion at one time.
 struct Motion {
     speed: f64,
     acceleration: f64,
     yaw_rate: f64,
 }
 
-/// A slow random process of variance 1 with a time constant, s.
+/// A Gauss-Markov process of variance 1: its value and its time constant, s.
 struct Wander(f64, f64);
 
 impl Wander {
@@ -98,11 +98,11 @@ fn town(seconds: f64, number: usize) -> (f64, f64) {
     (speed, turn)
 }
 
-/// Simulates a drive of a device; each number is another day.
+/// Simulates a drive of a device on a day, which seeds the random numbers.
 pub fn simulate(device: &Device, trip: Trip, day: u64) -> Drive {
     let seed = device.seed * 1_000 + day;
     let mut random = Random::new(seed, 102);
-    // The drift takes the place of the random walk.
+    // The simulated drift replaces the random walk.
     let part = mems::Config { gyro_bias: 0.0, gyro_walk: 0.0, mount: [0.0; 2], ..mems::Config::DEFAULT };
     let mut mems = Mems::of_device(&part, device.seed, seed);
     let mut vibration = Vibration::new(&vibration::Config::DEFAULT, seed);
@@ -138,7 +138,7 @@ pub fn simulate(device: &Device, trip: Trip, day: u64) -> Drive {
         };
         let motion = Motion { speed, acceleration: (speed - speed_before) / DT, yaw_rate };
         speed_before = speed;
-        // In the town before the motorway the sensor is warm already.
+        // On the motorway drive the temperature is constant in town.
         let celsius = match trip {
             Trip::Town => cold + 15.0 * (1.0 - (-now / 600.0).exp()),
             Trip::Motorway => cold + 10.0 * on_motorway / MOTORWAY_S,
@@ -158,7 +158,7 @@ pub fn simulate(device: &Device, trip: Trip, day: u64) -> Drive {
             let sign = if side == 0 { -1.0 } else { 1.0 };
             let ground = motion.speed + sign * motion.yaw_rate * TRACK / 2.0;
             let size = tyres[side] * (1.0 + warm[side] * (1.0 - (-now / 600.0).exp()));
-            // The outer wheel is pressed flatter, and turns faster.
+            // The outer wheel is compressed by the load and turns faster.
             let load = 1.0 + sign * 1.7e-4 * lateral / 2.0;
             Some(ground / size * load * (1.0 + slip * (1.0 + sign * slip_difference / 2.0)) / radius)
         };

@@ -1,16 +1,16 @@
-//! This module draws bias, sigma and heading error of the drive on the motorway.
+//! This module draws temperature, bias, sigma and heading error of the drive on the motorway.
 
 use super::State;
 use crate::plot::svg::{Axis, COLORS, Figure, Marks, Panel, PlotError, Stroke};
 
 const SIZE: (u32, u32) = (1000, 900);
-/// Seconds that are drawn as one point.
+/// Seconds that are averaged to one point.
 const AVERAGED: usize = 30;
 
 /// Draws the states.
 ///
 /// # Errors
-/// [`PlotError`], when the library refuses.
+/// [`PlotError`], if the plotting library fails.
 pub fn svg(states: &[State]) -> Result<String, PlotError> {
     let learned = Stroke::solid(COLORS[0], 2);
     let without = Stroke::solid(COLORS[1], 2);
@@ -60,7 +60,7 @@ pub fn svg(states: &[State]) -> Result<String, PlotError> {
     let title = "Half an hour without a stop while the sensor warms up (simulated)";
     let legend = vec![
         ("truth".to_owned(), Stroke::TRUTH),
-        ("static calibration, zero-rate updates".to_owned(), without),
+        ("static initialisation, zero-rate updates".to_owned(), without),
         ("with the bias curve".to_owned(), learned),
     ];
     Figure { title, size: SIZE, side_by_side: false, legend, panels }.svg()

@@ -1,47 +1,48 @@
-//! This module estimates the gyro's bias in motion from the difference of the rear wheels, as a Kalman filter over means of
-//! a second. It is here to be compared with the bias curve; the board does not have it.
+//! This module estimates the gyro's bias in motion from the difference of the rear wheels, with a Kalman filter over
+//! means of a second. It is compared with the bias curve; the board does not run it.
 //!
-//! z = gyro - difference / track is modelled as bias + r v + k w + l w v^2 + t T + s a v: the tyres' difference r, which
-//! has a rate of its own while they warm up, errors of scale k and of load l, the bias by temperature t, and the slip's
-//! difference s. A tyre's difference of 1e-5 is 0.012 deg/s at 31 m/s: as much as the bias changes by in an hour.
+//! The measurement gyro - difference / track is modelled as bias + r v + k w + l w v^2 + t T + s a v, with speed v,
+//! yaw rate w, temperature T and acceleration a. The parameters are the tyres' difference r, which has a rate of
+//! change while they warm up, the errors of scale k and of load l, the bias by temperature t, and the difference in
+//! slip s. A difference of the tyres of 1e-5 is 0.012 deg/s at 31 m/s: as much as the bias changes in an hour.
 //!
-//! The noises were chosen on this very simulation, and the acceleration is that of the second before and after: where the
-//! filter is no better than the curve here, it is nowhere.
+//! The filter has an advantage: its noises were tuned on this simulation, and the acceleration uses the next second.
+//! If it is no better than the curve here, it is no better anywhere.
 
 use super::drive::TRACK;
 use nalgebra::{SMatrix, SVector};
 
-/// Bias, r, k, l, t, s, and the rate of r.
+/// Number of states: bias, r, k, l, t, s, and the rate of r.
 const STATES: usize = 7;
 type Vector = SVector<f64, STATES>;
 type Matrix = SMatrix<f64, STATES, STATES>;
 
 /// Sigma of each state before the drive.
 const INITIAL: [f64; STATES] = [1e-4, 2e-3, 0.05, 1e-4, 8.7e-5, 1e-3, 1e-6];
-/// Sigma of its change in a second.
+/// Sigma of each state's change in a second.
 const WALK: [f64; STATES] = [3e-6, 1e-7, 1e-5, 1e-7, 1e-7, 1e-7, 3e-9];
 /// Sigma of a second's mean: gyro and wheels (0.01 km/h on the bus), and the gyro alone at standstill, rad/s.
 const MOVING: f64 = 6e-4;
 const STANDING: f64 = 1.5e-4;
-/// Slower than this, wheels are too coarse, m/s.
+/// Least speed for using the wheels, m/s; below it their resolution is too coarse.
 const SLOW: f64 = 5.0;
-/// Readings further off than this many sigma are left out.
+/// Sigmas beyond which a reading is rejected.
 const GATE: f64 = 5.0;
 
-/// Holds a second's means.
+/// The means of one second.
 #[derive(Debug, Clone, Copy)]
 pub struct Second {
     /// Gyro less its static bias, rad/s.
     pub gyro: f64,
     /// Speeds of the rear wheels, left and right, m/s.
     pub wheels: [f64; 2],
-    /// The vehicle stands.
+    /// Whether the vehicle stands.
     pub stands: bool,
-    /// Temperature above that of the first second, K; 0 where the curve has corrected the gyro.
+    /// Temperature above that of the first second, K; 0 if the curve has corrected the gyro.
     pub warmer: f64,
 }
 
-/// Returns the bias that the filter has at each second, rad/s.
+/// Returns the bias estimate of the filter at each second, rad/s.
 pub fn biases(seconds: &[Second]) -> Vec<f64> {
     let mut state = Vector::zeros();
     let mut covariance = Matrix::from_diagonal(&Vector::from(INITIAL.map(|sigma| sigma * sigma)));

@@ -1,4 +1,4 @@
-//! This module runs the drives through the board's code and compares the headings.
+//! This module runs the simulated drives through the board's code and compares the headings.
 
 use super::drive::{Device, Drive, MOTORWAY_FROM_S, Trip, simulate};
 use super::rear_wheels::{Second, biases};
@@ -15,26 +15,26 @@ use gyronet::store::{Calibration, Configuration, Learned};
 use serde::Serialize;
 
 const SECOND: usize = RATE_HZ as usize;
-/// Days in the town before the motorway.
+/// Number of trips in town, on different days, before the motorway.
 const DAYS: u64 = 6;
 
-/// Holds one method's heading error after half an hour on the motorway, deg.
+/// The heading error of one method after half an hour on the motorway, deg.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// The method.
+    /// The name of the method.
     pub name: &'static str,
     /// The error of each device.
     pub error_deg: Vec<f64>,
-    /// Their RMS.
+    /// RMS of the errors.
     pub rms_deg: f64,
-    /// The RMS over that of static calibration and zero-rate updates.
+    /// The RMS over that of static initialisation with zero-rate updates.
     pub ratio: f64,
 }
 
-/// The states of the board at one second of the motorway drive.
+/// The state of the board in one second of the motorway drive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct State {
-    /// Since the start, s.
+    /// Time since the start, s.
     pub seconds: f64,
     /// Temperature of the sensor, deg C.
     pub celsius: f64,
@@ -42,36 +42,35 @@ pub struct State {
     pub true_bias: f64,
     /// Bias that the board subtracts with the curve, deg/s.
     pub curve_bias: f64,
-    /// Bias that it subtracts without the curve, deg/s.
+    /// Bias that the board subtracts without the curve, deg/s.
     pub static_bias: f64,
     /// Expected error of the rate with the curve, deg/s.
     pub curve_sigma: f64,
-    /// Expected error of the rate without it, deg/s.
+    /// Expected error of the rate without the curve, deg/s.
     pub static_sigma: f64,
     /// Heading error with the curve, deg.
     pub curve_error: f64,
-    /// Heading error without it, deg.
+    /// Heading error without the curve, deg.
     pub static_error: f64,
 }
 
-/// Holds the results.
+/// The results of the measurement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// One row for each method.
     pub rows: Vec<Row>,
-    /// Share of the seconds on the motorway in which the bias is off by no more than its sigma, with the curve and
-    /// without.
+    /// Share of the motorway minutes in which the mean rate error is at most its sigma, with the curve and without.
     pub inside_one_sigma: [f64; 2],
-    /// The first device, second by second.
+    /// The states of the first device on the motorway, one per second.
     pub states: Vec<State>,
 }
 
 const NAMES: [&str; 5] = ["static", "static_zero_rate", "rear_wheels", "default", "default_rear_wheels"];
 
-/// Simulates so many devices, from a first seed on; `tick` is called for each drive.
+/// Simulates a number of devices with the seeds from `seed` on; `tick` is called for each drive.
 ///
 /// # Errors
-/// [`ReplayError`], where a simulated drive does not begin at rest.
+/// [`ReplayError`], if a simulated drive does not begin at rest.
 pub fn run(
     devices: u64,
     seed: u64,
@@ -118,7 +117,7 @@ pub fn run(
     Ok(Outcome { rows: rows.collect(), inside_one_sigma: inside, states })
 }
 
-/// Runs drives as a board that has learnt this.
+/// The pipeline configuration of a board that has learnt a bias curve, or none.
 struct Board(PipelineConfig);
 
 impl Board {
@@ -132,7 +131,7 @@ impl Board {
     }
 }
 
-/// Shows a drive to the board's learner.
+/// Feeds a drive to the board's learner.
 fn learn(drive: &Drive, replay: &Replay, learned: &mut Learned) {
     let mut learner = Learner::new();
     let limits = Configuration::DEFAULT.static_init;
@@ -142,7 +141,7 @@ fn learn(drive: &Drive, replay: &Replay, learned: &mut Learned) {
     }
 }
 
-/// Returns the heading error at the end of each second of the motorway, from its beginning on, rad.
+/// Returns the heading error at the end of each second on the motorway, rad.
 fn sums(drive: &Drive, rate: impl Fn(usize) -> f64) -> Vec<f64> {
     let first = (MOTORWAY_FROM_S / DT) as usize;
     let rows = first..drive.recording.rows.len();
@@ -160,13 +159,13 @@ fn gyro(drive: &Drive, row: usize) -> f64 {
     drive.recording.rows[row].sample.angular_rate[2].rad_per_sec()
 }
 
-/// The mean of the first three seconds, subtracted.
+/// Returns the heading errors of the gyro less its mean over the first three seconds.
 fn static_errors(drive: &Drive) -> Vec<f64> {
     let bias = (0..3 * SECOND).map(|row| gyro(drive, row)).sum::<f64>() / (3 * SECOND) as f64;
     sums(drive, |row| gyro(drive, row) - bias)
 }
 
-/// The rate that the board sends for navigation.
+/// Returns the heading errors of the navigation rate.
 fn drive_errors(drive: &Drive, replay: &Replay) -> Vec<f64> {
     let mut rates: Vec<f64> = drive.yaw_rate.clone();
     for step in &replay.steps {
@@ -177,7 +176,8 @@ fn drive_errors(drive: &Drive, replay: &Replay) -> Vec<f64> {
     sums(drive, |row| rates[row])
 }
 
-/// The gyro less the bias of the rear wheels' filter; with a curve the gyro is corrected by it first.
+/// Returns the heading errors of the gyro less the bias of the rear wheels' filter. With a curve, the gyro is
+/// corrected by the curve first.
 fn wheel_errors(drive: &Drive, curve: Option<&BiasCurve>) -> Vec<f64> {
     let celsius = |row: usize| {
         drive.recording.rows[row].sample.temperature.map_or(0.0, |code| f64::from(code.0) / 100.0)
@@ -198,7 +198,7 @@ fn wheel_errors(drive: &Drive, curve: Option<&BiasCurve>) -> Vec<f64> {
             for row in rows.clone() {
                 let speeds = frames.as_mut().map(|frames| frames.speeds(&drive.recording.rows[row]));
                 for (sum, speed) in wheels.iter_mut().zip(speeds.iter().flat_map(|speeds| &speeds[2..])) {
-                    // As the bus has it: 0.01 km/h.
+                    // Round as on the bus, to 0.01 km/h.
                     *sum += (100.0 * speed.unwrap_or(0.0)).round() / 360.0 / SECOND as f64;
                 }
             }
@@ -217,7 +217,7 @@ fn wheel_errors(drive: &Drive, curve: Option<&BiasCurve>) -> Vec<f64> {
     })
 }
 
-/// Returns the states of the motorway, second by second.
+/// Returns the states on the motorway, one per second.
 fn seconds_of(drive: &Drive, replays: [&Replay; 2], errors: [&Vec<f64>; 2]) -> Vec<State> {
     let first = MOTORWAY_FROM_S as usize;
     let biases = replays.map(|replay| {
@@ -253,7 +253,7 @@ fn seconds_of(drive: &Drive, replays: [&Replay; 2], errors: [&Vec<f64>; 2]) -> V
     errors[0].iter().zip(errors[1]).enumerate().map(state).collect()
 }
 
-/// Returns the shares of the minutes in which the rate's mean error is no larger than its mean sigma.
+/// Returns the shares of the minutes in which the rate's mean error is at most the sigma at the end of the minute.
 fn shares_inside(states: &[State]) -> [f64; 2] {
     let minutes = states.chunks_exact(60);
     let count = minutes.len().max(1) as f64;

@@ -1,12 +1,12 @@
-//! This module makes a file of wheel settings from a DBC file and the names of the signals that carry the speeds.
+//! This module creates wheel settings from a DBC file and the names of the signals that carry the speeds.
 //!
-//! A DBC file has the place, factor, offset and unit of a signal. It does not say in a standard way what protects a frame:
-//! checksum and counter are for the user to add to the file.
+//! A DBC file has the position, factor, offset and unit of a signal. It has no standard way to describe the
+//! protection of a frame, so the user must add checksum and counter to the settings.
 
 use super::file::{Frame, Order, Place, Signal, Wheel, WheelFile};
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueDescription, ValueType};
 
-/// Gives km/h for one of each unit, by the names that DBC files use, in lower case.
+/// Units by their names in DBC files, in lower case, and their values in km/h.
 const UNITS: [(&str, f64); 7] = [
     ("km/h", 1.0),
     ("kph", 1.0),
@@ -16,7 +16,7 @@ const UNITS: [(&str, f64); 7] = [
     ("mph", 1.609_344),
     ("mi/h", 1.609_344),
 ];
-/// DBC files describe the code of an invalid value with these words.
+/// Descriptions with which DBC files mark an invalid code, in lower case.
 const INVALID: [&str; 5] = ["invalid", "not available", "not valid", "sna", "signal not available"];
 
 /// The reason why a DBC file, or a name in it, cannot be used.
@@ -24,7 +24,7 @@ const INVALID: [&str; 5] = ["invalid", "not available", "not valid", "sna", "sig
 #[non_exhaustive]
 pub enum DbcError {
     /// The file is not a DBC file.
-    #[error("{path}: no DBC file: {reason}")]
+    #[error("{path}: not a valid DBC file: {reason}")]
     Format {
         /// The file.
         path: String,
@@ -38,7 +38,7 @@ pub enum DbcError {
         path: String,
         /// The name.
         name: String,
-        /// Names in the file that contain part of the missing one.
+        /// Signals in the file with a similar name.
         similar: Vec<String>,
     },
     /// Several messages have a signal of this name.
@@ -67,10 +67,10 @@ fn near(similar: &[String]) -> String {
     if similar.is_empty() { String::new() } else { format!("; there are {}", similar.join(", ")) }
 }
 
-/// Holds the names of the signals, SIGNAL or MESSAGE.SIGNAL, by wheel: front left, front right, rear left, rear right.
+/// Names of the signals, SIGNAL or MESSAGE.SIGNAL, by wheel: front left, front right, rear left, rear right.
 pub type Signals<'a> = [Option<&'a str>; 4];
 
-/// Makes a file of wheel settings.
+/// Creates wheel settings from a DBC file.
 ///
 /// # Errors
 /// [`DbcError`].
@@ -144,10 +144,10 @@ fn find(path: &str, dbc: &Dbc, wheel: Wheel, name: &str) -> Result<(MessageId, S
     let unit = signal.unit.trim().to_lowercase();
     let unit = UNITS.iter().find(|(known, _)| *known == unit);
     let Some((_, kmh)) = unit else {
-        return Err(refuse(&format!("has the unit {:?}, none of km/h, m/s and mph", signal.unit)));
+        return Err(refuse(&format!("has the unit {:?}, not km/h, m/s or mph", signal.unit)));
     };
     let (Ok(start_bit), Ok(bits)) = (u8::try_from(signal.start_bit), u8::try_from(signal.size)) else {
-        return Err(refuse("lies outside of eight bytes"));
+        return Err(refuse("is outside eight bytes"));
     };
     let place = Place {
         start_bit,
@@ -214,7 +214,7 @@ VAL_ 1200 WhlFR 16383 "SNA" 0 "stands" ;
         assert!((rear.factor_kmh - 0.036).abs() < 1e-12 && rear.offset_kmh == -360.0, "{rear:?}");
         assert_eq!((rear.place.order, rear.place.signed), (Order::Motorola, true));
         assert_eq!(settings.frames.iter().flatten().count(), 2);
-        // What is written is what is read.
+        // The file survives a round trip.
         let text = toml::to_string(&file).unwrap();
         assert_eq!(WheelFile::parse("car.toml", &text).unwrap(), file);
     }
@@ -227,6 +227,6 @@ VAL_ 1200 WhlFR 16383 "SNA" 0 "stands" ;
         assert!(error("Deep").to_string().ends_with("is multiplexed"));
         assert!(error("Temp").to_string().contains("the unit \"degC\""));
         let no_dbc = from_dbc("car.dbc", "wheels!", [None; 4]).unwrap_err();
-        assert!(no_dbc.to_string().starts_with("car.dbc: no DBC file: "), "{no_dbc}");
+        assert!(no_dbc.to_string().starts_with("car.dbc: not a valid DBC file: "), "{no_dbc}");
     }
 }

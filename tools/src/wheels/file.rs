@@ -1,5 +1,4 @@
-//! This module reads and writes the file of wheel settings (TOML), in the conventions of a DBC file: speeds in km/h,
-//! start bits as DBC files count them.
+//! This module reads and writes wheel settings (TOML), with speeds in km/h and start bits as in DBC files.
 
 use embedded_can::{ExtendedId, Id, StandardId};
 use gyronet::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
@@ -11,12 +10,12 @@ use gyronet::sample::WHEELS;
 use gyronet::units::{Duration, WheelSpeed};
 use serde::{Deserialize, Serialize};
 
-/// 1 km/h is this many speed codes.
+/// Speed codes per km/h.
 const CODES_PER_KMH: f64 = 65_536.0 / 3.6;
-/// A factor of 1 km/h is this [`WheelSignal::factor_q16`].
+/// [`WheelSignal::factor_q16`] of a factor of 1 km/h.
 const FACTORS_PER_KMH: f64 = CODES_PER_KMH * 65_536.0;
 
-/// The reason why a file of wheel settings cannot be used.
+/// The reason why a wheel settings file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WheelFileError {
@@ -28,22 +27,22 @@ pub enum WheelFileError {
         /// The place and the reason.
         source: Box<toml::de::Error>,
     },
-    /// There are more frames than wheels.
-    #[error("{path}: {found} frames, at most {MAX_FRAMES}")]
+    /// The file has too many frames.
+    #[error("{path}: {found} frames, at most {MAX_FRAMES} are allowed")]
     Frames {
         /// The file.
         path: String,
         /// The number of frames.
         found: usize,
     },
-    /// A frame's identifier has more bits than such identifiers have.
-    #[error("{path}: frame {id:#x}: no identifier of {} bits", if *.extended { 29 } else { 11 })]
+    /// The identifier of a frame is too large.
+    #[error("{path}: frame {id:#x}: not an identifier of {} bits", if *.extended { 29 } else { 11 })]
     Identifier {
         /// The file.
         path: String,
         /// The identifier.
         id: u32,
-        /// Says whether the file says that it has 29 bits.
+        /// Whether the file declares an identifier of 29 bits.
         extended: bool,
     },
     /// A wheel has two signals.
@@ -54,7 +53,7 @@ pub enum WheelFileError {
         /// The wheel.
         wheel: Wheel,
     },
-    /// A value does not lie in a frame of eight bytes.
+    /// A value is outside a frame of eight bytes.
     #[error("{path}: frame {id:#x}: {source}")]
     Place {
         /// The file.
@@ -64,7 +63,7 @@ pub enum WheelFileError {
         /// The reason.
         source: OutsideFrame,
     },
-    /// The board's codes cannot hold a number.
+    /// A number is out of the range of the board's codes.
     #[error("{path}: {key} = {value}: must be {range}")]
     Range {
         /// The file.
@@ -73,10 +72,10 @@ pub enum WheelFileError {
         key: &'static str,
         /// The value.
         value: f64,
-        /// The values that it can have.
+        /// The allowed values.
         range: &'static str,
     },
-    /// The library's check has failed.
+    /// The library rejects the settings.
     #[error("{path}: {source}")]
     Settings {
         /// The file.
@@ -86,17 +85,17 @@ pub enum WheelFileError {
     },
 }
 
-/// Holds the settings of a vehicle's wheel frames.
+/// The settings of a vehicle's wheel frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelFile {
-    /// Time after which a speed is too old, ms.
+    /// Age after which a speed is stale, ms.
     #[serde(default = "timeout_ms")]
     pub timeout_ms: u32,
-    /// Speed up to which a wheel counts as standing, km/h.
+    /// Largest speed of a standing wheel, km/h.
     #[serde(default = "still_speed_kmh")]
     pub still_speed_kmh: f64,
-    /// Time for which all wheels must stand, ms.
+    /// Time for which all wheels must stand before the vehicle counts as standing, ms.
     #[serde(default = "still_for_ms")]
     pub still_for_ms: u32,
     /// The frames.
@@ -115,30 +114,30 @@ const fn still_for_ms() -> u32 {
     500
 }
 
-/// Describes a frame with wheel speeds.
+/// A frame with wheel speeds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
-    /// Identifier.
+    /// CAN identifier.
     pub id: u32,
-    /// Says whether the identifier has 29 bits.
+    /// Whether the identifier has 29 bits.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub extended: bool,
-    /// Its protection, if it has one.
+    /// The protection of the frame, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub checksum: Option<Protection>,
-    /// Its message counter; absent if it has none or AUTOSAR's.
+    /// The position of the message counter; absent if there is none, or if it is part of an AUTOSAR profile.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counter: Option<Place>,
-    /// The speeds in it.
+    /// The wheel speeds in the frame.
     pub signal: Vec<Signal>,
 }
 
-/// Names the protection of a frame.
+/// The protection of a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Protection {
-    /// SAE J1850 in one byte, over all others.
+    /// SAE J1850 CRC over all other bytes.
     J1850 {
         /// Byte of the checksum, from 0.
         byte: usize,
@@ -183,31 +182,31 @@ pub enum Protection {
     },
 }
 
-/// Gives the place of a value in a frame.
+/// The position of a value in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
-    /// Start bit, as a DBC file gives it.
+    /// Start bit, as in a DBC file.
     pub start_bit: u8,
     /// Number of bits, 1 to 32.
     pub bits: u8,
     /// Order of the bytes.
     pub order: Order,
-    /// The value has a sign.
+    /// Whether the value is signed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub signed: bool,
 }
 
-/// Order of a value's bytes.
+/// The byte order of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// The lowest byte first (DBC `@1`).
+    /// Little endian (DBC `@1`).
     Intel,
-    /// The highest byte first (DBC `@0`).
+    /// Big endian (DBC `@0`).
     Motorola,
 }
 
-/// Names the wheel of a signal.
+/// The wheel of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wheel {
@@ -226,21 +225,21 @@ pub enum Wheel {
 pub struct Signal {
     /// The wheel.
     pub wheel: Wheel,
-    /// The place of its bits.
+    /// The position of the speed in the frame.
     #[serde(flatten)]
     pub place: Place,
-    /// km/h of one bit.
+    /// Speed per raw count, km/h.
     pub factor_kmh: f64,
-    /// km/h at raw zero.
+    /// Speed at raw value 0, km/h.
     #[serde(default)]
     pub offset_kmh: f64,
-    /// The raw code that says "not valid".
+    /// The raw value that means "not valid".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub invalid: Option<u32>,
 }
 
 impl WheelFile {
-    /// Reads a file's text.
+    /// Parses the text of a file.
     ///
     /// # Errors
     /// [`WheelFileError::Toml`], which names the line.
@@ -249,7 +248,7 @@ impl WheelFile {
             .map_err(|source| WheelFileError::Toml { path: path.to_owned(), source: Box::new(source) })
     }
 
-    /// Returns the file of settings, as a board has them.
+    /// Creates the file contents from a board's settings.
     #[must_use]
     pub fn of(settings: &WheelSettings) -> Self {
         let frames = (0..).zip(&settings.frames);
@@ -263,7 +262,7 @@ impl WheelFile {
         }
     }
 
-    /// Returns the settings of the board, checked as the board checks them.
+    /// Converts to the board's settings, with the checks of the board.
     ///
     /// # Errors
     /// [`WheelFileError`].
@@ -404,7 +403,7 @@ impl Protection {
     }
 }
 
-/// The library's factor; below 100 km/h for one bit, and such that the code is not zero.
+/// Converts a factor to the library's code. It must be below 100 km/h, and its code must not be zero.
 fn factor(path: &str, kmh: f64) -> Result<i32, WheelFileError> {
     let code = (kmh * FACTORS_PER_KMH).round() as i32;
     if kmh.abs() < 100.0 && code != 0 {
@@ -429,7 +428,7 @@ fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFil
 mod tests {
     use super::*;
 
-    /// This file has the content of [`WheelSettings::TOYOTA`].
+    /// The contents of [`WheelSettings::TOYOTA`] as a file.
     const TOYOTA: &str = r#"
 [[frame]]
 id = 0xAA
@@ -450,7 +449,7 @@ signal = [
     fn the_built_in_settings_as_a_file() {
         let settings = WheelFile::parse("car.toml", TOYOTA).unwrap().settings("car.toml").unwrap();
         let offset = |settings: &WheelSettings| settings.signals[0].unwrap().offset.0;
-        // One rounds and the other truncates: 0.00006 km/h.
+        // The file's offset is rounded and the constant truncated: they differ by 0.00006 km/h.
         assert_eq!(offset(&settings), offset(&WheelSettings::TOYOTA) - 1);
         assert_eq!(settings.still_speed, WheelSpeed(1_820));
         assert_eq!((settings.timeout, settings.still_for), (Duration(100_000), Duration(500_000)));
@@ -471,7 +470,9 @@ signal = [
         assert!(
             error(&TOYOTA.replace("start_bit = 55", "start_bit = 63")).contains("do not lie inside a frame")
         );
-        assert!(error(&TOYOTA.replace("0xAA", "0x800")).ends_with("frame 0x800: no identifier of 11 bits"));
+        assert!(
+            error(&TOYOTA.replace("0xAA", "0x800")).ends_with("frame 0x800: not an identifier of 11 bits")
+        );
         assert!(
             error(&TOYOTA.replace("\"rear-left\"", "\"rear-right\"")).ends_with("RearRight has two signals")
         );
@@ -483,7 +484,7 @@ signal = [
             TOYOTA.replace("id = 0xAA", &format!("id = 0xAA\nchecksum = {{ kind = \"{kind}\", byte = 7 }}"))
         };
         assert!(error(&checksum("crc99")).contains("unknown variant `crc99`"));
-        // The last signal lies in byte 7.
+        // Byte 7 is part of the last signal.
         assert!(error(&checksum("xor")).ends_with("two values overlap"));
     }
 }

@@ -1,1 +1,1 @@
-"""Training of gyronet's networks: recordings in, checkpoint and golden tensors out."""
+"""Training of gyronet's networks: from recordings to a checkpoint and golden tensors."""

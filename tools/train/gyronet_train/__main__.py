@@ -1,11 +1,11 @@
 """python -m gyronet_train DATA --out FOLDER: train GyroNet on a folder of drives.
 
-Trains once for each seed, prints what each is worth on the validation drives with mean and spread,
-and keeps the best of them there. Test drives are never read here. training.py says how it is
-trained and in what that departs from the paper. A training that was killed goes on where the files
-STEM.seedN.state in --out are; STEM.history.json has every epoch. Training drives can come as Parquet
-shards (shards.py), and several processes train together under torchrun. With --scale-of CHECKPOINT
-nothing is trained but that network's scale of its expected error (scale.py).
+Trains once for each seed, prints each seed's errors on the validation drives with mean and spread, and
+keeps the best network. Test drives are never read. training.py describes the training and where it
+differs from the paper. A training that was killed resumes from the files STEM.seedN.state in --out;
+STEM.history.json has every epoch. Training drives can be Parquet shards (shards.py), and several
+processes train together under torchrun. With --scale-of CHECKPOINT, only the scale of that network's
+expected error is fitted (scale.py).
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--shards", type=Path, metavar="FOLDER", help="train on these shards instead (pyarrow)")
     parser.add_argument("--validate", nargs="+", default=["08"], metavar="NAME")
     parser.add_argument("--epochs", type=int, default=20)
-    parser.add_argument("--patience", type=int, default=6, help="stop after so many epochs without a better one")
-    parser.add_argument("--batch", type=int, default=512, help="windows of a batch")
+    parser.add_argument("--patience", type=int, default=6, help="stop after this many epochs without improvement")
+    parser.add_argument("--batch", type=int, default=512, help="windows per batch")
     parser.add_argument("--lr", type=float, default=0.0015)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], metavar="N")
     parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="CPU threads")
-    parser.add_argument("--no-turns", dest="turns", action="store_false", help="add no turns")
+    parser.add_argument("--no-turns", dest="turns", action="store_false", help="do not add turns")
     parser.add_argument("--units", action="store_true", help="add other units of the part")
-    parser.add_argument("--windows", type=int, default=1, help="windows of a span")
+    parser.add_argument("--windows", type=int, default=1, help="windows per span")
     parser.add_argument("--scale-of", type=Path, metavar="CHECKPOINT", help="fit only this network's scale")
     parser.add_argument("--note", help="a sentence for the provenance")
     return parser.parse_args()
 
 
 def line(what: str, validation: Validation) -> str:
-    """The errors of one network, for people."""
+    """Returns a line of text with the errors of one network."""
     return (
         f"{what}: 1 s error {validation.mean_1s_rad:.6f} rad, over any 1 s {validation.any_1s_rad:.6f}, "
         f"window mean {validation.window_rad_per_sec:.6f} rad/s at {validation.scale_ratio:.2f} of its scale, "
@@ -71,13 +71,13 @@ def main() -> None:
     except ValueError as error:
         raise SystemExit(str(error)) from error
     except KeyboardInterrupt:
-        raise SystemExit("stopped; the same command goes on after the last whole epoch") from None
+        raise SystemExit("stopped; the same command resumes after the last complete epoch") from None
     finally:
         processes.leave()
 
 
 def run(args: argparse.Namespace) -> None:
-    """Trains and writes the files; the first of several processes alone writes and prints."""
+    """Trains and writes the files; only the first process writes and prints."""
     first = processes.part()[0] == 0
     say = print if first else lambda *_, **__: None
     args.out.mkdir(parents=True, exist_ok=True)
@@ -94,28 +94,28 @@ def run(args: argparse.Namespace) -> None:
 
 
 def csv_drives(args: argparse.Namespace) -> list[Drive]:
-    """The training drives."""
+    """Returns the training drives."""
     return pieces(args.data, args.train)
 
 
 def pieces(folder: Path, names: list[str]) -> list[Drive]:
-    """The drives of some names, each in the pieces between its gaps."""
+    """Returns the drives of these names, each in pieces between its gaps."""
     return [piece for name in tqdm(names, "reading", disable=None) for piece in load_pieces(find_drive(folder, name))]
 
 
 def data(args: argparse.Namespace):
-    """What is trained on: the drives in memory, or the shards' as a stream."""
+    """Returns the training data: drives in memory, or shards as a stream."""
     if args.shards is None:
         return Spans(csv_drives(args), args.windows, processes.part())
     try:
         from .shards import Stream
     except ImportError as error:
-        raise ValueError(f"--shards wants pyarrow: {error}") from error
+        raise ValueError(f"--shards needs pyarrow: {error}") from error
     return Stream(args.shards, args.windows, processes.part())
 
 
 def best_of_seeds(args: argparse.Namespace, validation: list[Drive], say) -> tuple[GyroNet, dict]:
-    """Trains with each seed: the best network on the validation drives, and where it comes from."""
+    """Trains with each seed; returns the best network on the validation drives, and its provenance."""
     weights = [len(drive.gyro_error) for drive in validation]
     static = float(np.average([mean_1s_error(drive.gyro_error) for drive in validation], weights=weights))
     say(f"static initialisation: 1 s error {static:.6f} rad")
@@ -174,17 +174,17 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive], say) -> tup
 
 
 def names(drives: list[Drive]) -> list[str]:
-    """The names of drives, each once, however many pieces it has."""
+    """Returns the names of drives, each once even if the drive has several pieces."""
     return list(dict.fromkeys(drive.name for drive in drives))
 
 
 def with_scale(
     args: argparse.Namespace, drives: list[Drive], validation: list[Drive]
 ) -> tuple[GyroNet, dict]:
-    """The checkpoint's network, its scale fitted again to the drives that it was trained on."""
+    """Returns the checkpoint's network, with its scale fitted again to the drives that it was trained on."""
     model, provenance = load_gyronet(args.scale_of)
     if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, *validation]}:
-        raise ValueError(f"{args.scale_of}: trained or validated on other drives than these")
+        raise ValueError(f"{args.scale_of}: was trained or validated on other drives")
     print(line("before", validate_all(model, validation)))
     fit_scale(model, drives)
     calibrate(model, validate_all(model, validation).scale_ratio)

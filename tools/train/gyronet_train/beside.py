@@ -1,12 +1,12 @@
-"""python -m gyronet_train.beside DATA --out FOLDER: the model that the library ships, a linear part and a small Bi-LSTM.
+"""python -m gyronet_train.beside DATA --out FOLDER: train the shipped model, a linear part and a small Bi-LSTM.
 
-The linear part is the filter of linear.py without the gain: the mounting, and differences of neighbouring samples, which
-add nothing for an input that does not change. The gain, and another unit's mounting, are found by `gyronet calibrate`; the
-board takes the slow mean out of all corrections, so that no vehicle gets a constant. Beside it a Bi-LSTM states the
-expected error of each window. What it could add to the correction is measured here too, each drive by the models of the
-others, and is not shipped unless it gains more than its spread over drives.
+The linear part is the filter of linear.py without the gain: the mounting, and differences of neighbouring samples,
+which add nothing for a constant input. `gyronet calibrate` finds the gain, and the mounting of another unit. The board
+removes the slow mean of all corrections, so that no vehicle gets a constant. A Bi-LSTM gives the expected error of each
+window. The program also measures what the Bi-LSTM could add to the correction, on each drive with the models of the
+others. This is not shipped unless it gains more than its spread over drives.
 
-The input is kept from telling level and turn: both are added at random (`disturb`).
+Random levels and turns are added to the input (`disturb`), so that the Bi-LSTM does not learn from level and turn.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ TILT = 0.5  # m/s^2, 1 sigma: 3 degrees of mounting or street
 BATCH = 512
 LR = 0.004
 LIKELIHOOD_WEIGHT = 0.1
-# Of the scale as trained: 0.71 of the seconds of the training drives are then inside one sigma as the board states it,
-# 0.78 without (`gyronet evaluate --ablation`).
+# Factor on the trained scale. With it 0.71 of the seconds of the training drives are within one sigma as the board
+# sends it, without it 0.78 (`gyronet evaluate --ablation`).
 STATED = 0.8
 
 
 def linear_part(made: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray) -> np.ndarray:
-    """The outputs of a window, fitted to the sums of some drives."""
+    """Returns the outputs of a window, fitted to the sums of some drives."""
     return rows(fit(made, basis))
 
 
 def disturb(x: torch.Tensor) -> torch.Tensor:
-    """Adds a turn and a level to each window, which say nothing of the gyro's error."""
+    """Adds a random turn and level to each window; neither depends on the gyro's error."""
     tilted = turn(x).clone()
     tilted[..., :3] += TILT * torch.randn(len(x), 1, 3)
     return tilted
 
 
 class Windows:
-    """All windows of some drives after the static phase, and what the linear part leaves of the gyro's error."""
+    """All windows of some drives after the static phase, and the gyro error that remains after the linear part."""
 
     def __init__(self, drives: list[Drive], outputs: np.ndarray):
         linear = torch.from_numpy(outputs.reshape(WINDOW, -1)).float()
@@ -60,7 +60,7 @@ class Windows:
 
 
 def train(drives: list[Drive], outputs: np.ndarray, units: int, epochs: int, seed: int, correct: bool) -> GyroNet:
-    """Trains a Bi-LSTM beside a linear part; with `correct` it adds to the correction, too."""
+    """Trains a Bi-LSTM beside a linear part; with `correct` the Bi-LSTM also adds to the correction."""
     torch.manual_seed(seed)
     data = Windows(drives, outputs)
     features = np.concatenate([drive.features for drive in drives])
@@ -77,7 +77,7 @@ def train(drives: list[Drive], outputs: np.ndarray, units: int, epochs: int, see
     for _ in range(epochs):
         for batch in torch.randperm(len(data.x)).split(BATCH)[: len(data.x) // BATCH]:
             x = data.x[batch]
-            # The linear part's output is the undisturbed window's: by construction neither turn nor level changes it.
+            # The linear part runs on the undisturbed window; by construction neither turn nor level changes its output.
             correction, scale = model(disturb(x))
             by_network = correction - model.linear(x.flatten(1)) if correct else torch.zeros_like(correction)
             error = by_network - data.left[batch]
@@ -95,14 +95,14 @@ def train(drives: list[Drive], outputs: np.ndarray, units: int, epochs: int, see
 
 @torch.no_grad()
 def estimates(model: GyroNet, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
-    """Corrections (W, N) and scales (W,) of the windows HOP apart."""
+    """Returns corrections (W, N) and scales (W,) of the windows HOP apart."""
     x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::HOP]))
     correction, scale = zip(*(model(part) for part in x.split(4096)))
     return torch.cat(correction).numpy(), torch.cat(scale).numpy()
 
 
 def corrected_ratio(model: GyroNet, drive: Drive) -> float:
-    """The 1 s error over static initialisation's."""
+    """Returns the 1 s error over static initialisation's."""
     corrections, _ = estimates(model, drive)
     total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
     for k in range(WINDOW):
@@ -114,8 +114,8 @@ def corrected_ratio(model: GyroNet, drive: Drive) -> float:
 
 
 def log_loss(model: GyroNet | None, outputs: np.ndarray, drive: Drive, unit: float) -> float:
-    """The mean negative log likelihood of the windows' mean errors, in units of the training drives' mean error;
-    without a model, that of one scale for all."""
+    """Returns the mean negative log likelihood of the windows' mean errors, in units of the training drives' mean
+    error; without a model, with the same scale for all windows."""
     data = Windows([drive], outputs)
     error = data.left.mean(1).abs().numpy()[::HOP] / unit
     if model is None:
@@ -125,7 +125,7 @@ def log_loss(model: GyroNet | None, outputs: np.ndarray, drive: Drive, unit: flo
 
 
 def report(drives: list[Drive], basis: np.ndarray, sizes: list[int], epochs: int, seed: int) -> dict:
-    """Each drive by the models of the others: mean and standard deviation of what each part gains."""
+    """Returns mean and standard deviation over drives of each part's score, with the models of the other drives."""
     made = [sums(drive, basis) for drive in drives]
     rows_of: dict[str, list[float]] = {}
     add = lambda name, value: rows_of.setdefault(name, []).append(value)
@@ -150,9 +150,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
     parser.add_argument("--stem", default="default", help="name of the files")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
-    parser.add_argument("--units", type=int, default=4, help="of the Bi-LSTM that is written, a multiple of 4")
-    parser.add_argument("--parts", nargs="+", default=SHIPPED, choices=list(PARTS), help="of the linear part")
-    parser.add_argument("--correct", action="store_true", help="the Bi-LSTM adds to the correction, too")
+    parser.add_argument("--units", type=int, default=4, help="units of the Bi-LSTM that is written, a multiple of 4")
+    parser.add_argument("--parts", nargs="+", default=SHIPPED, choices=list(PARTS), help="parts of the linear part")
+    parser.add_argument("--correct", action="store_true", help="the Bi-LSTM also adds to the correction")
     parser.add_argument("--report", type=int, nargs="*", default=[4, 8, 16], metavar="UNITS", help="sizes to compare")
     parser.add_argument("--epochs", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)

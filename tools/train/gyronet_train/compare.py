@@ -1,10 +1,10 @@
-"""python -m gyronet_train.compare DATA --out STEM: CNN, RNN, LSTM and Bi-LSTM, as in Fig. 2.
+"""python -m gyronet_train.compare DATA --out STEM: compare CNN, RNN, LSTM and Bi-LSTM, as in Fig. 2.
 
-Zhao et al. chose the Bi-LSTM among these by their test error after each epoch, and say neither how
-large the others were nor what the error is. Here all have two recurrent layers (the CNN four
-convolutions of three samples) and as many parameters as GyroNet, 119,000, and the error is the
-loss, the mean absolute error by sample. Trained as in the paper: Adam at a fixed rate of 0.0015,
-mean absolute error over shuffled windows, nothing added to them. Nothing is chosen by the outcome.
+Zhao et al. chose the Bi-LSTM among these by the test error after each epoch. They give neither the
+size of the other networks nor the kind of error. Here all have two recurrent layers (the CNN four
+convolutions of three samples) and as many parameters as GyroNet, 119,000. The error is the loss, the
+mean absolute error by sample. The training is that of the paper: Adam at a fixed rate of 0.0015, mean
+absolute error over shuffled windows without augmentation. The outcome chooses nothing.
 
 Writes STEM.json and STEM.png.
 """
@@ -31,7 +31,7 @@ from matplotlib import pyplot  # noqa: E402 - the backend comes first
 
 
 class Network(nn.Module):
-    """A body that turns (B, N, 6) into (B, N, width), and a last layer: gyro error in rad/s, (B, N)."""
+    """A body from (B, N, 6) to (B, N, width), and a last layer that gives the gyro error in rad/s, (B, N)."""
 
     def __init__(self, body: nn.Module, width: int, spans: Spans):
         super().__init__()
@@ -46,7 +46,7 @@ class Network(nn.Module):
 
 
 class Recurrent(nn.Module):
-    """Two recurrent layers; gives the hidden states alone."""
+    """Two recurrent layers that return only the hidden states."""
 
     def __init__(self, kind: type[nn.RNNBase], hidden: int, bidirectional: bool = False):
         super().__init__()
@@ -79,8 +79,8 @@ NETWORKS: dict[str, Callable[[Spans], Network]] = {
 
 @torch.no_grad()
 def errors(network: Network, drives: list[Drive]) -> tuple[float, float]:
-    """Mean absolute error by sample over all windows (rad/s), and 1 s yaw error as the firmware
-    overlaps windows (rad): means over drives."""
+    """Returns means over drives: the mean absolute error by sample over all windows (rad/s), and the 1 s yaw error with
+    windows that overlap as in the firmware (rad)."""
     network.eval()
     by_sample, in_1s = [], []
     for drive in drives:
@@ -91,7 +91,7 @@ def errors(network: Network, drives: list[Drive]) -> tuple[float, float]:
 
 
 def run(name: str, spans: Spans, test: list[Drive], args: argparse.Namespace) -> dict:
-    """Trains one network; its errors after each epoch."""
+    """Trains one network; returns its errors after each epoch."""
     torch.manual_seed(args.seed)
     network = NETWORKS[name](spans)
     optimiser = torch.optim.Adam(network.parameters(), lr=args.lr)
@@ -113,7 +113,7 @@ def run(name: str, spans: Spans, test: list[Drive], args: argparse.Namespace) ->
 
 
 def plot(networks: dict[str, dict], path: Path) -> None:
-    """Mean absolute error by epoch."""
+    """Plots the mean absolute error by epoch."""
     figure, axes = pyplot.subplots(figsize=(7, 4), layout="constrained")
     for name, result in networks.items():
         error = 1e3 * np.array(result["mean_abs_rad_per_sec"])
@@ -127,7 +127,7 @@ def plot(networks: dict[str, dict], path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="gyronet_train.compare", description=__doc__)
     parser.add_argument("data", type=Path, help="folder of drives")
-    parser.add_argument("--out", type=Path, required=True, help="files to write, without .json and .png")
+    parser.add_argument("--out", type=Path, required=True, help="path of the files to write, without .json and .png")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NN")
     parser.add_argument("--test", nargs="+", default=["09", "11"], metavar="NN")
     parser.add_argument("--epochs", type=int, default=8)

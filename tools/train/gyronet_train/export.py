@@ -1,4 +1,4 @@
-"""Checkpoint and golden tensors as safetensors, with where they came from in the metadata."""
+"""Writes checkpoint and golden tensors as safetensors, with the provenance in the metadata."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ GOLDEN_WINDOWS = 8
 
 
 def export(model: GyroNet | FoGNet, provenance: dict, folder: Path, stem: str) -> list[Path]:
-    """Write STEM.safetensors and STEM.golden.safetensors; returns the paths."""
+    """Writes STEM.safetensors and STEM.golden.safetensors; returns the paths."""
     checkpoint = folder / f"{stem}.safetensors"
     tensors = {name: t.detach().contiguous() for name, t in model.state_dict().items()}
-    # One metadata value: safetensors does not promise the order of several.
+    # There is one metadata value only, since safetensors does not guarantee the order of several.
     save_file(tensors, checkpoint, metadata={"provenance": json.dumps(provenance, sort_keys=True)})
     golden = folder / f"{stem}.golden.safetensors"
     save_file(golden_tensors(model), golden, metadata={"made_by": f"torch {torch.__version__}"})
@@ -27,12 +27,12 @@ def export(model: GyroNet | FoGNet, provenance: dict, folder: Path, stem: str) -
 
 
 def load_gyronet(path: Path) -> tuple[GyroNet, dict]:
-    """A checkpoint that `export` wrote, and its provenance. Raises ValueError for another network's."""
+    """Reads a checkpoint that `export` wrote, and its provenance. Raises ValueError for another network."""
     with safe_open(path, "pt") as file:
         provenance = json.loads(file.metadata()["provenance"])
         tensors = {name: file.get_tensor(name) for name in file.keys()}
     if provenance["network"] != "gyronet":
-        raise ValueError(f"{path}: holds a {provenance['network']}")
+        raise ValueError(f"{path}: is a checkpoint of {provenance['network']}, not gyronet")
     recurrent = tensors.get("lstm1.weight_hh_l0")
     model = GyroNet(
         tensors["input_mean"],
@@ -47,8 +47,8 @@ def load_gyronet(path: Path) -> tuple[GyroNet, dict]:
 
 @torch.no_grad()
 def golden_tensors(model: GyroNet | FoGNet) -> dict[str, torch.Tensor]:
-    """Known answers: synthetic windows (noise about the means, two of them far out, one of
-    zeros) and what every layer makes of them. No recording is in them."""
+    """Returns test vectors: synthetic windows (noise about the means, two of them with large amplitudes, one of zeros)
+    and the output of every layer. They contain no recording."""
     generator = torch.Generator().manual_seed(20)
     noise = torch.randn(GOLDEN_WINDOWS, model.steps, len(model.input_mean), generator=generator)
     gain = torch.tensor([1.0, 1.0, 1.0, 1.0, 1.0, 4.0, 8.0, 0.0]).view(-1, 1, 1)

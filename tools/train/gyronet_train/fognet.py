@@ -1,16 +1,16 @@
 """python -m gyronet_train.fognet LAYOUT --train DIR ... --validate DIR --out FOLDER: train FoGNet.
 
-As in the paper: windows of 60 s every second, Adam with an initial rate of 0.0015, the two
-losses of Eq. 14-16 with alpha 0.5. The paper gives no units; here the first loss is taken in
-units of the corrections' RMS, the second as the mean over the window in units of the gyro
-increments' RMS: in radians and summed it would be a thousand times the first. Some windows are
-padded ones (Fig. 8), labelled with the truth of the rows that they repeat. The rate follows one
-cycle, weights are averaged over the last steps, and the epoch that does best on the validation
-drive is kept. Of a gyro whose bias is known the correction's constant part is taken out at the end. Test drives are never read here.
+As in the paper, training uses windows of 60 s every second, Adam with an initial rate of 0.0015, and the
+two losses of Eq. 14-16 with alpha 0.5. The paper gives no units. Here the first loss is in units of the
+corrections' RMS, the second is the mean over the window in units of the gyro increments' RMS; in radians
+and summed, it would be a thousand times the first. Some windows are padded (Fig. 8) and labelled with the
+truth of the rows that they repeat. The learning rate follows one cycle, weights are averaged over the last
+steps, and the best epoch on the validation drive is kept. If the gyro's bias is known, the constant part of
+the correction is removed at the end. Test drives are never read.
 
-LAYOUT drives: files that `gyronet import kaist --training` or `nclt` wrote, with the gyro less the Earth's rate and
-its bias, used in pieces where they have gaps. LAYOUT kingston: the Kingston
-2008 recording, of which only the first 60 % are read, the last sixth of these to validate.
+LAYOUT drives: files that `gyronet import kaist --training` or `nclt` wrote, with the Earth's rate and the
+bias subtracted from the gyro; a file with gaps is used in pieces. LAYOUT kingston: the first 60 % of the
+Kingston 2008 recording; the last sixth of these validates.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .fognet_model import FoGNet
 from .seconds import FOG, STEPS, Seconds, load_grid, load_kingston, window_rows
 
 ADAPT_SHARE, VALIDATE_SHARE = 0.6, 1 / 6
-AVERAGE = 0.995  # of the weights, a step
+AVERAGE = 0.995  # decay of the weights' average per step
 SETTINGS = ("epochs", "windows", "batch", "lr", "alpha", "padded", "weight_decay", "head_only", "seed")
 
 
@@ -39,18 +39,18 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train.fognet", description=__doc__)
     parser.add_argument("layout", choices=["drives", "kingston"])
     parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="PATH")
-    parser.add_argument("--validate", type=Path, nargs="+", metavar="PATH", help="the drives to validate with")
+    parser.add_argument("--validate", type=Path, nargs="+", metavar="PATH", help="validation drives")
     parser.add_argument(
-        "--rates", type=Path, metavar="FOLDER", help="rates of `gyronet replay --csv`, DRIVE.csv each, in place of the FoG's"
+        "--rates", type=Path, metavar="FOLDER", help="rates of `gyronet replay --csv` (DRIVE.csv) instead of the FoG's"
     )
-    parser.add_argument("--gyro", choices=["DSP-1760", "DSP-3000", "pseudo-FoG"], help="part that the weights are for")
-    parser.add_argument("--serial", type=int, default=0, help="number of the one gyro that they are for; 0 any of the part")
-    parser.add_argument("--simulated", action="store_true", help="say in the provenance that the drives are")
-    parser.add_argument("--init", type=Path, metavar="FILE", help="checkpoint to go on from")
+    parser.add_argument("--gyro", choices=["DSP-1760", "DSP-3000", "pseudo-FoG"], help="gyro that the weights are for")
+    parser.add_argument("--serial", type=int, default=0, help="serial number of the one gyro for the weights; 0: any")
+    parser.add_argument("--simulated", action="store_true", help="mark the drives as simulated in the provenance")
+    parser.add_argument("--init", type=Path, metavar="FILE", help="checkpoint to start from")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
     parser.add_argument("--stem", default="fognet", help="name of the files")
     parser.add_argument("--epochs", type=int, default=20)
-    parser.add_argument("--windows", type=int, default=4800, help="windows an epoch")
+    parser.add_argument("--windows", type=int, default=4800, help="windows per epoch")
     parser.add_argument("--batch", type=int, default=64)
     parser.add_argument("--lr", type=float, default=0.0015)
     parser.add_argument("--alpha", type=float, default=0.5)
@@ -60,12 +60,12 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     if args.rates and args.layout != "drives":
-        parser.error("--rates is for LAYOUT drives")
+        parser.error("--rates needs LAYOUT drives")
     return args
 
 
 def load(args: argparse.Namespace) -> tuple[list[Seconds], list[Seconds]]:
-    """The drives to train on and to validate with; pieces of a drive count as drives."""
+    """Returns the training and the validation drives; pieces of a drive count as drives."""
     if args.layout != "kingston":
         rates = lambda path: args.rates and args.rates / path.name
         pieces = lambda path: load_grid(path, rates(path))
@@ -78,7 +78,7 @@ def load(args: argparse.Namespace) -> tuple[list[Seconds], list[Seconds]]:
 
 
 class Windows:
-    """All windows of some drives: rows to look up, not copies of them."""
+    """All windows of some drives, as row numbers instead of copies."""
 
     def __init__(self, drives: list[Seconds], padding: str):
         self.features = torch.from_numpy(np.concatenate([d.features for d in drives])).float()
@@ -95,13 +95,13 @@ class Windows:
         self.padded = torch.from_numpy(np.array(padded).reshape(-1, STEPS))
 
     def take(self, rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Inputs (B, 60, 9) and correction labels (B)."""
+        """Returns inputs (B, 60, 9) and correction labels (B)."""
         return self.features[rows], self.error[rows].sum(dim=1)
 
 
 def normalisation(data: Windows) -> tuple[torch.Tensor, torch.Tensor, float]:
-    """Mean and spread of each feature, and the RMS of the corrections. The gyro increment keeps
-    its zero, so that what FC3 makes of it stays linear."""
+    """Returns mean and standard deviation of each feature, and the RMS of the corrections. The mean of the gyro
+    increment is zero, so that FC3 stays linear in it."""
     mean, std = data.features.mean(dim=0), data.features.std(dim=0)
     mean[FOG] = 0.0
     std[FOG] = data.features[:, FOG].square().mean().sqrt()
@@ -110,7 +110,7 @@ def normalisation(data: Windows) -> tuple[torch.Tensor, torch.Tensor, float]:
 
 
 def epoch_rows(data: Windows, count: int, padded: float) -> torch.Tensor:
-    """Rows of the windows of one epoch, shuffled, some of them padded ones."""
+    """Returns the rows of one epoch's windows in random order; some windows are padded."""
     extra = int(padded * count) if len(data.padded) else 0
     rows = data.full[torch.randperm(len(data.full))[: count - extra]]
     if extra:
@@ -120,7 +120,7 @@ def epoch_rows(data: Windows, count: int, padded: float) -> torch.Tensor:
 
 @torch.no_grad()
 def validation_error(model: FoGNet, data: Windows) -> float:
-    """Mean |predicted - true turn| over all full windows, rad: Eq. 14."""
+    """Returns the mean |predicted - true turn| over all full windows, rad: Eq. 14."""
     x, label = data.take(data.full)
     return (torch.cat([model(part)[0] for part in x.split(256)]) - label).abs().mean().item()
 
@@ -135,7 +135,7 @@ def main() -> None:
             raise SystemExit(f"no {what} drive has a minute without a gap")
     model = FoGNet(*normalisation(data))
     if args.init:
-        # Another device's units are not these drives'.
+        # The normalisation constants stay those of these drives.
         weights = {k: v for k, v in load_file(args.init).items() if k not in dict(model.named_buffers())}
         model.load_state_dict(weights, strict=False)
     for name, parameter in model.named_parameters():
@@ -144,7 +144,7 @@ def main() -> None:
     optimiser = torch.optim.AdamW(parameters, lr=args.lr, weight_decay=args.weight_decay)
     batches = min(args.windows, len(data.full)) // args.batch
     if batches == 0:
-        raise SystemExit(f"{len(data.full)} whole windows to train on, fewer than a batch of {args.batch}")
+        raise SystemExit(f"{len(data.full)} full windows to train on, fewer than a batch of {args.batch}")
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, args.lr, total_steps=batches * args.epochs)
     average = copy.deepcopy(model)
     scale = model.correction_scale.item()
@@ -177,7 +177,7 @@ def main() -> None:
     model.load_state_dict(best[2])
     model.eval()
     constant = 0.0 if args.layout == "kingston" else take_out_constant(model, data)
-    print(f"a constant of {constant:+.7f} rad a minute is taken out")
+    print(f"a constant of {constant:+.7f} rad per minute is removed")
     provenance = {
         "network": "fognet",
         "train": list(dict.fromkeys(d.name for d in train)),
@@ -202,8 +202,8 @@ def main() -> None:
 
 @torch.no_grad()
 def take_out_constant(model: FoGNet, data: Windows) -> float:
-    """Takes the mean of what is not linear in the gyro's increments out of the correction, and returns it, rad a minute. The
-    bias was taken off before, by standstills of the drive itself: a constant that is left is one of the training drives."""
+    """Removes the mean of the correction's part that is not linear in the gyro's increments; returns it, rad per
+    minute. The bias was removed before, by standstills of each drive, so what remains is specific to these drives."""
     total = 0.0
     for rows in data.full.split(256):
         x, _ = data.take(rows)
@@ -217,7 +217,7 @@ def take_out_constant(model: FoGNet, data: Windows) -> float:
 
 @torch.no_grad()
 def follow(average: FoGNet, model: FoGNet, decay: float) -> None:
-    """Moves the average of the weights on by one step."""
+    """Updates the average of the weights by one step."""
     for mean, weight in zip(average.parameters(), model.parameters()):
         mean.lerp_(weight, 1 - decay)
 

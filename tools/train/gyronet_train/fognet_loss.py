@@ -1,8 +1,8 @@
-"""The losses of FoGNet, for arrays of numpy and tensors of PyTorch alike."""
+"""The losses of FoGNet, for NumPy arrays and PyTorch tensors."""
 
 
 def fognet_losses(correction, label, f1, fog, scale, alpha):
-    """Eq. 14 in units of `scale`, Eq. 15 and Eq. 16 of the paper.
+    """Returns the losses of the paper: Eq. 14 in units of `scale`, Eq. 15 and Eq. 16.
 
     `correction` and `label` (B) are in rad, `f1` and the gyro increments `fog` (B, 60) normalised.
     """

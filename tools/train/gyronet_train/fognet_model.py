@@ -14,17 +14,17 @@ PARAMETERS = 387_006
 
 
 class FoGNet(nn.Module):
-    """Estimates by how much a gyro errs over a window of a minute.
+    """Estimates the error of a gyro over a window of a minute.
 
-    Input (B, 60, 9), one row a second: mean specific force xyz in m/s^2, mean angular rate xyz in
-    rad/s less its static mean, way of the left and the right wheel in m, gyro increment in rad.
+    Input (B, 60, 9), one row per second: mean specific force xyz in m/s^2, mean angular rate xyz in
+    rad/s less its static mean, distance of the left and the right wheel in m, gyro increment in rad.
     Output (B): the correction in rad, gyro less truth over the window.
 
-    The paper predicts the turn itself and takes the gyro's own sum from it. Here the last layer
-    gives the difference at once, in units of `correction_scale`, so FC3 holds its departure from
-    the plain sum: the same functions with the same parameters, but a correction of 1e-4 rad is
-    not the difference of two numbers near 1. FC2 and FC3 begin at zero: the prediction starts as
-    the plain sum.
+    The paper predicts the turn itself and subtracts the gyro's sum. Here the last layer gives the
+    difference directly, in units of `correction_scale`, so FC3 holds the difference from the plain
+    sum. The functions and parameters are the same, but a correction of 1e-4 rad is not the
+    difference of two numbers near 1. FC2 and FC3 begin at zero, so the first prediction is the plain
+    sum.
     """
 
     steps = STEPS
@@ -48,7 +48,7 @@ class FoGNet(nn.Module):
         assert sum(p.numel() for p in self.parameters()) == PARAMETERS
 
     def layers(self, x: torch.Tensor) -> dict[str, torch.Tensor]:
-        """Every layer's output, by the names the golden tensors carry."""
+        """Returns the output of every layer, by its name in the golden tensors."""
         normalised = (x - self.input_mean) / self.input_std
         layer1, _ = self.lstm1(normalised)
         f1 = self.fc1(layer1)
@@ -68,6 +68,6 @@ class FoGNet(nn.Module):
         }
 
     def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Correction (rad), and f1 with the gyro increments it should be near (both normalised)."""
+        """Returns the correction (rad), f1, and the gyro increments that f1 should approximate (both normalised)."""
         outputs = self.layers(x)
         return outputs["correction"], outputs["f1"], outputs["normalised"][..., FOG]

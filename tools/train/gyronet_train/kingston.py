@@ -1,8 +1,8 @@
-"""python -m gyronet_train.kingston CHECKPOINT DIR: FoGNet on the part of the Kingston 2008
-recording that training has not read, against the gyro as it is and less Earth's rate.
+"""python -m gyronet_train.kingston CHECKPOINT DIR: evaluate FoGNet on the part of the Kingston 2008
+recording that training has not read, against the uncorrected gyro and the gyro less Earth's rate.
 
-Corrections are used as the firmware does (src/fog.rs): from the second after next on, the linear
-part of an increment taken off that increment, the rest spread over a minute.
+Corrections are applied as in the firmware (src/fog.rs), from the second after next on. The linear part
+of an increment is subtracted from that increment, the rest is spread over a minute.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ IN_USE_AFTER = 2  # s
 
 @torch.no_grad()
 def corrections(model: FoGNet, drive: Seconds, padding: str) -> np.ndarray:
-    """What is taken off each second's increment, rad."""
+    """Returns what is subtracted from each second's increment, rad."""
     gains = model.correction_scale * model.fc4.weight[0, 1] * model.fc3.weight[0] / model.input_std[FOG]
     gains = gains.numpy().astype(float)
     features = torch.from_numpy(drive.features).float()

@@ -1,13 +1,14 @@
 """python -m gyronet_train.linear DATA --out FOLDER: fit the linear part of a window model to a folder of drives.
 
-The linear part is a filter of eleven taps around a sample: what it takes off the yaw gyro is the unit's
-mounting (roll and pitch rate), its gain, and what the reference does not see of its noise (differences of
-neighbouring gyro and accelerometer samples). A difference of neighbours adds nothing for an input that does
-not change, so the accelerometer's level and a constant error have no part in it (`PARTS`).
+The linear part is a filter of eleven taps around a sample. It removes from the yaw gyro the unit's mounting
+(roll and pitch rate), its gain, and noise (differences of neighbouring gyro and accelerometer samples). A
+difference of neighbours is zero for a constant input, so the accelerometer's level and a constant error do
+not contribute (`PARTS`).
 
-The fit is by absolute errors of the yaw change over any second, the number that the tools print. Each drive
-is predicted by the filter of the others: the report has mean and standard deviation of those ratios to static
-initialisation, part by part. What is written is fitted to all drives. Needs numpy and safetensors alone.
+The fit minimises the absolute error of the yaw change over any second, the number that the tools print. For
+the report, each drive is predicted by the filter of the other drives: mean and standard deviation of the
+error over static initialisation's, as the parts are added. The written filter is fitted to all drives. Only
+numpy and safetensors are needed.
 """
 
 from __future__ import annotations
@@ -30,20 +31,20 @@ ROLL, PITCH, YAW = 3, 4, 5
 TAPS = 2 * REACH + 1
 RIDGE = 1e-6
 ITERATIONS = 30
-SMALLEST_ERROR = 1e-6  # rad: where an absolute error counts as a squared one
-STEP = 5  # samples between the seconds that are fitted
+SMALLEST_ERROR = 1e-6  # rad: below it an absolute error counts as a squared one
+STEP = 5  # samples between the beginnings of the seconds that are fitted
 GYRO_GRID, FORCE_GRID = 2.0**-22, 2.0**-28  # steps of weights whose sums float32 holds exactly
 
 
 def level(feature: int) -> np.ndarray:
-    """A filter (TAPS, FEATURES) that takes the sample itself."""
+    """Returns a filter (1, TAPS, FEATURES) that is the sample itself."""
     taps = np.zeros((1, TAPS, FEATURES))
     taps[0, REACH, feature] = 1.0
     return taps
 
 
 def differences(feature: int) -> np.ndarray:
-    """The filters that take the difference of two neighbours."""
+    """Returns the filters that are differences of two neighbouring samples."""
     taps = np.zeros((TAPS - 1, TAPS, FEATURES))
     for k in range(TAPS - 1):
         taps[k, k, feature], taps[k, k + 1, feature] = -1.0, 1.0
@@ -59,25 +60,25 @@ PARTS = {
 
 
 def seconds(series: np.ndarray) -> np.ndarray:
-    """Sums over each second that begins STEP samples after another: (T, ...) -> (S, ...), times the period."""
+    """Integrates over seconds that begin STEP samples apart: (T, ...) -> (S, ...)."""
     total = np.concatenate([np.zeros_like(series[:1]), np.cumsum(series, axis=0)])
     return (total[RATE_HZ:] - total[:-RATE_HZ])[::STEP] / RATE_HZ
 
 
 def neighbours(drive: Drive) -> np.ndarray:
-    """Each sample with REACH on both sides, the ends repeated: (T, TAPS, FEATURES)."""
+    """Returns each sample with REACH neighbours on both sides, the ends repeated: (T, TAPS, FEATURES)."""
     padded = np.pad(drive.features.astype(np.float64), ((REACH, REACH), (0, 0)), mode="edge")
     return windows(padded, TAPS)
 
 
 def sums(drive: Drive, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of each second: what every filter of the basis makes of it, and the gyro's error."""
+    """Returns for each second the output of every filter of the basis, and the gyro's error."""
     inputs = np.tensordot(neighbours(drive), basis, axes=([1, 2], [1, 2]))
     return seconds(inputs[STATIC_SAMPLES:]), seconds(drive.gyro_error[STATIC_SAMPLES:].astype(np.float64))
 
 
 def fit(drives: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray) -> np.ndarray:
-    """The filter of the basis (TAPS, FEATURES) with the least absolute errors on the sums of some drives."""
+    """Returns the combination of the basis (TAPS, FEATURES) with the least absolute errors on some drives' sums."""
     inputs, errors = (np.concatenate(part) for part in zip(*drives))
     size = np.sqrt((inputs**2).mean(axis=0))
     inputs = inputs / size
@@ -91,18 +92,18 @@ def fit(drives: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray) -> np.nd
 
 
 def on_grid(taps: np.ndarray) -> np.ndarray:
-    """Rounds the running sums of each feature's taps, so that what adds up to zero still does, exactly."""
+    """Rounds the running sums of each feature's taps, so that taps whose sum is zero still sum to exactly zero."""
     grid = np.array([FORCE_GRID] * 3 + [GYRO_GRID] * 3)
     running = np.round(np.cumsum(taps, axis=-2) / grid) * grid
     return np.diff(running, axis=-2, prepend=0.0)
 
 
 def rows(taps: np.ndarray) -> np.ndarray:
-    """The outputs of a window (WINDOW, WINDOW, FEATURES) whose overlap is the filter.
+    """Returns the outputs of a window (WINDOW, WINDOW, FEATURES) whose mean over overlapping windows is the filter.
 
-    A sample is estimated at place k of one window and at place k + HOP of the one before; the mean of both is the
-    filter's output. A tap that only one of them sees has twice its weight there. What that adds to or takes from
-    the sum of its taps is made up for by those that both see, so that each row alone has the filter's sum.
+    A sample is estimated at index k of one window and at index k + HOP of the previous window; the mean of both is
+    the filter's output. A tap that only one of the windows covers has twice its weight there. The taps that both
+    windows cover compensate for this, so that the taps of each row have the filter's sum.
     """
     outputs = np.zeros((WINDOW, WINDOW, FEATURES))
     for k in range(HOP):
@@ -113,7 +114,7 @@ def rows(taps: np.ndarray) -> np.ndarray:
         missing = taps.sum(axis=0) - ahead.sum(axis=0) - taps[shared].sum(axis=0)
         ahead[shared] = taps[shared] + missing / (WINDOW - HOP)
         behind[shared] = taps[shared] - missing / (WINDOW - HOP)
-        # The window's first sample is k before this one.
+        # The window begins k samples before this sample.
         place(outputs[k], ahead, k)
         place(outputs[k + HOP], behind, k + HOP)
     return on_grid(outputs)
@@ -127,12 +128,12 @@ def place(row: np.ndarray, taps: np.ndarray, k: int) -> None:
 
 
 def corrections(outputs: np.ndarray, drive: Drive) -> np.ndarray:
-    """Outputs (W, WINDOW) of the windows HOP apart."""
+    """Returns the outputs (W, WINDOW) of the windows HOP apart."""
     return np.tensordot(windows(drive.features)[::HOP].astype(np.float64), outputs, axes=([1, 2], [1, 2]))
 
 
 def rate_error(outputs: np.ndarray, drive: Drive) -> np.ndarray:
-    """The error (T,) of the rate that the overlap's mean corrects."""
+    """Returns the error (T,) of the rate that is corrected by the mean of overlapping windows."""
     total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
     estimates = corrections(outputs, drive)
     for k in range(WINDOW):
@@ -143,19 +144,19 @@ def rate_error(outputs: np.ndarray, drive: Drive) -> np.ndarray:
 
 
 def ratio(outputs: np.ndarray, drive: Drive) -> float:
-    """The 1 s error over static initialisation's."""
+    """Returns the 1 s error over static initialisation's."""
     return mean_1s_error(rate_error(outputs, drive)) / mean_1s_error(drive.gyro_error)
 
 
 def leave_one_out(drives: list[Drive], basis: np.ndarray) -> list[float]:
-    """The ratio of each drive, by the filter of the others."""
+    """Returns the ratio of each drive with the filter of the others."""
     made = [sums(drive, basis) for drive in drives]
     others = (made[:k] + made[k + 1 :] for k in range(len(drives)))
     return [ratio(rows(fit(rest, basis)), drive) for rest, drive in zip(others, drives)]
 
 
 def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:
-    """The mean |error| of the mean of a window's corrected rates, rad/s, after the static phase."""
+    """Returns the mean |error| of a window's mean corrected rate, rad/s, after the static phase."""
     from_static = slice(STATIC_SAMPLES // HOP, None)
     errors = [
         (windows(d.gyro_error)[::HOP] - corrections(outputs, d)).mean(axis=1)[from_static] for d in drives
@@ -169,15 +170,15 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors file")
     parser.add_argument("--stem", default="linear_window", help="name of the file")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
-    parser.add_argument("--course", action="store_true", help="train on ref_yaw, mounting and gain alone (course.py)")
+    parser.add_argument("--course", action="store_true", help="train on ref_yaw: mounting and gain only (course.py)")
     parser.add_argument("--noise-deg", type=float, metavar="DEG", help="simulate the course from ref_gyr_z, at 1 Hz")
     return parser.parse_args()
 
 
 def train_on_rate(paths: list[Path]) -> tuple[list[Drive], np.ndarray, float, dict]:
-    """The drives, outputs of a window, expected error in rad/s and the report, by `ref_gyr_z`."""
+    """Trains on `ref_gyr_z`; returns drives, outputs of a window, expected error in rad/s and report."""
     drives = [load_drive(path) for path in paths]
-    print("1 s error over static initialisation's, each drive by the filter of the others: mean, standard deviation")
+    print("1 s error over static initialisation's, each drive with the filter of the others: mean, standard deviation")
     report = {}
     for count in range(1, len(PARTS) + 1):
         names = " + ".join(list(PARTS)[:count])
@@ -192,7 +193,7 @@ def train_on_rate(paths: list[Path]) -> tuple[list[Drive], np.ndarray, float, di
 
 
 def train_on_course(paths: list[Path], noise_deg: float | None) -> tuple[list[course.CourseDrive], np.ndarray, float, dict]:
-    """The same by `ref_yaw`: mounting and gain."""
+    """Trains mounting and gain on `ref_yaw`; returns the same as `train_on_rate`."""
     drives = []
     for path in paths:
         try:
@@ -200,14 +201,14 @@ def train_on_course(paths: list[Path], noise_deg: float | None) -> tuple[list[co
         except ValueError as error:
             print(f"left out: {error}")
     if len(drives) < 2:
-        raise SystemExit(f"{len(drives)} drives can be used, needed are 2")
+        raise SystemExit(f"{len(drives)} drives can be used, but 2 are needed")
     for drive in drives:
-        print(f"{drive.name}: ref_yaw, {len(drive.errors)} spans of 10 s, {drive.left_out} that jump left out")
-    print("10 s error over static initialisation's, each drive by the shares of the others: mean, standard deviation")
+        print(f"{drive.name}: ref_yaw, {len(drive.errors)} spans of 10 s, {drive.left_out} spans with jumps left out")
+    print("10 s error over static initialisation's, each drive with the shares of the others: mean, standard deviation")
     report = {"mounting + gain": tell("mounting + gain, 3 numbers", course.leave_one_out(drives))}
     shares, sigmas = course.fit(drives)
     for name, share, sigma, limit in zip(("roll rate", "pitch rate", "yaw rate"), shares, sigmas, course.SHOWN):
-        shown = "" if sigma < limit else ": the drives do not show it"
+        shown = "" if sigma < limit else ": not observable in these drives"
         print(f"share of the {name} {share:+.5f}, sigma {sigma:.5f}{shown}")
     taps = np.tensordot(shares, np.concatenate([PARTS["mounting"], PARTS["gain"]]), axes=1)
     return drives, rows(taps), course.window_error(shares, drives), report

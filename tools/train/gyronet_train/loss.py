@@ -1,4 +1,4 @@
-"""The loss: gyro error by sample and as an angle, and how far off it is said to be."""
+"""The loss: gyro error by sample and as an angle, and the likelihood of the stated scale."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ SCALE_WEIGHT = 0.1
 def span_loss(
     correction: torch.Tensor, scale: torch.Tensor, gyro_error: torch.Tensor, unit: float
 ) -> torch.Tensor:
-    """Loss of spans, in units of `unit` rad/s.
+    """Returns the loss of spans, in units of `unit` rad/s.
 
-    `correction` (S, k, N) and `scale` (S, k) are the network's, `gyro_error` (S, L) is the label.
-    Absolute errors count: each window's, sample by sample; in spans of more than one window also
-    that of the overlap's mean, and that of its integral over the span, times the root of its samples
-    so that it is as large where the errors are independent. The integral weighs little: its label is mostly the drift of gyro
-    and reference, which no window can tell, and with a weight of one the validation drive's 1 s
-    error was larger. The scale is trained by the likelihood of the windows' mean
-    errors, which are not trained by it: a window may not get away with being unsure.
+    `correction` (S, k, N) and `scale` (S, k) are outputs of the network, `gyro_error` (S, L) is the label.
+    The loss sums absolute errors: of each window, sample by sample, and in spans of more than one window
+    also of the overlap's mean and of its integral over the span. The integral is multiplied by the root of
+    the number of samples, so that it is as large as the others if errors are independent. It has a small
+    weight: its label is mostly the drift of gyro and reference, which a window cannot show, and with a
+    weight of one the 1 s error on the validation drive was larger. The scale is trained by the likelihood
+    of the windows' mean errors. These errors are detached, so that a window cannot lower the loss by a
+    large scale instead of a better correction.
     """
     error = correction - cut(gyro_error)
     absolute = error.abs().mean()

@@ -1,12 +1,12 @@
 """python -m gyronet_train.lwoi --train DIR ... --test DIR ... --out FOLDER: the rival lwoi, from the paper's equations.
 
 Brossard and Bonnabel, Learning wheel odometry and IMU errors for localization, 2019: Gaussian
-processes expect the error of each second of wheel and fibre-optic odometry and of the inertial
-sensor, and a Kalman filter uses both. It trains both processes on the training sequences, in the
-layout of KAIST Urban, and writes the trajectories of the test sequences in TUM format into
-FOLDER/odometry, FOLDER/constant, FOLDER/model and FOLDER/filter (lwoi_run.py says what these are),
-and all numbers into FOLDER/lwoi.json. A test sequence that cannot be read, or on which the filter
-diverges, is named and left out.
+processes predict the error of each second of wheel and fibre-optic odometry and of the inertial
+sensor, and a Kalman filter uses both. The program trains both processes on the training sequences, in
+the layout of KAIST Urban. It writes the trajectories of the test sequences in TUM format to
+FOLDER/odometry, FOLDER/constant, FOLDER/model and FOLDER/filter (see lwoi_run.py), and all numbers to
+FOLDER/lwoi.json. A test sequence that cannot be read, or on which the filter diverges, is reported and
+left out.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def arguments() -> argparse.Namespace:
 
 
 def fit(what: str, drives: list[Sequence], args: argparse.Namespace) -> Trained:
-    """Trains the process of the odometry's or of the inertial sensor's errors."""
+    """Trains the process for the errors of the odometry or of the inertial sensor."""
     errors_of, features = {
         "odometry": (odometry_errors, odometry_features),
         "inertial": (inertial_errors, inertial_features),
@@ -65,19 +65,20 @@ def fit(what: str, drives: list[Sequence], args: argparse.Namespace) -> Trained:
 
 
 def speed_variance(drives: list[Sequence]) -> float:
-    """How far the wheels' speed at the edges is off, squared, m^2/s^2."""
+    """Returns the mean squared error of the wheels' speed at the edges, m^2/s^2."""
     off = [drive.edge_speed - np.linalg.norm(drive.edge_velocity, axis=1) for drive in drives]
     return float((np.concatenate(off) ** 2).mean())
 
 
 def remaining(errors: np.ndarray, expected: np.ndarray) -> list[float]:
-    """What is left of each component's RMS after the expected error is taken off: 1 is no gain."""
+    """Returns the RMS of each component after the expected error is subtracted, over the RMS before: 1 is no gain."""
     return [round(float(x), 4) for x in np.sqrt(((errors - expected) ** 2).mean(0) / (errors**2).mean(0))]
 
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """What training gives: the processes, the wheels' speed variance, and the odometry errors' mean and mean square."""
+    """The result of a training: the processes, the variance of the wheels' speed, and mean and mean square of the
+    odometry's errors."""
 
     processes: dict[str, Trained]
     speed_variance: float
@@ -85,7 +86,7 @@ class Model:
     mean_square: np.ndarray
 
     def expect(self, drive: Sequence) -> Expected:
-        """What it expects of a drive's errors."""
+        """Predicts the errors of a drive."""
         errors = [process.predict(getattr(drive, what)) for what, process in self.processes.items()]
         return Expected(self.constant, self.mean_square, *errors, self.speed_variance)
 
@@ -103,7 +104,7 @@ def test(drive: Sequence, model: Model, out: Path) -> dict:
     for mode in MODES:
 
         def late(track: Track) -> dict:
-            """The error of a pose that stands for the next second."""
+            """Returns the error if each pose is used one second late."""
             error = trajectory_error(track.position[STEPS:], drive.position[:-STEPS], False)
             return {"ate_a_second_late_m": round(error, 3)}
 

@@ -1,10 +1,10 @@
-"""The extended Kalman filter of lwoi: poses from second to second, with their covariance.
+"""The extended Kalman filter of lwoi: a pose every second, with its covariance.
 
-The state is the pose and a copy of the pose a second ago, since what the inertial sensor measures
-concerns both. Errors are [turn in world axes, position] of the pose, then of the copy: a true
-attitude is Exp(turn) times the estimated one. Odometry moves the pose on by a motion whose error is
-a twist at its end; the inertial sensor then measures the second's rotation, gain of velocity and
-way, the velocities being the wheels' along the body's x axis.
+The state is the pose and a copy of the pose one second earlier, since the inertial sensor's measurement
+depends on both. Errors are [turn in world axes, position] of the pose, then of the copy; the true
+attitude is Exp(turn) times the estimate. Odometry moves the pose on by a motion whose error is a twist at
+its end. The inertial sensor then measures the second's rotation, velocity change and displacement, with
+the wheels' speeds along the body's x axis as velocities.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from .trajectory import FilterError
 POSE, COPY = slice(0, 6), slice(6, 12)
 TURN, PLACE, OLD_TURN, OLD_PLACE = (slice(k, k + 3) for k in (0, 3, 6, 9))
 AHEAD = np.array([1.0, 0.0, 0.0])
-GATE = 27.88  # chi squared of nine numbers that one in a thousand exceeds
-REFUSED_IN_A_ROW = 30  # s without a measurement that fits: the filter has diverged
+GATE = 27.88  # chi squared of nine numbers, exceeded with probability 0.001
+REFUSED_IN_A_ROW = 30  # s of refused measurements after which the filter has diverged
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A second's motion as seen from its beginning, and the covariance of its twist (6, 6), translation first."""
+    """The motion in a second relative to its beginning, and the covariance of its twist (6, 6), translation first."""
 
     rotation: Rotation
     way: np.ndarray
@@ -36,8 +36,8 @@ class Motion:
 
 @dataclass(frozen=True)
 class Measured:
-    """A second's rotation, gain of velocity and way by the inertial sensor (9), their covariance, and the wheels'
-    speeds at its beginning and end with their variance."""
+    """Rotation, velocity change and displacement in a second by the inertial sensor (9), their covariance, and the
+    wheels' speeds at the beginning and the end of the second with their variance."""
 
     value: np.ndarray
     covariance: np.ndarray
@@ -46,7 +46,7 @@ class Measured:
 
 
 class Filter:
-    """The pose, its copy of a second ago, and the covariance of both."""
+    """The pose, its copy of one second earlier, and the covariance of both."""
 
     def __init__(self, attitude: Rotation, position: np.ndarray):
         self.attitude = self.old_attitude = attitude
@@ -55,7 +55,7 @@ class Filter:
         self.seconds = self.refused = self.refused_in_a_row = 0
 
     def move(self, motion: Motion) -> None:
-        """Copies the pose and moves it on by a second."""
+        """Copies the pose, then moves it on by a second."""
         transition = motion_jacobian(self.attitude, motion.way)
         self.old_attitude, self.old_position = self.attitude, self.position
         self.position = self.position + self.attitude.apply(motion.way)
@@ -69,7 +69,7 @@ class Filter:
             raise FilterError(f"second {self.seconds}: the covariance is not finite")
 
     def update(self, measured: Measured) -> bool:
-        """Corrects pose and copy by the inertial sensor's measurement; returns whether it was near enough to do so."""
+        """Corrects pose and copy by the inertial sensor's measurement; returns false if the measurement is refused."""
         expected, jacobian, by_speeds = expectation(self, measured.speeds)
         noise = measured.covariance + measured.speed_variance * by_speeds @ by_speeds.T
         spread = jacobian @ self.covariance @ jacobian.T + noise
@@ -88,33 +88,34 @@ class Filter:
         return True
 
     def correct(self, error: np.ndarray) -> None:
-        """Takes an error of the state (12) into the estimate."""
+        """Applies an error of the state (12) to the estimate."""
         self.attitude = Rotation.from_rotvec(error[TURN]) * self.attitude
         self.position = self.position + error[PLACE]
         self.old_attitude = Rotation.from_rotvec(error[OLD_TURN]) * self.old_attitude
         self.old_position = self.old_position + error[OLD_PLACE]
 
     def error(self, attitude: Rotation, position: np.ndarray) -> np.ndarray:
-        """The error of the pose (6), of which a true pose is given."""
+        """Returns the error of the pose (6) against a true pose."""
         return np.concatenate([(attitude * self.attitude.inv()).as_rotvec(), position - self.position])
 
 
 def motion_jacobian(attitude: Rotation, way: np.ndarray) -> np.ndarray:
-    """How the error of a pose grows by a motion (6, 6)."""
+    """Returns the Jacobian of the error of a pose over a motion (6, 6)."""
     jacobian = np.eye(6)
     jacobian[PLACE, TURN] = -skew(attitude.apply(way))
     return jacobian
 
 
 def twist_jacobian(attitude: Rotation) -> np.ndarray:
-    """How a twist at the end of a motion enters the error of the pose (6, 6)."""
+    """Returns the Jacobian of the error of a pose with respect to a twist at the end of the motion (6, 6)."""
     jacobian = np.zeros((6, 6))
     jacobian[TURN, 3:] = jacobian[PLACE, :3] = attitude.as_matrix()
     return jacobian
 
 
 def expectation(state: Filter, speeds: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What the inertial sensor should measure (9), its Jacobian by the state (9, 12) and by both speeds (9, 2)."""
+    """Returns the expected measurement of the inertial sensor (9), and its Jacobians with respect to the state (9, 12)
+    and to both speeds (9, 2)."""
     to_body = state.old_attitude.as_matrix().T
     ahead, old_ahead = state.attitude.apply(AHEAD), state.old_attitude.apply(AHEAD)
     velocity, old_velocity = speeds[1] * ahead, speeds[0] * old_ahead

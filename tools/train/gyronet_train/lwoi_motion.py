@@ -1,9 +1,9 @@
-"""What odometry and the inertial sensor say of a second's motion, and by how much they are wrong.
+"""The motion in a second by odometry and by the inertial sensor, and the errors of both.
 
-Windows are independent of each other, so each function takes all windows of a drive at once. The
-errors are what lwoi's processes learn: those of odometry as the twist that leads from its pose to
-the true one (translation first), those of the inertial sensor as differences of its preintegrated
-rotation, velocity and way.
+Windows are independent of each other, so each function processes all windows of a drive at once. The
+errors are what lwoi's processes learn: for odometry the twist from its pose to the true pose
+(translation first), for the inertial sensor the differences of its preintegrated rotation, velocity
+and displacement.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ WINDOW_S = STEPS * DT
 
 
 def odometry_poses(odometry: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (N, 101) and ways (N, 101, 2) of each window from its beginning: a step ahead, then its turn."""
+    """Returns turns (N, 101) and displacements (N, 101, 2) from the beginning of each window. A step moves, then
+    turns."""
     way = odometry[:, :, :2].mean(axis=2)
     turn = np.concatenate([np.zeros((len(way), 1)), np.cumsum(odometry[:, :, 2], axis=1)], axis=1)
     steps = way[..., None] * np.stack([np.cos(turn[:, :-1]), np.sin(turn[:, :-1])], axis=-1)
@@ -26,7 +27,7 @@ def odometry_poses(odometry: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def odometry_motion(odometry: np.ndarray) -> tuple[Rotation, np.ndarray]:
-    """The pose at the end of each window as seen from its beginning."""
+    """Returns the pose at the end of each window relative to its beginning."""
     turn, way = odometry_poses(odometry)
     turns = np.zeros((len(turn), 3))
     turns[:, 2] = turn[:, -1]
@@ -34,13 +35,13 @@ def odometry_motion(odometry: np.ndarray) -> tuple[Rotation, np.ndarray]:
 
 
 def corrected(rotation: Rotation, way: np.ndarray, twist: np.ndarray) -> tuple[Rotation, np.ndarray]:
-    """Moves on from poses by twists (N, 6)."""
+    """Moves poses on by twists (N, 6)."""
     moved = np.einsum("nij,nj->ni", left_jacobian(twist[:, 3:]), twist[:, :3])
     return rotation * Rotation.from_rotvec(twist[:, 3:]), way + rotation.apply(moved)
 
 
 def odometry_errors(sequence: Sequence) -> np.ndarray:
-    """The twists (N, 6) from odometry's motion of each window to the true one."""
+    """Returns the twists (N, 6) from odometry's motion in each window to the true motion."""
     rotation, way = odometry_motion(sequence.odometry)
     attitude, position = sequence.attitude[sequence.edges], sequence.position[sequence.edges]
     moved = attitude[:-1].inv().apply(np.diff(position, axis=0))
@@ -50,7 +51,8 @@ def odometry_errors(sequence: Sequence) -> np.ndarray:
 
 
 def inertial_motion(inertial: np.ndarray) -> np.ndarray:
-    """The rotation vector, velocity and way (N, 9) that the inertial sensor measures in each window, gravity in it."""
+    """Returns the rotation vector, velocity and displacement (N, 9) that the inertial sensor measures in each window,
+    including gravity."""
     attitude = Rotation.identity(len(inertial))
     velocity, way = np.zeros((2, len(inertial), 3))
     for k in range(inertial.shape[1]):
@@ -62,7 +64,7 @@ def inertial_motion(inertial: np.ndarray) -> np.ndarray:
 
 
 def true_inertial_motion(sequence: Sequence) -> np.ndarray:
-    """What the inertial sensor would measure of the true poses (N, 9)."""
+    """Returns what an ideal inertial sensor would measure along the true poses (N, 9)."""
     attitude, position = sequence.attitude[sequence.edges], sequence.position[sequence.edges]
     velocity = sequence.edge_velocity
     from_begin = attitude[:-1].inv()
@@ -73,5 +75,5 @@ def true_inertial_motion(sequence: Sequence) -> np.ndarray:
 
 
 def inertial_errors(sequence: Sequence) -> np.ndarray:
-    """What must be added to the inertial sensor's motion of each window (N, 9)."""
+    """Returns what must be added to the inertial sensor's motion in each window (N, 9)."""
     return true_inertial_motion(sequence) - inertial_motion(sequence.inertial)

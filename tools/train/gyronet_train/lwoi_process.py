@@ -1,10 +1,10 @@
-"""The Gaussian processes of lwoi: what a second's measurements say of their own error, and how surely.
+"""The Gaussian processes of lwoi: they predict the error of a second's measurements and its variance.
 
-Independent processes, one for each component of the error, share the features that a small
-convolutional network makes of a window. Inducing points are windows themselves, 100 of them, which
-are optimised with all else: exact processes on thousands of windows would cost the cube of that.
-Targets are divided by their RMS in training, not centred: far from all it has seen a process then
-returns to no correction, with the full RMS as its spread.
+There is an independent process for each component of the error. All share the features that a small
+convolutional network extracts from a window. The inducing points are 100 windows, which are optimised
+with the other parameters; the cost of exact processes would grow with the cube of the number of
+windows. Targets are divided by their RMS in training, but not centred: far from the training data a
+process then predicts no correction, with the full RMS as standard deviation.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from torch import nn
 FEATURES = 20
 INDUCING = 100
 START_NOISE = 0.1
-NOISE_RATE = 10.0  # of the noise's rate over the others': in 100 steps of 0.01 it could not leave 0.04 to 0.25
-DECAY = 0.999  # of the rate, a step
+NOISE_RATE = 10.0  # learning rate of the noise over the others': in 100 steps of 0.01 it could not leave 0.04 to 0.25
+DECAY = 0.999  # of the learning rate per step
 CHUNK = 2000  # windows that are predicted at once
 
 
 class ProcessError(ValueError):
-    """A process that cannot be trained. Its text says at which step, or on what data."""
+    """A process cannot be trained. The text gives the step or describes the data."""
 
 
 class Features(nn.Module):
-    """Two convolutions and one layer: windows (n, 100 * channels) to 20 numbers."""
+    """Two convolutions and one linear layer, from windows (n, 100 * channels) to 20 features."""
 
     def __init__(self, channels: int, kernel: int, stride: int, flat: int):
         super().__init__()
@@ -50,17 +50,17 @@ class Features(nn.Module):
 
 
 def odometry_features() -> Features:
-    """The network before the process of the odometry's errors."""
+    """Returns the feature network of the process for the odometry's errors."""
     return Features(3, 3, 5, 200)
 
 
 def inertial_features() -> Features:
-    """The network before the process of the inertial sensor's errors."""
+    """Returns the feature network of the process for the inertial sensor's errors."""
     return Features(6, 6, 4, 250)
 
 
 class SparseProcess(gpytorch.models.ApproximateGP):
-    """Independent processes with Matern 5/2 kernels on common features."""
+    """Independent sparse processes with Matern 5/2 kernels on common features."""
 
     def __init__(self, features: nn.Module, inducing: torch.Tensor, outputs: int):
         batch = torch.Size([outputs])
@@ -81,7 +81,7 @@ class SparseProcess(gpytorch.models.ApproximateGP):
 
 @dataclass(frozen=True)
 class Settings:
-    """How a process is trained."""
+    """Settings of a process's training."""
 
     steps: int = 100
     rate: float = 0.01
@@ -91,14 +91,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class Errors:
-    """The expected errors of windows (n, outputs) and their variances, the noise of one window included."""
+    """The expected errors of windows (n, outputs) and their variances, which include the noise of one window."""
 
     mean: np.ndarray
     variance: np.ndarray
 
 
 class Trained:
-    """A trained process with the units of its inputs and targets."""
+    """A trained process, with mean and standard deviation of its inputs and the scale of its targets."""
 
     def __init__(self, model, likelihood, units, scale: np.ndarray, settings: Settings, seconds: float):
         self.model, self.likelihood, self.units = model, likelihood, units
@@ -106,7 +106,7 @@ class Trained:
 
     @torch.no_grad()
     def predict(self, windows: np.ndarray) -> Errors:
-        """The errors of windows (n, 100, channels)."""
+        """Predicts the errors of windows (n, 100, channels)."""
         inputs = standardised(windows, *self.units)
         with gpytorch.settings.variational_cholesky_jitter(self.settings.jitter):
             parts = [self.likelihood(self.model(part)) for part in inputs.split(CHUNK)]
@@ -116,7 +116,7 @@ class Trained:
 
 
 def standardised(windows: np.ndarray, mean: np.ndarray, spread: np.ndarray) -> torch.Tensor:
-    """Flat windows (n, 100 * channels) in units of each channel's spread."""
+    """Normalises windows by each channel's mean and standard deviation, and flattens them to (n, 100 * channels)."""
     return torch.from_numpy(((windows - mean) / spread).reshape(len(windows), -1)).float()
 
 
@@ -127,7 +127,7 @@ def train(
     settings: Settings,
     report: Callable[[int, float], None] = lambda step, loss: None,
 ) -> Trained:
-    """Fits a process to windows (n, 100, channels) and errors (n, outputs); each step of Adam is on all of them."""
+    """Fits a process to windows (n, 100, channels) and errors (n, outputs); each step of Adam uses all windows."""
     begin = time.monotonic()
     torch.manual_seed(settings.seed)
     units = windows.mean(axis=(0, 1)), windows.std(axis=(0, 1))

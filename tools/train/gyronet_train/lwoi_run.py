@@ -1,9 +1,9 @@
-"""A drive by lwoi: from windows and trained processes to a pose every 10 ms.
+"""Runs lwoi on a drive: from windows and trained processes to a pose every 10 ms.
 
-There are four ways to run it. `odometry` moves on by wheels and fibre-optic gyro alone, level as it
-starts; `constant` adds the mean error of the training's seconds, to show how much of the gain four
-numbers have; `model` adds what the process expects of each second, roll and pitch left out; `filter`
-starts with the true attitude and has each second corrected by the inertial sensor as well.
+There are four modes. `odometry` uses wheels and fibre-optic gyro alone and stays level. `constant` adds
+the mean error over the training's seconds, to show how much of the gain four numbers give. `model` adds
+the error that the process expects for each second, without roll and pitch. `filter` starts with the true
+attitude, and also corrects each second by the inertial sensor.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from .trajectory import Track
 
 MODES = ("odometry", "constant", "model", "filter")
 LEVEL = slice(3, 5)  # of a twist: roll and pitch
-# The least deviations of the inertial sensor's rotation (rad), gain of velocity (m/s) and way (m): the fixed ones of
-# lwoi's authors (of their two for the way the smaller). The process states less, but takes errors of successive
-# seconds as independent: a gyro's bias is the same in all.
+# Least standard deviations of the inertial sensor's rotation (rad), velocity change (m/s) and displacement (m): the
+# fixed values of lwoi's authors (the smaller of their two for the displacement). The process predicts less, but assumes
+# that errors of successive seconds are independent, although a gyro's bias is the same in all.
 LEAST_STD = np.repeat([2 / 180, 0.1, 0.2], 3)
 
 
 @dataclass(frozen=True)
 class Expected:
-    """The expected errors of a drive's odometry and inertial sensor, and the variance of the wheels' speed; `constant`
-    and `mean_square` are of the odometry's errors in training (6)."""
+    """The expected errors of a drive's odometry and inertial sensor, and the variance of the wheels' speed. `constant`
+    and `mean_square` are the mean and mean square of the odometry's errors in training (6)."""
 
     constant: np.ndarray
     mean_square: np.ndarray
@@ -39,7 +39,7 @@ class Expected:
     speed_variance: float
 
     def twists(self, mode: str) -> Errors:
-        """The expected errors of the odometry in a mode, roll and pitch left out."""
+        """Returns the expected errors of the odometry in a mode, without roll and pitch."""
         like = np.ones_like(self.odometry.mean)
         mean, variance = {
             "odometry": (0.0 * like, self.mean_square * like),
@@ -50,7 +50,7 @@ class Expected:
 
 
 def run(sequence: Sequence, expected: Expected, mode: str) -> Track:
-    """Runs a drive from its true first pose. Raises FilterError where the filter diverges."""
+    """Runs a drive from its true first pose. Raises FilterError if the filter diverges."""
     attitude, position = sequence.attitude[0], sequence.position[0]
     if mode != "filter":
         attitude = Rotation.from_euler("z", attitude.as_euler("ZYX")[0])
@@ -75,7 +75,7 @@ def run(sequence: Sequence, expected: Expected, mode: str) -> Track:
 
 
 def steps_within(odometry: np.ndarray, twist: np.ndarray) -> tuple[Rotation, np.ndarray]:
-    """The poses of a window's steps as seen from its beginning; its twist grows evenly."""
+    """Returns the poses of a window's steps relative to its beginning; the twist grows linearly."""
     turn, way = odometry_poses(odometry[None])
     turns = np.zeros((STEPS, 3))
     turns[:, 2] = turn[0, 1:]

@@ -1,5 +1,5 @@
-"""GyroNet of Zhao et al., section III-B: (N, 6) -> 2 x Bi-LSTM(60) -> FC 120->2 per step; or fewer units, none,
-and a linear part of the whole window beside them (linear.py).
+"""GyroNet of Zhao et al., section III-B: (N, 6) -> 2 x Bi-LSTM(60) -> FC 120->2 per step. The Bi-LSTMs can have fewer
+units or be left out, and a linear part over the whole window can be added (linear.py).
 
 The second output is the paper's future work, "learning uncertainty": the log of the scale of a
 Laplace error.
@@ -17,13 +17,13 @@ HIDDEN = 60
 
 
 class GyroNet(nn.Module):
-    """Estimates the yaw gyro's error for each sample of a window, and how far off it may be.
+    """Estimates the yaw gyro's error for each sample of a window, and the uncertainty of the estimate.
 
     Input (B, N, 6): specific force xyz in m/s^2, then angular rate xyz in rad/s
     less its static mean. Output: gyro error (B, N) in rad/s, and for each window
     (B,) the scale in rad/s of the Laplace error that the mean of the window's
-    corrected rates has. All ends are scaled inside, by constants that travel with
-    the checkpoint.
+    corrected rates has. Inputs and outputs are scaled inside the network, by
+    constants that are stored in the checkpoint.
     """
 
     steps = WINDOW
@@ -36,7 +36,7 @@ class GyroNet(nn.Module):
         units: int = HIDDEN,
         linear: torch.Tensor | None = None,
     ):
-        """`units` a direction; `linear` (N, 6 N) holds the fixed weights of the linear part."""
+        """`units` is per direction; `linear` (N, 6 N) holds the fixed weights of the linear part."""
         super().__init__()
         self.register_buffer("input_mean", input_mean.float())
         self.register_buffer("input_std", input_std.float())
@@ -52,7 +52,7 @@ class GyroNet(nn.Module):
             self.fc = nn.Linear(2 * units, 2)
 
     def layers(self, x: torch.Tensor) -> dict[str, torch.Tensor]:
-        """Every layer's output, by the names the golden tensors carry."""
+        """Returns the output of every layer, by its name in the golden tensors."""
         normalised = (x - self.input_mean) / self.input_std
         outputs = {"normalised": normalised}
         gyro_error, log_scale = x.new_zeros(x.shape[:2]), x.new_zeros(x.shape[:2])
@@ -72,7 +72,7 @@ class GyroNet(nn.Module):
 
 
 def overlap_mean(outputs: torch.Tensor, hop: int, length: int) -> torch.Tensor:
-    """Mean of all estimates each sample gets from windows `hop` apart; 0 where none covers it.
+    """Returns the mean of each sample's estimates from windows `hop` apart; 0 if no window covers the sample.
 
     `outputs` is (W, N) for the windows that start at 0, hop, 2 hop, ...; the result is (length,).
     """

@@ -1,22 +1,22 @@
-"""Rotations by their vectors, and gravity: what the filters of all rivals share."""
+"""Rotation vectors and gravity, for the filters of all rivals."""
 
 from __future__ import annotations
 
 import numpy as np
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])  # m/s^2
-SMALL = 1e-4  # rad: below it, series replace quotients
+SMALL = 1e-4  # rad: below it, series are used instead of quotients
 # The cross products of the axes: (x, y, z) @ CROSS is the flat matrix [[0, -z, y], [z, 0, -x], [-y, x, 0]].
 CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], float)
 
 
 def skew(v: np.ndarray) -> np.ndarray:
-    """The matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    """Returns the matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
     return (v @ CROSS).reshape(*v.shape, 3)
 
 
 def left_jacobian(rotation: np.ndarray) -> np.ndarray:
-    """The left Jacobians (..., 3, 3) of rotation vectors (..., 3): it maps a twist's translation to a way."""
+    """Returns the left Jacobians (..., 3, 3) of rotation vectors (..., 3); they map twists to displacements."""
     angle = np.sqrt((rotation * rotation).sum(axis=-1))[..., None, None]
     safe = np.where(angle < SMALL, 1.0, angle)
     first = np.where(angle < SMALL, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
@@ -26,5 +26,5 @@ def left_jacobian(rotation: np.ndarray) -> np.ndarray:
 
 
 def exponential(rotation: np.ndarray) -> np.ndarray:
-    """The rotation matrices (..., 3, 3) of rotation vectors (..., 3)."""
+    """Returns the rotation matrices (..., 3, 3) of rotation vectors (..., 3)."""
     return np.eye(3) + skew(rotation) @ left_jacobian(rotation)

@@ -1,4 +1,4 @@
-"""One process of several that train together (torchrun, PyTorch DDP over gloo); or the only one."""
+"""Training in several processes (torchrun, PyTorch DDP over gloo), or in one."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ T = TypeVar("T")
 
 
 def join() -> None:
-    """Joins the others where torchrun has started this process."""
+    """Joins the process group if torchrun has started several processes."""
     if int(os.environ.get("WORLD_SIZE", "1")) > 1:
         distributed.init_process_group("gloo")
 
 
 def leave() -> None:
-    """Leaves the others, where there are any."""
+    """Leaves the process group, if there is one."""
     if distributed.is_initialized():
         distributed.destroy_process_group()
 
 
 def part() -> tuple[int, int]:
-    """This process's number, from 0, and how many there are."""
+    """Returns the number of this process, from 0, and the number of processes."""
     return (distributed.get_rank(), distributed.get_world_size()) if distributed.is_initialized() else (0, 1)
 
 
 def together(model: nn.Module) -> nn.Module:
-    """The model with gradients that are the mean over all processes'."""
+    """Returns the model with gradients that are averaged over all processes."""
     return DistributedDataParallel(model) if distributed.is_initialized() else model
 
 
 def mean(value: float) -> float:
-    """The mean of a number over all processes."""
+    """Returns the mean of a number over all processes."""
     total = torch.tensor(value, dtype=torch.float64)
     if distributed.is_initialized():
         distributed.all_reduce(total)
@@ -43,7 +43,7 @@ def mean(value: float) -> float:
 
 
 def of_first(value: T) -> T:
-    """The first process's value in all of them: what they decide by must be equal to the last bit."""
+    """Returns the first process's value in all processes, since decisions need bit-identical values."""
     values = [value]
     if distributed.is_initialized():
         distributed.broadcast_object_list(values)

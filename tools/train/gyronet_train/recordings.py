@@ -1,9 +1,9 @@
-"""Recordings in the layout of a drive CSV, turned into the windows the network sees.
+"""Reads drive CSV files and cuts them into the windows of the network.
 
-A drive is sampled at 100 Hz and stands still for its first three seconds. The
-gyro is taken less its own mean over those seconds (static initialisation), in
-rad/s; the accelerometer is taken as it is, in m/s^2. Both are turned as the
-vehicle file beside the drive says.
+A drive is sampled at 100 Hz and stands still for the first three seconds. The
+gyro's mean over those seconds is subtracted from the gyro, in rad/s (static
+initialisation); the accelerometer is unchanged, in m/s^2. Both are rotated by
+the mounting in the vehicle file beside the drive.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .vehicle import Mounting, read_mounting
 
 RATE_HZ = 100
 STATIC_SAMPLES = 3 * RATE_HZ
-LEAST_SAMPLES = STATIC_SAMPLES + 2 * RATE_HZ  # of a piece between two gaps: a shorter one is left out
+LEAST_SAMPLES = STATIC_SAMPLES + 2 * RATE_HZ  # shorter pieces between two gaps are left out
 WINDOW = 10
 COLUMNS = ("t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z", "ref_gyr_z")
 
 
 @dataclass(frozen=True)
 class Drive:
-    """One drive: features (T, 6) = specific force xyz, angular rate xyz; label (T,)."""
+    """One drive: features (T, 6) = specific force xyz, angular rate xyz; gyro error (T,), the label."""
 
     name: str
     sha256: str
@@ -35,22 +35,22 @@ class Drive:
 
 
 def load_drive(path: Path) -> Drive:
-    """Read one CSV without gaps. Raises ValueError that names the file and what is wrong with it."""
+    """Reads one CSV without gaps. Raises ValueError with the file's name and the reason."""
     drives = load_pieces(path)
     if len(drives) > 1:
-        raise ValueError(f"{path}: wants an unbroken 100 Hz recording of more than 3 s")
+        raise ValueError(f"{path}: must be an unbroken 100 Hz recording of more than 3 s")
     return drives[0]
 
 
 def load_pieces(path: Path) -> list[Drive]:
-    """Read the pieces of one CSV between its gaps; static initialisation is that of the first. Raises ValueError that
-    names the file and what is wrong with it."""
+    """Reads the pieces of one CSV between its gaps; all have the static initialisation of the first. Raises ValueError
+    with the file's name and the reason."""
     table, mounting, digest = read_table(path, COLUMNS)
     values = np.stack([table[name] for name in COLUMNS], axis=1)
     broken = np.flatnonzero(abs(np.diff(values[:, 0]) - 1 / RATE_HZ) > 1e-3) + 1
     pieces = np.split(np.arange(len(values)), broken)
     if len(pieces[0]) <= STATIC_SAMPLES:
-        raise ValueError(f"{path}: wants an unbroken 100 Hz recording of more than 3 s")
+        raise ValueError(f"{path}: must be an unbroken 100 Hz recording of more than 3 s")
     force, gyro, reference = mounting.turn(values[:, 1:4]), mounting.turn(values[:, 4:7]), values[:, 7]
     gyro = gyro - gyro[:STATIC_SAMPLES].mean(axis=0)
     kept = [rows for rows in pieces if len(rows) >= LEAST_SAMPLES] if len(pieces) > 1 else pieces
@@ -69,13 +69,13 @@ def load_pieces(path: Path) -> list[Drive]:
 
 
 def read_table(path: Path, columns: tuple[str, ...]) -> tuple[np.ndarray, Mounting, str]:
-    """Read the rows of one CSV, its mounting, and the hash of both. Raises ValueError where one of the columns has no
-    number in every row."""
+    """Reads the rows of one CSV, its mounting, and the hash of both. Raises ValueError if one of the columns does not
+    have a number in every row."""
     mounting = read_mounting(path)
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in columns if name not in (table.dtype.names or ())]
     if missing:
-        raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
+        raise ValueError(f"{path}: missing columns {', '.join(missing)}")
     unknown = ~np.isfinite(np.stack([table[name] for name in columns], axis=1)).all(axis=1)
     if unknown.any():
         raise ValueError(f"{path}: line {np.argmax(unknown) + 2}: a value is empty or not a number")
@@ -83,25 +83,25 @@ def read_table(path: Path, columns: tuple[str, ...]) -> tuple[np.ndarray, Mounti
 
 
 def find_drive(folder: Path, name: str) -> Path:
-    """The drive of that name, or the only one whose name contains it (`02`). Raises ValueError."""
+    """Returns the path of the drive of that name, or of the only one whose name contains it. Raises ValueError."""
     name = name.removesuffix(".csv")
     if (folder / f"{name}.csv").is_file():
         return folder / f"{name}.csv"
     found = sorted(path for path in folder.glob("*.csv") if name in path.stem)
     if len(found) != 1:
         names = ", ".join(path.stem for path in found) or "no drive"
-        raise ValueError(f"{folder}: {names} for the name {name}")
+        raise ValueError(f"{folder}: {names} matching the name {name}")
     return found[0]
 
 
 def windows(series: np.ndarray, length: int = WINDOW) -> np.ndarray:
-    """All overlapping windows of a series, step one sample: (T, ...) -> (T-length+1, length, ...)."""
+    """Returns all windows of a series, one from each sample: (T, ...) -> (T-length+1, length, ...)."""
     view = np.lib.stride_tricks.sliding_window_view(series, length, axis=0)
     return np.moveaxis(view, -1, 1)
 
 
 def mean_1s_error(rate_error: np.ndarray) -> float:
-    """Mean |yaw error| over consecutive, non-overlapping 1 s windows after the static phase, rad."""
+    """Returns the mean |yaw error| over consecutive, non-overlapping 1 s windows after the static phase, rad."""
     error = rate_error[STATIC_SAMPLES:]
     whole = len(error) // RATE_HZ * RATE_HZ
     return float(np.abs(error[:whole].reshape(-1, RATE_HZ).sum(axis=1) / RATE_HZ).mean())

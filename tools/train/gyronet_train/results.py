@@ -1,7 +1,7 @@
-"""Runs a rival on test sequences, and collects its numbers.
+"""Runs a rival on test sequences and collects its numbers.
 
-A sequence that cannot be read, and a mode in which the filter diverges, are named, counted and left
-out: they have a reason instead of numbers, and no trajectory.
+A sequence that cannot be read, or a mode in which the filter diverges, is reported, counted and left out:
+it has a reason instead of numbers, and no trajectory.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from .trajectory import FilterError, Track, consistency, trajectory_error, write
 def test_all(
     folders: Iterable[Path], out: Path, modes: Iterable[str], test: Callable[[Sequence], dict]
 ) -> dict[str, dict]:
-    """Tests each folder's sequence; returns numbers by the folder's name. Removes trajectories of an earlier run."""
+    """Tests the sequence of each folder; returns the numbers by folder name. Removes trajectories of an earlier run."""
     results: dict[str, dict] = {}
     for folder in folders:
         if folder.name in results:
-            raise SystemExit(f"{folder}: a second test sequence of the name {folder.name}")
+            raise SystemExit(f"{folder}: a second test sequence with the name {folder.name}")
         for mode in modes:
             (out / mode).mkdir(parents=True, exist_ok=True)
             (out / mode / f"{folder.name}.txt").unlink(missing_ok=True)
@@ -39,7 +39,7 @@ def test_all(
 def run_mode(
     drive: Sequence, path: Path, run: Callable[[], Track], further: Callable[[Track], dict] = lambda track: {}
 ) -> dict:
-    """Runs a drive in one mode, writes its trajectory into `path` and returns its numbers, and `further` ones."""
+    """Runs a drive in one mode, writes its trajectory to `path` and returns its numbers and those of `further`."""
     begin = time.monotonic()
     name = f"{drive.name} {path.parent.name}"
     try:
@@ -61,13 +61,13 @@ def run_mode(
 
 
 def left_out(name: str, error: ValueError) -> dict:
-    """Says that a sequence or one of its modes has no numbers, and why."""
+    """Prints and returns the reason why a sequence or a mode has no numbers."""
     print(f"{name}: left out, {error}", flush=True)
     return {"left_out": str(error)}
 
 
 def mean_numbers(results: dict[str, dict], mode: str) -> dict:
-    """The means of a mode's numbers, with how many sequences have them and how many were left out."""
+    """Returns the means of a mode's numbers, and how many sequences have them and how many were left out."""
     rows = [numbers[mode] for numbers in results.values() if "left_out" not in numbers]
     rows = [row for row in rows if "left_out" not in row]
     means = {key: round(float(np.mean([row[key] for row in rows])), 3) for key in (rows[0] if rows else {})}

@@ -2,11 +2,11 @@
 
 Brossard, Barrau and Bonnabel, RINS-W: Robust inertial navigation system on wheels, 2019: recurrent
 networks detect from the inertial sensor when the car stands, goes straight, or does not slip, and an
-invariant Kalman filter takes that as measurements. It trains the detectors on the training sequences,
-in the layout of KAIST Urban, or reads trained ones; writes the trajectories of the test sequences in
-TUM format into FOLDER/rinsw, and those of its variants into FOLDER/stops, FOLDER/truth and
-FOLDER/inertial (rinsw_run.py says what these are); and all numbers into FOLDER/rinsw.json. A test
-sequence that cannot be read, or on which the filter diverges, is named and left out.
+invariant Kalman filter uses that as measurements. The program trains the detectors on the training
+sequences, in the layout of KAIST Urban, or reads trained ones. It writes the trajectories of the test
+sequences in TUM format to FOLDER/rinsw, those of the variants to FOLDER/stops, FOLDER/truth and
+FOLDER/inertial (see rinsw_run.py), and all numbers to FOLDER/rinsw.json. A test sequence that cannot be
+read, or on which the filter diverges, is reported and left out.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--test", type=Path, nargs="+", required=True, metavar="DIR")
     parser.add_argument("--out", type=Path, required=True, help="folder for trajectories and detectors")
     parser.add_argument("--modes", nargs="+", choices=MODES, default=MODES)
-    parser.add_argument("--units", type=int, default=Settings.units, help="of each LSTM layer")
+    parser.add_argument("--units", type=int, default=Settings.units, help="units of each LSTM layer")
     parser.add_argument("--steps", type=int, default=Settings.steps, help="training steps of each detector")
     parser.add_argument("--rate", type=float, default=Settings.rate, help="initial rate of Adam")
     parser.add_argument("--seed", type=int, default=Settings.seed)
@@ -45,7 +45,7 @@ def arguments() -> argparse.Namespace:
 
 
 def fit(args: argparse.Namespace) -> tuple[Detectors, dict]:
-    """Trains the detectors and writes them; returns what the report says of it."""
+    """Trains the detectors and writes them; returns them and their entries for the report."""
     drives = load_pieces(args.train)
     settings = Settings(units=args.units, steps=args.steps, rate=args.rate, seed=args.seed)
 

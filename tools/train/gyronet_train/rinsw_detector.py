@@ -1,8 +1,9 @@
 """The detectors of RINS-W: one recurrent network for each motion profile, from the inertial sensor alone.
 
-Each is an LSTM of two layers and a perceptron of two, which give a probability for every sample
-from that sample and those before it. They begin afresh every second with the three seconds before
-it: trained on windows of 4 s, a network that ran on for a drive found 2 to 36 % of the stops.
+Each is an LSTM of two layers and a perceptron of two layers. It gives a probability for every sample
+from that sample and earlier ones. Its state is reset every second, and it then runs from three seconds
+earlier on. Trained on windows of 4 s, a network that ran through a whole drive found only 2 to 36 % of
+the stops.
 """
 
 from __future__ import annotations
@@ -22,30 +23,30 @@ from torch import nn
 from .rinsw_profiles import PROFILES
 
 CHANNELS = 6  # gyro, accelerometer
-WINDOW, BLOCK = 400, 100  # samples that a network sees from its beginning, and of these the last, which count
-CHUNK = 100  # windows that are seen at once
+WINDOW, BLOCK = 400, 100  # samples that a network runs on after a reset, and the last of them, whose outputs are used
+CHUNK = 100  # windows that are processed at once
 THRESHOLDS = np.array([0.95, 0.95, 0.5, 0.5])  # probabilities above which a profile counts as detected
-BIAS = 1e-3  # rad/s and m/s^2: the most that training adds to a channel of a window
-NOISE = np.repeat([8e-5, 1e-3], 3)  # rad/s, m/s^2: standard deviation of what training adds to a sample
+BIAS = 1e-3  # rad/s and m/s^2: largest bias that training adds to a channel of a window
+NOISE = np.repeat([8e-5, 1e-3], 3)  # rad/s, m/s^2: standard deviation of the noise that training adds to a sample
 
 
 class DetectorError(ValueError):
-    """A detector that cannot be trained or read. Its text says on what data, or names the file."""
+    """A detector cannot be trained or read. The text describes the data or names the file."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How the detectors are made and trained."""
+    """Size and training of the detectors."""
 
     units: int = 80
     steps: int = 1200  # of Adam, for each network
     batch: int = 32  # windows of a step
-    rate: float = 3e-3  # at first; it falls along a cosine
+    rate: float = 3e-3  # initial rate; it falls along a cosine
     seed: int = 1
 
 
 class Network(nn.Module):
-    """Gives the logit of one profile for each sample (windows, samples, 6)."""
+    """Returns the logit of one profile for each sample (windows, samples, 6)."""
 
     def __init__(self, units: int):
         super().__init__()
@@ -57,7 +58,7 @@ class Network(nn.Module):
 
 
 class Detectors(nn.Module):
-    """The four networks, with the mean and the spread of the samples that they were trained on."""
+    """The four networks, with mean and standard deviation of the samples that they were trained on."""
 
     def __init__(self, settings: Settings):
         super().__init__()
@@ -67,13 +68,13 @@ class Detectors(nn.Module):
         self.networks = nn.ModuleDict({profile: Network(settings.units) for profile in PROFILES})
 
     def standardised(self, samples: np.ndarray) -> torch.Tensor:
-        """Samples (..., 6) in units of each channel's spread."""
+        """Normalises samples (..., 6) by each channel's mean and standard deviation."""
         return ((torch.from_numpy(samples) - self.mean) / self.spread).float()
 
     @torch.no_grad()
     def probabilities(self, samples: np.ndarray) -> np.ndarray:
-        """The probability of each profile at each sample of a drive of whole seconds (steps, 4). Before its first
-        sample a drive counts as having stood with that sample."""
+        """Returns the probability of each profile at each sample of a drive of whole seconds (steps, 4). The first
+        sample is repeated before the drive."""
         before = np.repeat(samples[:1], WINDOW - BLOCK, axis=0)
         inputs = self.standardised(np.concatenate([before, samples])).unfold(0, WINDOW, BLOCK).transpose(1, 2)
         parts = [
@@ -83,7 +84,7 @@ class Detectors(nn.Module):
         return torch.sigmoid(torch.cat(parts)).reshape(-1, len(PROFILES)).double().numpy()
 
     def detect(self, samples: np.ndarray) -> np.ndarray:
-        """Which profiles are detected at each sample of a drive (steps, 4)."""
+        """Returns which profiles are detected at each sample of a drive (steps, 4)."""
         return self.probabilities(samples) > THRESHOLDS
 
     def save(self, path: Path) -> None:
@@ -92,14 +93,14 @@ class Detectors(nn.Module):
 
 
 def load_detectors(path: Path) -> Detectors:
-    """Reads what `save` wrote. Raises DetectorError that names the file."""
+    """Reads the file that `save` wrote. Raises DetectorError with the file's name."""
     try:
         with safe_open(path, framework="pt") as file:
             settings = Settings(**json.loads((file.metadata() or {})["settings"]))
             detectors = Detectors(settings)
             detectors.load_state_dict({name: file.get_tensor(name) for name in file.keys()})
     except (OSError, SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise DetectorError(f"{path}: no detectors of RINS-W: {error}") from error
+        raise DetectorError(f"{path}: not a file of RINS-W detectors: {error}") from error
     return detectors
 
 
@@ -109,10 +110,10 @@ def train(
     settings: Settings,
     report: Callable[[str, int, float], None] = lambda profile, step, loss: None,
 ) -> tuple[Detectors, dict[str, float]]:
-    """Trains on drives of samples (steps, 6) and their labels (steps, 4); returns the seconds of each profile too."""
+    """Trains on drives of samples (steps, 6) and their labels (steps, 4); also returns the time of each profile, s."""
     samples = np.concatenate(drives)
     if min(map(len, drives)) < WINDOW:
-        raise DetectorError(f"a drive of {min(map(len, drives))} samples: training wants {WINDOW} and more")
+        raise DetectorError(f"a drive of {min(map(len, drives))} samples: training needs at least {WINDOW}")
     if not np.isfinite(samples).all() or (samples.std(axis=0) == 0).any():
         raise DetectorError(f"{len(samples)} samples: a channel is constant or not a number")
     torch.manual_seed(settings.seed)
@@ -156,7 +157,7 @@ def train_one(
 def windows(
     drives: list[np.ndarray], targets: list[np.ndarray], count: int, random: np.random.Generator
 ) -> tuple[np.ndarray, torch.Tensor]:
-    """Draws windows (count, WINDOW, 6) and their labels; noise and a bias are added to each."""
+    """Draws random windows (count, WINDOW, 6) and their labels; noise and a bias are added to each window."""
     chosen = random.integers(len(drives), size=count)
     places = [(k, random.integers(len(drives[k]) - WINDOW + 1)) for k in chosen]
     samples = np.stack([drives[k][first : first + WINDOW] for k, first in places])

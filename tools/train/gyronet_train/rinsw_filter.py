@@ -1,10 +1,10 @@
-"""The invariant extended Kalman filter of RINS-W: inertial navigation, corrected by what does not move.
+"""The invariant extended Kalman filter of RINS-W: inertial navigation with detected zero motions as measurements.
 
 The state is attitude, velocity and position in a level frame, and the biases of gyro and
-accelerometer. Errors are right-invariant, [turn, velocity, position, gyro bias, force bias]: a true
-attitude is Exp(turn) times the estimated one, a true velocity Exp(turn) v + J(turn) error and a true
-position likewise, with J the left Jacobian; biases add. A detected profile is a measurement of zero,
-and a motion that is detected as zero is not integrated.
+accelerometer. Errors are right-invariant, [turn, velocity, position, gyro bias, force bias]. The true
+attitude is Exp(turn) times the estimate, the true velocity is Exp(turn) v + J(turn) error, and the
+true position likewise, with J the left Jacobian; biases add. A detected profile is a measurement of
+zero, and a motion that is detected as zero is not integrated.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from .trajectory import FilterError
 TURN, SPEED, PLACE, GYRO_BIAS, FORCE_BIAS = (slice(k, k + 3) for k in range(0, 15, 3))
 STATES = 15
 IDENTITY, ALL, GRAVITY_CROSS = np.eye(3), np.eye(STATES), skew(GRAVITY)
-FASTEST = 100.0  # m/s: a filter that states more has diverged
-STILL_RATE, STILL_FORCE = 0.1, 0.6  # rad/s, m/s^2: the most that a sensor may be off while it stands
+FASTEST = 100.0  # m/s: a filter with a higher speed has diverged
+STILL_RATE, STILL_FORCE = 0.1, 0.6  # rad/s, m/s^2: largest residual of a sensor at standstill
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: of each sample, of the biases' walk, and of the measurements of zero."""
+    """Standard deviations of each sample, of the biases' random walk, and of the measurements of zero."""
 
     gyro: float = 5e-3  # rad/s
     force: float = 0.1  # m/s^2
@@ -36,10 +36,10 @@ class Noise:
     force_bias: float = 2e-2  # m/s^3
     lateral: float = 2.0  # m/s
     vertical: float = 3.0  # m/s
-    velocity: float = 1.0  # m/s, of each axis while the car stands
+    velocity: float = 1.0  # m/s, of each axis at standstill
     still_gyro: float = 0.04  # rad/s
     still_force: float = 0.4  # m/s^2
-    # At the start: turn (the last is the heading's), velocity, position, gyro bias, force bias.
+    # At the start: turn (the third is the heading), velocity, position, gyro bias, force bias.
     start: tuple = (0.1, 0.1, 1e-3, 0, 0, 0, 0.01, 0.01, 0.01, 1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2)
 
 
@@ -54,8 +54,8 @@ class Filter:
         self.steps = self.refused = 0
 
     def start(self, samples: np.ndarray) -> None:
-        """Takes gyro bias, roll, pitch and the accelerometer's scale from samples (n, 6) of a car that stands; the
-        heading stays."""
+        """Initialises gyro bias, roll, pitch and the accelerometer's bias from samples (n, 6) at standstill; the
+        heading is kept."""
         gyro, force = samples.mean(axis=0).reshape(2, 3)
         yaw = Rotation.from_matrix(self.attitude).as_euler("ZYX")[0]
         pitch, roll = np.arctan2(-force[0], np.hypot(force[1], force[2])), np.arctan2(force[1], force[2])
@@ -66,7 +66,7 @@ class Filter:
         self.update(np.zeros(6), jacobian, spread**2 / len(samples))
 
     def move(self, sample: np.ndarray, detected: np.ndarray) -> None:
-        """Integrates a sample over a step, except for velocity and attitude where these are detected as constant."""
+        """Integrates a sample over a step. Velocity or attitude stays if it is detected as constant."""
         noise, moving, turning = self.noise, not detected[VELOCITY], not detected[ROTATION]
         growth, covariance = np.zeros((STATES, STATES)), self.covariance.copy()
         if turning:
@@ -118,31 +118,31 @@ class Filter:
             self.update(np.concatenate(residuals), np.concatenate(jacobians), np.concatenate(variances))
 
     def near(self, off: np.ndarray, limit: float) -> bool:
-        """Tells whether a standing sensor is off by less than a limit; counts it as refused if not."""
+        """Returns whether a residual at standstill is within a limit; counts a measurement that is not as refused."""
         near = bool(off @ off < limit**2)
         self.refused += not near
         return near
 
     def velocity_row(self) -> np.ndarray:
-        """The Jacobian of the velocity in body axes."""
+        """Returns the Jacobian of the velocity in body axes."""
         row = np.zeros((3, STATES))
         row[:, SPEED] = self.attitude.T
         return row
 
     def gyro_row(self) -> np.ndarray:
-        """The Jacobian of the gyro's sample at rest."""
+        """Returns the Jacobian of the gyro's sample at rest."""
         row = np.zeros((3, STATES))
         row[:, GYRO_BIAS] = IDENTITY
         return row
 
     def force_row(self) -> np.ndarray:
-        """The Jacobian of the accelerometer's sample at rest."""
+        """Returns the Jacobian of the accelerometer's sample at rest."""
         row = np.zeros((3, STATES))
         row[:, TURN], row[:, FORCE_BIAS] = -self.attitude.T @ GRAVITY_CROSS, IDENTITY
         return row
 
     def update(self, residual: np.ndarray, jacobian: np.ndarray, variance: np.ndarray) -> None:
-        """Corrects the state by measurements of independent noise."""
+        """Corrects the state by measurements with independent noise."""
         across = jacobian @ self.covariance
         spread = across @ jacobian.T
         spread[np.diag_indices_from(spread)] += variance
@@ -152,7 +152,7 @@ class Filter:
         self.covariance = rest @ self.covariance @ rest.T + gain * variance @ gain.T
 
     def correct(self, error: np.ndarray) -> None:
-        """Takes an error (15) into the state."""
+        """Applies an error (15) to the state."""
         jacobian = left_jacobian(error[TURN])
         turn = IDENTITY + skew(error[TURN]) @ jacobian
         self.attitude = turn @ self.attitude
@@ -162,14 +162,14 @@ class Filter:
         self.force_bias = self.force_bias + error[FORCE_BIAS]
 
     def pose_covariance(self) -> np.ndarray:
-        """The covariance (6, 6) of the turn and of the position's plain difference."""
+        """Returns the covariance (6, 6) of the turn and of the position's plain (not invariant) difference."""
         plain = np.eye(6)
         plain[3:, :3] = -skew(self.position)
         within = np.r_[TURN, PLACE]
         return plain @ self.covariance[np.ix_(within, within)] @ plain.T
 
     def check(self) -> None:
-        """Raises FilterError if the filter has diverged; makes the attitude a rotation again each 10,000 steps."""
+        """Raises FilterError if the filter has diverged; orthonormalises the attitude every 10,000 steps."""
         if not self.velocity @ self.velocity < FASTEST**2:
             speed = np.linalg.norm(self.velocity)
             raise FilterError(f"second {self.steps * DT:.2f}: diverged, its speed is {speed:.0f} m/s")

@@ -1,7 +1,7 @@
-"""The four motion profiles of RINS-W, found in the true poses, and how well a detector finds them.
+"""The four motion profiles of RINS-W, computed from the true poses, and the scores of a detector.
 
-The true poses give the labels of the training and of the report. They are smoothed over 11 steps
-around each (Savitzky and Golay), before and after they are differentiated.
+The true poses give the labels for training and report. They are smoothed over 11 steps (Savitzky and
+Golay), before and after differentiation.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.signal import savgol_filter
 from .sequence import DT, Sequence
 
 PROFILES = ("velocity", "rotation", "lateral", "vertical")
-VELOCITY, ROTATION, LATERAL, VERTICAL = range(4)  # columns of labels and detections: each is zero
+VELOCITY, ROTATION, LATERAL, VERTICAL = range(4)  # columns of labels and detections: the motion is zero
 SMOOTH = 11  # steps
 
 
@@ -23,13 +23,13 @@ class Limits:
     """Below these a motion counts as zero: speed, angular rate, lateral and vertical velocity."""
 
     velocity: float = 0.004  # m/s
-    rotation: float = 0.001  # rad/s: of 0.005, 0.002 and 0.001 the best on training sequences with true profiles
+    rotation: float = 0.001  # rad/s: the best of 0.005, 0.002 and 0.001 on training sequences with true profiles
     lateral: float = 0.1  # m/s
     vertical: float = 0.1  # m/s
 
 
 def label(sequence: Sequence, limits: Limits = Limits()) -> np.ndarray:
-    """Returns which profiles hold in each step of a sequence (N * 100, 4), of type bool."""
+    """Returns which profiles are true in each step of a sequence (N * 100, 4), of type bool."""
     position = savgol_filter(sequence.position, SMOOTH, 1, axis=0)
     velocity = savgol_filter(np.diff(position, axis=0) / DT, SMOOTH, 0, axis=0)
     turns = (sequence.attitude[:-1].inv() * sequence.attitude[1:]).as_rotvec()
@@ -47,8 +47,7 @@ def label(sequence: Sequence, limits: Limits = Limits()) -> np.ndarray:
 
 
 def agreement(detected: np.ndarray, true: np.ndarray) -> dict[str, dict]:
-    """Returns each profile's share of the steps, and the precision and recall of its detections: None where there is
-    nothing to count."""
+    """Returns each profile's share of the steps, and the precision and recall of its detections (None if undefined)."""
     numbers = {}
     for k, profile in enumerate(PROFILES):
         both = (detected[:, k] & true[:, k]).sum()

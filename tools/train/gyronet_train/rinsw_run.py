@@ -1,9 +1,9 @@
-"""A drive by RINS-W: from samples and detections to a pose every 10 ms.
+"""Runs RINS-W on a drive: from samples and detections to a pose every 10 ms.
 
-There are four ways to run it. `rinsw` takes the profiles that the four networks detect, as in the
-paper; `stops` takes the network of zero velocity alone, for zero rotation as well, and always counts
-lateral and vertical velocity as zero, as the program does that its authors released later; `truth`
-takes the true profiles, to show what better detectors would gain; `inertial` detects nothing.
+There are four modes. `rinsw` uses the profiles that the four networks detect, as in the paper. `stops`
+uses only the network for zero velocity, also for zero rotation, and always counts lateral and vertical
+velocity as zero, like the program that the authors released later. `truth` uses the true profiles, to
+show what better detectors would gain. `inertial` detects nothing.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ MODES = ("rinsw", "stops", "truth", "inertial")
 
 
 def samples_of(sequence: Sequence) -> np.ndarray:
-    """A sequence's samples of the inertial sensor (N * 100, 6), its windows one after the other."""
+    """Returns a sequence's samples of the inertial sensor (N * 100, 6), with the windows concatenated."""
     return sequence.inertial.reshape(-1, sequence.inertial.shape[-1])
 
 
 def gates(detected: np.ndarray, true: np.ndarray, mode: str) -> np.ndarray:
-    """The profiles (steps, 4) that the filter is told of in a mode."""
+    """Returns the profiles (steps, 4) that the filter uses in a mode."""
     if mode == "stops":
         chosen = np.ones_like(detected)
         chosen[:, VELOCITY] = chosen[:, ROTATION] = detected[:, VELOCITY]
@@ -35,9 +35,9 @@ def gates(detected: np.ndarray, true: np.ndarray, mode: str) -> np.ndarray:
 
 
 def run(sequence: Sequence, detected: np.ndarray, noise: Noise = Noise()) -> Track:
-    """Runs a drive from its true first place and heading. Raises FilterError where the filter diverges.
+    """Runs a drive from its true first position and heading. Raises FilterError if the filter diverges.
 
-    The first three seconds, which stand, give bias, roll and pitch; the pose is constant in them.
+    The first three seconds, at standstill, give bias, roll and pitch; the pose is constant in them.
     """
     samples, standing = samples_of(sequence), int(STATIC_S / DT)
     state = Filter(sequence.attitude[0].as_matrix(), noise)

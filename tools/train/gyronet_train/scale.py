@@ -1,8 +1,8 @@
-"""Fits the scale's row alone, to a network whose other weights stay as they are.
+"""Fits only the output row of the scale; the other weights of the network stay unchanged.
 
-The scale's log is the mean over a window's steps of the last layer's second row, so it is linear in
-the mean of the layer below. With the likelihood of loss.py that is a convex problem, and a little
-ridge gives it one solution: no seed, no epochs, and the same row whatever was there before.
+The log of the scale is the mean over a window's steps of the last layer's second row, so it is linear
+in the mean of the layer below. With the likelihood of loss.py the problem is convex, and a small ridge
+makes the solution unique: it needs no seed and no epochs, and does not depend on the previous row.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BATCH = 4096
 
 
 def fit_scale(model: GyroNet, drives: list[Drive]) -> None:
-    """Replaces the scale's row by the one that is best on the drives, from when they may move."""
+    """Replaces the scale's row by the best one on the drives, without their static phase."""
     inputs, errors = map(torch.cat, zip(*[statistics(model, drive) for drive in drives]))
     row = torch.zeros(inputs.shape[1], dtype=torch.float64, requires_grad=True)
     bias = torch.zeros(1, dtype=torch.float64, requires_grad=True)
@@ -40,8 +40,8 @@ def fit_scale(model: GyroNet, drives: list[Drive]) -> None:
 
 @torch.no_grad()
 def statistics(model: GyroNet, drive: Drive) -> tuple[torch.Tensor, torch.Tensor]:
-    """Of each window: the mean over its steps of what the last layer sees (W, 120), and the
-    |error| of its mean corrected rate in units of the output's scale (W,)."""
+    """Returns for each window the mean over its steps of the last layer's input (W, 120), and the |error| of its mean
+    corrected rate in units of the output's scale (W,)."""
     model.eval()
     x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[STATIC_SAMPLES:]))
     label = torch.from_numpy(np.ascontiguousarray(windows(drive.gyro_error)[STATIC_SAMPLES:]))

@@ -1,7 +1,7 @@
-"""Drives as FoGNet sees them: one row of nine features a second, and the truth beside it.
+"""Drives as input of FoGNet: one row of nine features per second, and the true turn.
 
-Increments (gyro, wheels) are summed over a second, the inertial sensor is averaged; its gyro is
-taken less its mean over the first three seconds, which stand still.
+Increments (gyro, wheels) are summed over a second, the inertial sensor is averaged. The mean of its gyro
+over the first three seconds, at standstill, is subtracted.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from .vehicle import read_mounting
 
-STEPS = 60  # of a window
+STEPS = 60  # per window
 FOG = 8  # column of the gyro increment
 STATIC_S = 3.0
 RATE_HZ = 100
@@ -24,7 +24,7 @@ DRIVE = ("t_s", "acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z", "left_m", 
 
 @dataclass(frozen=True)
 class Seconds:
-    """One drive: features (T, 9) in float64, the true yaw change of each second (T,) in rad."""
+    """One drive: features (T, 9) in float64, and the true yaw change of each second (T,) in rad."""
 
     name: str
     sha256: str
@@ -32,16 +32,16 @@ class Seconds:
     turn: np.ndarray
 
     def part(self, begin: int, end: int) -> Seconds:
-        """The seconds from `begin` to `end`."""
+        """Returns the seconds from `begin` to `end`."""
         name = f"{self.name}[{begin}:{end}]"
         return Seconds(name, self.sha256, self.features[begin:end], self.turn[begin:end])
 
 
 def window_rows(end: int, padding: str) -> np.ndarray | None:
-    """Rows of the window that ends with row `end - 1`, oldest first.
+    """Returns the rows of the window that ends with row `end - 1`, oldest first.
 
-    Before there are 60 of them (Fig. 8 of the paper): `repeat` fills up with the existing rows,
-    over and over, in their order; `edge` with the first one; `none` gives no window.
+    If there are fewer than 60 rows (Fig. 8 of the paper), `repeat` repeats the existing rows in their
+    order, `edge` repeats the first row, and `none` gives no window.
     """
     rows = np.arange(end - STEPS, end)
     if end >= STEPS:
@@ -54,8 +54,8 @@ def window_rows(end: int, padding: str) -> np.ndarray | None:
 
 
 def kaist_files(folder: Path):
-    """Read the four files of a sequence in the KAIST Urban layout (IMU, fibre-optic gyro, encoders, pose), the encoders'
-    scale, and the files' hash."""
+    """Reads the four files of a sequence in the KAIST Urban layout (IMU, fibre-optic gyro, encoders, pose), the
+    encoders' scale, and the hash of the files."""
     digest = hashlib.sha256()
     sensors = folder / "sensor_data"
     imu = table(sensors / "xsens_imu.csv", 17, digest)
@@ -67,15 +67,15 @@ def kaist_files(folder: Path):
 
 
 def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
-    """Read a drive that `gyronet import kaist` or `nclt` wrote: the pieces of whole seconds between its gaps, on the grid
-    of seconds from its first row. The rates for navigation of `gyronet replay --csv` stand in for the fibre-optic gyro
-    where they are given: the paper's pseudo-FoG. Raises ValueError that names what is wrong."""
+    """Reads a drive that `gyronet import kaist` or `nclt` wrote: the pieces of whole seconds between its gaps, counted
+    from its first row. If `rates` is given, the navigation rates of `gyronet replay --csv` replace the fibre-optic
+    gyro: the paper's pseudo-FoG. Raises ValueError with the reason."""
     mounting = read_mounting(path)
     digest = hashlib.sha256(path.read_bytes() + mounting.text)
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in DRIVE if name not in (table.dtype.names or ())]
     if missing:
-        raise ValueError(f"{path}: missing column(s) {', '.join(missing)}")
+        raise ValueError(f"{path}: missing columns {', '.join(missing)}")
     values = np.stack([table[name] for name in DRIVE], axis=1)
     values[:, 1:4], values[:, 4:7] = mounting.turn(values[:, 1:4]), mounting.turn(values[:, 4:7])
     row = np.round((values[:, 0] - values[0, 0]) * RATE_HZ).astype(int)
@@ -96,31 +96,31 @@ def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
 
 
 def turns(path: Path, start: float, row: np.ndarray) -> np.ndarray:
-    """The turns of a drive's rows by the rates that `gyronet replay --csv` wrote; zero before the first, where the vehicle
-    stands."""
+    """Returns the turns of a drive's rows by the rates that `gyronet replay --csv` wrote. Before the first rate the
+    turns are zero, since the vehicle stands."""
     sent = np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="ascii")
     at = np.round((sent["t_s"] - start) * RATE_HZ).astype(int)
     if not np.isin(at, row).all():
-        raise ValueError(f"{path}: rates at times that the drive has no rows for")
+        raise ValueError(f"{path}: has rates at times at which the drive has no rows")
     turn = np.zeros(row[-1] + 1)
     turn[at] = np.nan_to_num(sent["navigation"]) / RATE_HZ
     return turn[row]
 
 
 def load_kingston(folder: Path) -> Seconds:
-    """Read the Kingston 2008 recording: its gyro stands in for the fibre-optic one, and both
-    wheels go at the speed of the car. Its azimuth grows clockwise."""
+    """Reads the Kingston 2008 recording. Its gyro replaces the fibre-optic gyro, and both wheels have the speed of the
+    car. Its azimuth is positive clockwise."""
     digest = hashlib.sha256()
     imu, speed, reference = (
         table(folder / name, columns, digest, header=1)
         for name, columns in (("imu_10hz.csv", 7), ("obd_speed_1hz.csv", 2), ("reference_1hz.csv", 10))
     )
-    # The reference's own stamps: a heading between two of them would be a guess.
+    # Seconds begin at the reference's time stamps, since a heading between two stamps would be a guess.
     inside = (reference[:, 0] >= imu[0, 0]) & (reference[:, 0] <= imu[-1, 0])
     edges = reference[inside, 0]
     if (abs(np.diff(edges) - 1.0) > 0.01).any():
         raise ValueError(f"{folder}: the reference is not at 1 Hz throughout")
-    # A sample's rate holds from the sample before it to its own time.
+    # The rate of a sample is that since the previous sample.
     turned = np.cumsum(imu[:, 6] * np.diff(imu[:, 0], prepend=imu[0, 0]))
     way = np.cumsum(speed[:, 1] * np.diff(speed[:, 0], prepend=speed[0, 0]))
     gyro = imu[:, 4:7] - imu[imu[:, 0] < STATIC_S + imu[0, 0], 4:7].mean(axis=0)
@@ -136,7 +136,7 @@ def load_kingston(folder: Path) -> Seconds:
 
 
 def second_means(times: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Mean of the values in each second; raises ValueError where a second has none."""
+    """Returns the mean of the values in each second; raises ValueError if a second has none."""
     first = np.searchsorted(times, edges)
     count = np.diff(first)
     if (count == 0).any():
@@ -146,22 +146,22 @@ def second_means(times: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np
 
 
 def table(path: Path, columns: int, digest, header: int = 0) -> np.ndarray:
-    """A CSV of that many columns. Stamps of 1.5e18 ns are rounded to 256 ns, which is finer than
-    anything that is done with them here. Rows that are not finite or repeat a stamp are left out and counted."""
+    """Reads a CSV of that many columns. Stamps of 1.5e18 ns are rounded to 256 ns, which is precise enough here. Rows
+    that are not finite or repeat a stamp are left out and counted."""
     digest.update(path.read_bytes())
     try:
         values = np.loadtxt(path, delimiter=",", skiprows=header, dtype=np.float64, ndmin=2)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
     if values.shape[1] != columns:
-        raise ValueError(f"{path}: wants {columns} columns")
+        raise ValueError(f"{path}: must have {columns} columns")
     lines = np.arange(len(values)) + 1 + header
     finite = np.isfinite(values).all(axis=1)
     values, lines = values[finite], lines[finite]
     new = np.diff(values[:, 0], prepend=-np.inf) != 0
     left_out = int((~finite).sum() + (~new).sum())
     if left_out:
-        print(f"{path}: {left_out} rows left out, not finite or with the stamp before", file=sys.stderr)
+        print(f"{path}: {left_out} rows left out, not finite or with a repeated time stamp", file=sys.stderr)
     values, lines = values[new], lines[new]
     backwards = np.flatnonzero(np.diff(values[:, 0]) < 0)
     if len(backwards):
@@ -172,7 +172,7 @@ def table(path: Path, columns: int, digest, header: int = 0) -> np.ndarray:
 
 
 def encoder_scale(path: Path) -> list[float]:
-    """Metres per count of the left and the right wheel."""
+    """Returns metres per count of the left and the right wheel."""
     entries = {}
     for line in path.read_text().splitlines():
         words = line.split()

@@ -1,9 +1,9 @@
 """Sequences in the layout of KAIST Urban: windows of one second on a 100 Hz grid, and the true poses.
 
-The grid begins with the first row of the inertial sensor that all other files have reached, as in
-`gyronet tables`, and has whole seconds only. Ways and turns are interpolated as sums, so that no
-increment is lost or counted twice; the inertial sensor's values are means over a step. Its gyro is
-taken less its mean over the first three seconds, which stand still.
+The grid begins at the first row of the inertial sensor at which all other files have begun, as in
+`gyronet tables`, and has whole seconds only. Distances and turns are interpolated as sums, so that no
+increment is lost or counted twice; the inertial sensor's values are means over a step. The gyro's mean
+over the first three seconds, at standstill, is subtracted from the gyro.
 """
 
 from __future__ import annotations
@@ -16,36 +16,36 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from .seconds import STATIC_S, kaist_files
 
-STEPS = 100  # of a window
+STEPS = 100  # per window
 DT = 0.01  # s
 PERIOD_NS = 10_000_000
 MAX_GAP_NS = 100_000_000  # a longer one between two rows of a file is a gap
-LEAST = 5  # windows of a piece between two gaps: the detectors of RINS-W train on four
-STANDING_M = 0.01  # the most that wheels may turn while the gyro's mean is taken
+LEAST = 5  # fewest windows of a piece between two gaps: the detectors of RINS-W train on four
+STANDING_M = 0.01  # largest distance that the wheels may roll while the gyro's mean is taken
 
 
 class SequenceError(ValueError):
-    """A sequence that cannot be used. Its text names the folder and what is wrong."""
+    """A sequence cannot be used. The text names the folder and the reason."""
 
 
 @dataclass(frozen=True)
 class Sequence:
-    """One drive of N windows. Lengths are in m, angles in rad, the truth is at the N * 100 + 1 steps."""
+    """One drive of N windows. Lengths are in m, angles in rad; the true poses are at the N * 100 + 1 steps."""
 
     name: str
     sha256: str
     start_ns: int
-    odometry: np.ndarray  # (N, 100, 3): ways of the left and the right wheel, turn by the fibre-optic gyro
+    odometry: np.ndarray  # (N, 100, 3): distances of the left and the right wheel, turn by the fibre-optic gyro
     inertial: np.ndarray  # (N, 100, 6): gyro, accelerometer
     attitude: Rotation
     position: np.ndarray  # (N * 100 + 1, 3)
-    whole: np.ndarray  # (N,): no file has a gap in the window
+    whole: np.ndarray  # (N,): true if no file has a gap in the window
 
     def __len__(self) -> int:
         return len(self.odometry)
 
     def part(self, begin: int, end: int) -> Sequence:
-        """The windows from `begin` to `end`."""
+        """Returns the windows from `begin` to `end`."""
         windows, steps = slice(begin, end), slice(begin * STEPS, end * STEPS + 1)
         return replace(
             self,
@@ -58,19 +58,19 @@ class Sequence:
         )
 
     def pieces(self) -> list[Sequence]:
-        """The pieces between gaps, to train on."""
+        """Returns the pieces between gaps, for training."""
         inside = np.concatenate([[0], self.whole.astype(int), [0]])
         edges = np.flatnonzero(np.diff(inside)).reshape(-1, 2)
         return [self.part(begin, end) for begin, end in edges if end - begin >= LEAST]
 
     @property
     def edges(self) -> slice:
-        """The steps at which windows begin and end."""
+        """Returns the steps at which windows begin and end."""
         return slice(None, None, STEPS)
 
     @property
     def edge_speed(self) -> np.ndarray:
-        """Speed by the wheels at the edges, m/s: a tenth of a second around each, since one step has few counts."""
+        """Returns the wheels' speed at the edges, m/s, over 0.1 s around each edge, since one step has few counts."""
         way = np.concatenate([[0.0], np.cumsum(self.odometry[:, :, :2].mean(axis=2).ravel())])
         middle = np.arange(0, len(way), STEPS)
         after, before = np.minimum(middle + 5, len(way) - 1), np.maximum(middle - 5, 0)
@@ -78,14 +78,14 @@ class Sequence:
 
     @property
     def edge_velocity(self) -> np.ndarray:
-        """True velocity at the edges, m/s: the slope of a parabola through five steps (Savitzky and Golay), at either
-        end of the drive two steps inwards."""
+        """Returns the true velocity at the edges, m/s: the slope of a parabola through five steps (Savitzky and Golay).
+        At both ends of the drive it is that of two steps further inside."""
         middle = np.clip(np.arange(0, len(self.position), STEPS), 2, len(self.position) - 3)
         return sum(k * self.position[middle + k] for k in (-2, -1, 1, 2)) / (10 * DT)
 
 
 def load_sequence(folder: Path) -> Sequence:
-    """Read a folder in the KAIST Urban layout. Raises SequenceError that names what is wrong."""
+    """Reads a folder in the KAIST Urban layout. Raises SequenceError with the reason."""
     try:
         return read(folder)
     except (OSError, ValueError) as error:
@@ -93,7 +93,7 @@ def load_sequence(folder: Path) -> Sequence:
 
 
 def load_pieces(folders: list[Path]) -> list[Sequence]:
-    """Read folders in the KAIST Urban layout, in pieces between gaps. Raises SequenceError that names what is wrong."""
+    """Reads folders in the KAIST Urban layout, in pieces between gaps. Raises SequenceError with the reason."""
     pieces = [piece for folder in folders for piece in load_sequence(folder).pieces()]
     if not pieces:
         raise SequenceError(f"no piece of {LEAST} s without a gap in {', '.join(map(str, folders))}")
@@ -101,14 +101,14 @@ def load_pieces(folders: list[Path]) -> list[Sequence]:
 
 
 def read(folder: Path) -> Sequence:
-    """Reads the four files and the encoder's calibration, and puts them on the grid."""
+    """Reads the four files and the encoder's calibration, and resamples them to the grid."""
     files, scale, digest = kaist_files(folder)
     imu, fog, encoder, pose = files
     latest = max(t[0, 0] for t in files)
     start = imu[np.searchsorted(imu[:, 0], latest), 0]
     count = int((min(t[-1, 0] for t in files) - start) // 10**9)
     if count < STATIC_S + 1:
-        raise SequenceError(f"its files have {count} s in common, and at least {STATIC_S + 1:.0f} s are needed")
+        raise SequenceError(f"its files have {count} s in common, but at least {STATIC_S + 1:.0f} s are needed")
     grid = np.arange(count * STEPS + 1) * DT
 
     def on_grid(times: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ def read(folder: Path) -> Sequence:
     inertial = (samples[1:] + samples[:-1]) / 2
     standing = int(STATIC_S / DT)
     if abs(wheels[0][:standing].sum() + wheels[1][:standing].sum()) > 2 * STANDING_M:
-        raise SequenceError(f"it moves in its first {STATIC_S:.0f} s, in which the gyro's mean is taken")
+        raise SequenceError(f"the vehicle moves in the first {STATIC_S:.0f} s, in which the gyro's mean is taken")
     inertial[:, :3] -= inertial[:standing, :3].mean(axis=0)
     whole = np.ones(count, bool)
     for times in (table[:, 0] for table in files):

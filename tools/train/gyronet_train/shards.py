@@ -1,7 +1,7 @@
-"""python -m gyronet_train.shards DRIVE.csv... --out FOLDER: drives as Parquet shards, for more than memory holds.
+"""python -m gyronet_train.shards DRIVE.csv... --out FOLDER: write drives as Parquet shards, for data beyond memory.
 
-A shard has some drives, a row group each, as the network sees them, in f32. Its metadata has the name, hash and
-moments of each drive, so that a training knows all that it needs before it reads a row. Wants pyarrow.
+A shard has one row group per drive, with the network's inputs and labels in f32. Its metadata has the name, hash and
+moments of each drive, so that a training has them before it reads a row. Needs pyarrow.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ COLUMNS = [*(f"feature{k}" for k in range(6)), "gyro_error", "reference_rate"]
 
 @dataclass(frozen=True)
 class Entry:
-    """A drive in a shard."""
+    """The location of a drive in a shard, and its metadata."""
 
     path: Path
     group: int
@@ -43,7 +43,7 @@ class Entry:
 
 
 def write_shard(path: Path, drives: list[Drive]) -> None:
-    """Writes drives into one file."""
+    """Writes drives to one shard."""
     about = [{"name": d.name, "sha256": d.sha256, "moments": asdict(Moments.of(d))} for d in drives]
     schema = pyarrow.schema([(name, pyarrow.float32()) for name in COLUMNS], {"drives": json.dumps(about)})
     with parquet.ParquetWriter(path, schema) as writer:
@@ -53,7 +53,7 @@ def write_shard(path: Path, drives: list[Drive]) -> None:
 
 
 def entries(folder: Path) -> list[Entry]:
-    """The drives of a folder's shards. Raises ValueError for none, and for files of another origin."""
+    """Returns the drives in the shards of a folder. Raises ValueError if there are none, or for other Parquet files."""
     found = []
     for path in sorted(folder.glob("*.parquet")):
         metadata = parquet.read_schema(path).metadata or {}
@@ -68,7 +68,7 @@ def entries(folder: Path) -> list[Entry]:
 
 
 class Stream:
-    """Every span of the drives in some shards, as `Spans` has it, with a few drives in memory at a time."""
+    """All spans of the drives in some shards, like `Spans`, with a few drives in memory at a time."""
 
     def __init__(self, folder: Path, windows: int, part: tuple[int, int] = (0, 1), drives_at_once: int = 8):
         self.entries = entries(folder)
@@ -81,7 +81,7 @@ class Stream:
             raise ValueError(f"{folder}: {len(self.entries)} drives for {part[1]} processes")
 
     def batches(self, windows: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
-        """This process's batches: its drives in any order, shuffled within those that are in memory."""
+        """Yields the batches of this process: its drives in random order, shuffled within the drives in memory."""
         return islice(self._all(windows), self.epoch(windows))
 
     def _all(self, windows: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
@@ -92,8 +92,8 @@ class Stream:
             yield from Spans(drives, self.windows).batches(windows)
 
     def epoch(self, windows: int) -> int:
-        """Batches of an epoch, the same for every process: what the one with the least has, however its drives come
-        together."""
+        """Returns the number of batches of an epoch, the same for every process: the least that any process has in any
+        order of its drives."""
 
         def least(entry: Entry) -> int:
             return Spans.count(entry.moments.count, self.windows) // (windows // self.windows * self.windows)

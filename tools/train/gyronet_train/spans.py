@@ -1,7 +1,7 @@
-"""Spans of drives, each cut into windows as the firmware runs them: HOP samples apart.
+"""Spans of drives, each cut into windows HOP samples apart, as the firmware runs them.
 
-A span of k windows has k - 1 stretches of HOP samples that two windows cover. Their mean is what
-the firmware uses, so it is what the loss looks at.
+A span of k windows has k - 1 stretches of HOP samples that two windows cover. The firmware uses the mean
+of both windows there, so the loss is computed from it.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ HOP = 5
 
 
 class Spans:
-    """Every span of `windows` windows in some drives, wherever it begins."""
+    """All spans of `windows` windows in some drives, one from each sample."""
 
     def __init__(self, drives: list[Drive], windows: int, part: tuple[int, int] = (0, 1)):
-        """`part` (k, n) is the k-th process of n: it gets every n-th span."""
+        """`part` (k, n) means process k of n, which gets every n-th span."""
         self.names = {drive.name: drive.sha256 for drive in drives}
         self.moments = Moments.added([Moments.of(drive) for drive in drives])
         self.windows = windows
@@ -32,18 +32,18 @@ class Spans:
         starts = [np.arange(end - len(d.gyro_error), end - self.length + 1) for d, end in zip(drives, ends)]
         every = torch.from_numpy(np.concatenate(starts))
         rank, ranks = part
-        # As many for each process.
+        # Every process gets the same number of spans.
         self.starts = every[rank::ranks][: len(every) // ranks]
 
     @staticmethod
     def count(samples: int, windows: int) -> int:
-        """Spans of a drive of so many samples."""
+        """Returns the number of spans in a drive of `samples` samples."""
         return max(0, samples - (WINDOW + (windows - 1) * HOP) + 1)
 
     def batches(self, windows: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
-        """Shuffled batches of about `windows` windows: features (S, L, 6), gyro error (S, L).
+        """Yields shuffled batches of about `windows` windows: features (S, L, 6), gyro error (S, L).
 
-        One epoch holds as many windows as the drives have samples.
+        One epoch has about as many windows as the drives have samples.
         """
         spans = windows // self.windows
         order = self.starts[torch.randperm(len(self.starts))]
@@ -53,17 +53,17 @@ class Spans:
             yield self.features[rows], self.gyro_error[rows]
 
     def epoch(self, windows: int) -> int:
-        """Batches of an epoch."""
+        """Returns the number of batches of an epoch."""
         return len(self.starts) // (windows // self.windows * self.windows)
 
 
 def cut(span: torch.Tensor) -> torch.Tensor:
-    """The windows of spans: (S, L, ...) -> (S, k, WINDOW, ...)."""
+    """Cuts spans into windows: (S, L, ...) -> (S, k, WINDOW, ...)."""
     return torch.stack(
         [span[:, at : at + WINDOW] for at in range(0, span.shape[1] - WINDOW + 1, HOP)], dim=1
     )
 
 
 def overlapped(windows: torch.Tensor) -> torch.Tensor:
-    """Mean of both estimates of the samples that two windows cover: (S, k, WINDOW) -> (S, (k - 1) HOP)."""
+    """Averages both estimates of the samples that two windows cover: (S, k, WINDOW) -> (S, (k - 1) HOP)."""
     return ((windows[:, :-1, HOP:] + windows[:, 1:, :HOP]) / 2).flatten(1)

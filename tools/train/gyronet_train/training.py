@@ -1,13 +1,14 @@
-"""Training of one network with one seed, by one process or several.
+"""Training of one network with one seed, in one process or several.
 
-As in the paper: Adam with an initial rate of 0.0015 and mean absolute error over shuffled windows
-of 0.1 s. Other than there, turns are added (augment.py), the rate follows one cycle, what is kept is
-the running mean of the weights, and a scale is trained (loss.py). Windows can come in spans as the
-firmware overlaps them, and as other units of the part would give them; the defaults do without, for
-on the validation drive neither the 1 s error nor the windows' mean error was better with them.
+As in the paper, training uses Adam with an initial rate of 0.0015 and mean absolute error over shuffled
+windows of 0.1 s. Unlike in the paper, turns are added (augment.py), the rate follows one cycle, the
+running mean of the weights is kept, and a scale is trained (loss.py). Windows can be grouped in spans
+that overlap as in the firmware, and can be changed to those of other units of the part. By default
+neither is done, since it improved neither the 1 s error nor the windows' mean error on the validation
+drive.
 
-Random numbers start anew with each epoch, from seed, epoch and process, so that a training that goes on from its
-state is the one that was not broken off.
+Random numbers are seeded in each epoch from seed, epoch and process, so that a resumed training gives the same result
+as one that was not interrupted.
 """
 
 from __future__ import annotations
@@ -39,33 +40,33 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Settings:
-    """How to train."""
+    """Settings of a training."""
 
     epochs: int
-    """Passes; in each, as many windows as the training drives have samples."""
+    """Number of passes, each with as many windows as the training drives have samples."""
     batch: int
-    """Windows of a batch, about, of all processes together."""
+    """Approximate number of windows of a batch, of all processes together."""
     lr: float
     """Largest learning rate."""
     turns: bool
-    """Add turns."""
+    """Whether to add turns."""
     units: bool
-    """Add other units."""
+    """Whether to add other units of the part."""
     windows: int
-    """Windows of a span; with one, the overlap has no part in the loss."""
+    """Windows of a span; with one window, the loss ignores the overlap."""
     patience: int
-    """Epochs without a better one after which it stops."""
+    """Epochs without improvement after which training stops."""
     memory: float = 0.999
-    """Of the running mean of the weights, a batch."""
+    """Decay of the running mean of the weights per batch."""
 
 
 @dataclass(frozen=True)
 class Epoch:
-    """What an epoch came to."""
+    """The result of an epoch."""
 
     epoch: int
     loss: float
-    """Mean over its batches."""
+    """Mean loss over the batches."""
     validation: Validation
 
 
@@ -76,11 +77,11 @@ class Trained:
     model: GyroNet
     validation: Validation
     epoch: int
-    """The one whose mean weights these are: the best on the validation drives."""
+    """The epoch of these weights: the best on the validation drives."""
     seconds: float
-    """Wall time."""
+    """Wall time, s."""
     epochs: list[Epoch]
-    """All that were run."""
+    """All epochs that were run."""
 
 
 def train(
@@ -91,7 +92,7 @@ def train(
     on_epoch: Callable[[Epoch], None],
     state: Path | None = None,
 ) -> Trained:
-    """Trains GyroNet; `on_epoch` hears of each epoch. Goes on from the file `state`, where it exists, and keeps it."""
+    """Trains GyroNet; calls `on_epoch` after each epoch. Resumes from the file `state` if it exists, and updates it."""
     of = {"settings": dataclasses.asdict(settings), "seed": seed, "drives": data.names}
     of["validation drives"] = [drive.sha256 for drive in validation]
     torch.manual_seed(seed)
@@ -151,12 +152,12 @@ def train(
 
 
 def best_of(epochs: list[Epoch]) -> Epoch:
-    """The epoch with the least error on the validation drives."""
+    """Returns the epoch with the least error on the validation drives."""
     return min(epochs, key=lambda epoch: epoch.validation.any_1s_rad)
 
 
 def finished(epochs: list[Epoch], settings: Settings) -> bool:
-    """Whether all epochs are run, or none was better than the best for too long."""
+    """Returns whether all epochs are run, or the last `patience` epochs brought no improvement."""
     waited = len(epochs) - best_of(epochs).epoch if epochs else 0
     return len(epochs) >= settings.epochs or waited >= settings.patience
 
@@ -170,5 +171,5 @@ def update_mean(mean: GyroNet, model: GyroNet, memory: float) -> None:
 
 @torch.no_grad()
 def calibrate(model: GyroNet, ratio: float) -> None:
-    """Multiplies the scale by a factor, in the bias of its log."""
+    """Multiplies the scale by a factor, by changing the bias of its log."""
     model.fc.bias[1] += math.log(ratio)

@@ -1,4 +1,4 @@
-"""Trajectories that a rival estimates: their form, their errors, and the file that holds them."""
+"""Trajectories that a rival estimates: their representation, their errors and their files."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .sequence import PERIOD_NS, Sequence
 
 
 class FilterError(ValueError):
-    """A filter that has diverged. Its text says when and why."""
+    """A filter has diverged. The text says when and why."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """A pose at each step, the errors' covariances (N + 1, 6, 6) at the edges, and the measurements refused."""
+    """A pose at each step, the pose covariances (N + 1, 6, 6) at the edges, and the number of refused measurements."""
 
     attitude: Rotation
     position: np.ndarray
@@ -26,8 +26,8 @@ class Track:
 
 
 def write_tum(sequence: Sequence, track: Track, path: Path) -> None:
-    """Writes the poses as `time x y z qx qy qz qw`, time in s (the stamps that are read are good to
-    a microsecond) and places in the frame of the true poses."""
+    """Writes the poses as `time x y z qx qy qz qw`, with the time in s (rounded to a microsecond, the resolution of the
+    input) and positions in the frame of the true poses."""
     with path.open("w") as file:
         for k, (place, turn) in enumerate(zip(track.position, track.attitude.as_quat())):
             whole, rest = divmod(round((sequence.start_ns + k * PERIOD_NS) / 1000), 10**6)
@@ -36,7 +36,7 @@ def write_tum(sequence: Sequence, track: Track, path: Path) -> None:
 
 
 def trajectory_error(estimate: np.ndarray, truth: np.ndarray, align: bool) -> float:
-    """The RMS distance of places in the plane, m, after the best turn and shift if `align`."""
+    """Returns the RMS distance of positions in the plane, m; with `align`, after the best rotation and shift."""
     estimate, truth = estimate[:, :2], truth[:, :2]
     if align:
         estimate, truth = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
@@ -48,8 +48,8 @@ def trajectory_error(estimate: np.ndarray, truth: np.ndarray, align: bool) -> fl
 
 
 def consistency(sequence: Sequence, track: Track) -> float:
-    """The squared error of place and heading in the plane by its covariance, mean over the edges after the first, a
-    third of it: 1 where the filter knows how wrong it is."""
+    """Returns a third of the squared error of position and heading in the plane, normalised by its covariance and
+    averaged over the edges after the first. It is 1 if the covariance is right."""
     attitude, position = track.attitude[sequence.edges], track.position[sequence.edges]
     turn = (sequence.attitude[sequence.edges] * attitude.inv()).as_rotvec()[:, 2:]
     error = np.concatenate([turn, (sequence.position[sequence.edges] - position)[:, :2]], axis=1)[1:]

@@ -1,4 +1,4 @@
-"""What a network is worth on a drive, run as the firmware runs it."""
+"""Errors of a network on a drive, run as in the firmware."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ class Validation:
     mean_1s_rad: float
     """Mean |yaw error| over consecutive 1 s windows: the number that the tools print."""
     any_1s_rad: float
-    """The same over all 1 s windows, one beginning at each sample: it scatters less."""
+    """Mean |yaw error| over all 1 s windows, one from each sample, which scatters less."""
     window_rad_per_sec: float
     """Mean |error| of the mean of a window's corrected rates."""
     scale_ratio: float
-    """That error over the scale that the network gives: 1 where it is calibrated."""
+    """The window error over the scale that the network gives, on average: 1 if the scale is calibrated."""
     log_loss: float
     """Mean Laplace log loss of the windows' errors, scale in rad/s."""
 
 
 def validate_all(model: GyroNet, drives: list[Drive]) -> Validation:
-    """Runs the network over some drives: the means of their errors, each by its length."""
+    """Runs the network on some drives; returns the means of their errors, weighted by length."""
     errors = [astuple(validate(model, drive)) for drive in drives]
     return Validation(*np.average(errors, axis=0, weights=[len(d.gyro_error) for d in drives]).tolist())
 
 
 @torch.no_grad()
 def corrections(model: GyroNet, features: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
-    """Outputs (W, N) and scales (W,) of the windows HOP apart."""
+    """Returns outputs (W, N) and scales (W,) of the windows HOP apart."""
     model.eval()
     return model(torch.from_numpy(np.ascontiguousarray(windows(features)[::HOP])))
 
 
 def validate(model: GyroNet, drive: Drive) -> Validation:
-    """Runs the network over a drive."""
+    """Runs the network on a drive; returns its errors."""
     output, scale = corrections(model, drive.features)
     rate_error = drive.gyro_error - overlap_mean(output, HOP, len(drive.gyro_error)).numpy()
     yaw_error = np.cumsum(np.append(0.0, rate_error[STATIC_SAMPLES:])) / RATE_HZ

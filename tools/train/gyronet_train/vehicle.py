@@ -1,6 +1,6 @@
-"""The vehicle file of a drive, `DRIVE.toml` beside `DRIVE.csv`: how the sensor is mounted.
+"""The mounting of the sensor, from the vehicle file of a drive (`DRIVE.toml` beside `DRIVE.csv`).
 
-Every command of `gyronet` turns the rows of a drive into the vehicle's axes by it, and so does a training.
+Training rotates the rows of a drive into the vehicle's axes, as every command of `gyronet` does.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
 
 @dataclass(frozen=True)
 class Mounting:
-    """The rotation that the rows of a drive still need, and the file that says so."""
+    """The rotation that the rows of a drive still need, and the text of the vehicle file."""
 
     rotation: np.ndarray
     text: bytes
 
     def turn(self, vectors: np.ndarray) -> np.ndarray:
-        """Turns vectors (T, 3) from the sensor's axes to the vehicle's."""
+        """Rotates vectors (T, 3) from the sensor's axes to the vehicle's."""
         return vectors @ self.rotation.T
 
 
 def read_mounting(drive: Path) -> Mounting:
-    """Read the file beside a drive; without one the rows are in the vehicle's axes. Raises ValueError that names it."""
+    """Reads the vehicle file beside a drive; without one, the rows are in the vehicle's axes. Raises ValueError."""
     path = drive.with_suffix(".toml")
     text = path.read_bytes() if path.is_file() else b""
     try:
@@ -35,9 +35,9 @@ def read_mounting(drive: Path) -> Mounting:
         applied = mounting.get("applied", False)
         angles = np.array([float(mounting.get(name, 0.0)) for name in ANGLES])
     except (ValueError, TypeError, AttributeError) as error:
-        raise ValueError(f"{path}: no vehicle file: {error}") from error
+        raise ValueError(f"{path}: not a valid vehicle file: {error}") from error
     if not (abs(angles) <= 360).all():
-        raise ValueError(f"{path}: mounting should be angles of at most 360 degrees")
+        raise ValueError(f"{path}: the angles of mounting must be at most 360 degrees")
     if applied or not angles.any():
         return Mounting(np.eye(3), b"")
     (sr, sp, sy), (cr, cp, cy) = np.sin(np.deg2rad(angles)), np.cos(np.deg2rad(angles))

@@ -58,9 +58,9 @@ class Courses(unittest.TestCase):
         self.assertLess(ratio(shares, other), 0.3)
 
     def test_a_course_that_cannot_train_is_refused_with_the_reason(self):
-        self.refused("turns by [0-9]+ degrees, needed are 90", turn=0.001)
+        self.refused("turns by [0-9]+ degrees, but 90 are needed", turn=0.001)
         self.refused("the course is known in 1 spans", seconds=20)
-        self.refused("ref_yaw turns otherwise than gyr_z", change=lambda yaw: -yaw, turn=0.5)
+        self.refused("ref_yaw disagrees with gyr_z by", change=lambda yaw: -yaw, turn=0.5)
         # Every fourth block of 10 s lies 0.4 rad beside the others.
         beside = lambda yaw: yaw + 0.4 * ((np.arange(len(yaw)) - STILL) // 1000 % 4 == 0)
         self.refused("the course jumps by more than 0.2 rad in", change=beside)

@@ -38,7 +38,7 @@ class Gaps(unittest.TestCase):
         error = self.rows[1400:, GYR_Z] - bias - self.rows[1400:, REFERENCE]
         np.testing.assert_allclose(second.gyro_error, error, atol=1e-5)
         self.assertEqual((len(first.gyro_error), len(second.gyro_error)), (1010, 1000))
-        with self.assertRaisesRegex(ValueError, "any name.csv: wants an unbroken"):
+        with self.assertRaisesRegex(ValueError, "any name.csv: must be an unbroken"):
             load_drive(self.path)
 
     def test_seconds_with_a_gap_are_left_out(self):
@@ -59,12 +59,12 @@ class Gaps(unittest.TestCase):
         np.testing.assert_allclose(first.features[5, 8], np.arange(501, 600).sum() / 1e5)
         np.testing.assert_allclose(second.features[0, 8], np.arange(1300, 1400).sum() / 1e5)
         rates.write_text("t_s,navigation,status\n11.0,0.1,ready\n11.01,0.1,ready\n")
-        with self.assertRaisesRegex(ValueError, "rates.csv: rates at times that the drive has no rows for"):
+        with self.assertRaisesRegex(ValueError, "rates.csv: has rates at times at which the drive has no rows"):
             load_grid(self.path, rates)
 
     def test_a_drive_that_begins_with_a_gap_is_named(self):
         self.write(np.concatenate([np.arange(200), np.arange(250, 2400)]))
-        with self.assertRaisesRegex(ValueError, "any name.csv: wants an unbroken 100 Hz recording of more than 3 s"):
+        with self.assertRaisesRegex(ValueError, "any name.csv: must be an unbroken 100 Hz recording of more than 3 s"):
             load_pieces(self.path)
 
     def test_rows_are_turned_as_the_vehicle_file_beside_the_drive_says(self):

@@ -46,7 +46,7 @@ class Learning(unittest.TestCase):
 
     def test_drives_that_cannot_be_learned_from_are_named(self):
         samples, labels = shaken_or_still(1, 3)
-        with self.assertRaisesRegex(DetectorError, f"a drive of 300 samples: training wants {WINDOW}"):
+        with self.assertRaisesRegex(DetectorError, f"a drive of 300 samples: training needs at least {WINDOW}"):
             train([samples], [labels], QUICK)
         samples, labels = shaken_or_still(1, 6)
         for bad in (0.0, np.nan):
@@ -98,11 +98,11 @@ class Files(unittest.TestCase):
         np.testing.assert_array_equal(read.probabilities(samples), detectors.probabilities(samples))
 
     def test_a_file_that_is_missing_or_holds_no_detectors_is_named(self):
-        with self.assertRaisesRegex(DetectorError, "detectors.safetensors: no detectors of RINS-W"):
+        with self.assertRaisesRegex(DetectorError, "detectors.safetensors: not a file of RINS-W detectors"):
             load_detectors(self.path)
         for content in (b"", b"no tensors", b"\x02\0\0\0\0\0\0\0{}"):
             self.path.write_bytes(content)
-            with self.assertRaisesRegex(DetectorError, "detectors.safetensors: no detectors of RINS-W"):
+            with self.assertRaisesRegex(DetectorError, "detectors.safetensors: not a file of RINS-W detectors"):
                 load_detectors(self.path)
 
 

@@ -88,7 +88,7 @@ class Command(unittest.TestCase):
             main()
 
     def test_a_missing_file_of_detectors_ends_it(self):
-        with self.assertRaisesRegex(SystemExit, "nothing.safetensors: no detectors of RINS-W"):
+        with self.assertRaisesRegex(SystemExit, "nothing.safetensors: not a file of RINS-W detectors"):
             file = self.folder / "nothing.safetensors"
             self.call("--detectors", file, "--test", self.folder, "--out", self.folder / "out")
 

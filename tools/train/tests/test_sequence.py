@@ -49,7 +49,7 @@ class Files(unittest.TestCase):
     def test_a_drive_that_does_not_stand_at_first_is_named(self):
         moving = make_drive(np.full(800, 5.0), np.zeros(800))
         write_kaist(moving, self.folder.parent / "moving")
-        with self.assertRaisesRegex(SequenceError, "moving: it moves in its first 3 s"):
+        with self.assertRaisesRegex(SequenceError, "moving: the vehicle moves in the first 3 s"):
             load_sequence(self.folder.parent / "moving")
 
     def test_a_drive_of_a_moment_is_named(self):

@@ -70,7 +70,7 @@ class Training(unittest.TestCase):
         self.assertEqual(find_drive(self.folder, "b").name, "b.csv")
         write_drive(self.folder / "monday 1.csv", 4)
         self.assertEqual(find_drive(self.folder, "monday").stem, "monday 1")
-        with self.assertRaisesRegex(ValueError, "no drive for the name tuesday"):
+        with self.assertRaisesRegex(ValueError, "no drive matching the name tuesday"):
             find_drive(self.folder, "tuesday")
 
 

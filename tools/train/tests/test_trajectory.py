@@ -91,5 +91,5 @@ class LeftOut(InFolder):
     def test_two_sequences_of_one_name_are_refused(self):
         for folder in ("a", "b"):
             write_kaist(start_and_go(), self.folder / folder / "made")
-        with self.assertRaisesRegex(SystemExit, "b/made: a second test sequence of the name made"):
+        with self.assertRaisesRegex(SystemExit, "b/made: a second test sequence with the name made"):
             test_all([self.folder / "a" / "made", self.folder / "b" / "made"], self.folder, [], lambda drive: {})

@@ -1,4 +1,4 @@
-//! An SLCAN line carries frames as text over anything that carries bytes.
+//! An SLCAN line carries frames as text over any byte stream.
 
 use super::{Bus, WAIT};
 use crate::client::connection::{ConnectError, Connection, is_silence};
@@ -7,14 +7,14 @@ use std::io::{ErrorKind, Read, Result, Write};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-/// The mark of a command that was refused; no line end follows.
+/// The answer to a refused command; no line end follows.
 const BELL: u8 = 7;
-/// More characters than any line has.
+/// Characters of a line that are kept; no valid line is as long.
 const LONGEST: usize = 64;
 
-/// A line that carries bytes; its reads return after a short while with what there is.
+/// A byte stream whose reads return after a short time with the bytes that have arrived.
 pub trait Line: Read + Write {
-    /// Returns the time since any moment.
+    /// Returns the time since an arbitrary but fixed moment.
     fn now(&mut self) -> Duration;
 }
 
@@ -25,11 +25,11 @@ impl Line for Connection {
     }
 }
 
-/// A line to a board or an adapter.
+/// An SLCAN line to a board or an adapter.
 pub struct SlcanBus<L> {
     line: L,
     text: Vec<u8>,
-    /// The line that an earlier program may have left in the other end's buffer has been ended.
+    /// True once a CR was sent, which ends a line that an earlier program may have left in the other end's buffer.
     is_clean: bool,
 }
 
@@ -44,7 +44,7 @@ impl SlcanBus<Connection> {
 }
 
 impl<L: Line> SlcanBus<L> {
-    /// Uses an open line.
+    /// Creates a bus on an open line.
     pub fn new(line: L) -> Self {
         Self { line, text: Vec::new(), is_clean: false }
     }
@@ -71,7 +71,7 @@ impl<L: Line> Bus for SlcanBus<L> {
         let mut frames = Vec::new();
         for byte in bytes.into_iter().take(len) {
             match byte {
-                // What is no frame is an answer to a command.
+                // A line that is not a frame is an answer to a command.
                 b'\r' => frames.extend(slcan::parse::<DataFrame>(&std::mem::take(&mut self.text))),
                 BELL => self.text.clear(),
                 _ if self.text.len() < LONGEST => self.text.push(byte),
@@ -92,7 +92,7 @@ mod tests {
     use embedded_can::Frame;
     use std::collections::VecDeque;
 
-    /// Gives these bytes, then nothing, and keeps what is written.
+    /// A line that yields these bytes, then times out, and records the written bytes.
     struct Script(VecDeque<u8>, Vec<u8>);
 
     impl Read for Script {

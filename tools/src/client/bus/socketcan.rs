@@ -1,4 +1,4 @@
-//! A CAN interface of Linux (SocketCAN), which the kernel shares among programs.
+//! A Linux CAN interface (SocketCAN), which the kernel shares among programs.
 
 use super::{Bus, WAIT};
 use crate::client::connection::ConnectError;
@@ -8,7 +8,7 @@ use socketcan::{CanFrame, CanSocket, Socket, SocketOptions};
 use std::io::{ErrorKind, Result};
 use std::time::{Duration, Instant};
 
-/// An open interface.
+/// An open CAN interface.
 pub struct Interface {
     socket: CanSocket,
     opened: Instant,

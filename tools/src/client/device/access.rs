@@ -1,4 +1,4 @@
-//! Access to a board with a key: its challenge is answered, and what is written is signed.
+//! Gets access to a board with a key: answers the board's challenge, and signs the written content.
 
 use super::requests::ACCESS;
 use super::{Authority, Device, DeviceError};
@@ -7,23 +7,23 @@ use crate::signing::unhex;
 use gyronet::uds::Session;
 use gyronet::uds::signature::SEED;
 
-/// Who may write to a board.
+/// The state of a board's access control.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct AccessState {
     /// `open` (no key is stored), `locked`, or `unlocked` for this session.
     pub state: &'static str,
     /// The counter of the newest signature that was accepted.
     pub counter: u32,
-    /// Wrong answers to challenges in a row.
+    /// Consecutive wrong answers to challenges.
     pub wrong_answers: u8,
-    /// The begin of the public key, hexadecimal.
+    /// First bytes of the public key, hexadecimal; empty if no key is stored.
     pub key: String,
     /// The serial number of the board, hexadecimal.
     pub serial: String,
 }
 
 impl<B: Bus> Device<B> {
-    /// Returns who may write.
+    /// Returns the state of the access control.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -37,7 +37,8 @@ impl<B: Bus> Device<B> {
         Ok(AccessState { state, counter: u32::from_be_bytes([a, b, c, d]), wrong_answers, key, serial })
     }
 
-    /// Enters a session, with access where a key is there; the board leaves it after five seconds of silence.
+    /// Enters a session, and unlocks a locked board with the private key, if there is one. The board leaves the
+    /// session after 5 s without a request.
     pub(super) fn enter(&mut self, session: Session) -> Result<(), DeviceError> {
         self.ask(&[0x10, session as u8])?;
         let access = self.access()?;
@@ -54,7 +55,8 @@ impl<B: Bus> Device<B> {
         self.ask(&[&[0x27, 2][..], &answer].concat()).map(drop)
     }
 
-    /// Returns the trailer of a content for this board; nothing where it has no key, or nothing to sign with.
+    /// Returns the signature trailer of a content for this board; empty if the board has no key, or without
+    /// authority.
     pub(super) fn trailer(&mut self, target: u16, content: &[u8]) -> Result<Vec<u8>, DeviceError> {
         let access = self.access()?;
         Ok(match &self.authority {
@@ -68,7 +70,7 @@ impl<B: Bus> Device<B> {
         })
     }
 
-    /// Stores the public key of those who may write; zeros for none.
+    /// Stores the public key that controls who may write; zeros remove the key.
     ///
     /// # Errors
     /// [`DeviceError`].

@@ -1,17 +1,17 @@
-//! A calibration and what the board has learnt about its sensor, as readable names and values.
+//! Converts a calibration, and what the board has learnt about its sensor, to readable names and values.
 
 use super::settings::{shortest, value};
 use gyronet::store::{Calibration, Learned};
 use gyronet::units::SpecificForce;
 use serde_json::{Value, json};
 
-/// The bias by temperature is printed at these, deg C.
+/// Temperatures at which the bias curve is printed, deg C.
 const TEMPERATURES: [f32; 6] = [-20.0, 0.0, 20.0, 40.0, 60.0, 80.0];
 
-/// Both by names with units, and where forward is, with its sigma, deg.
+/// Returns both as JSON, whose names contain the units, with the forward direction and its sigma, deg.
 ///
 /// # Errors
-/// [`serde_json::Error`], which no calibration gives.
+/// [`serde_json::Error`], which does not occur for a calibration.
 pub fn to_value(
     calibration: &Calibration,
     learned: &Learned,

@@ -1,11 +1,11 @@
-//! The errors of a request to a board.
+//! Defines the errors of a request to a board.
 
 use crate::client::connection::ConnectError;
 use gyronet::service::message::Refusal;
 use gyronet::uds::Nrc;
 use std::fmt;
 
-/// The error of a request without the expected response.
+/// The error of a request that did not get the expected response.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     /// The line cannot be opened.
@@ -14,40 +14,40 @@ pub enum DeviceError {
     /// The line cannot be used.
     #[error("{name}: {source}")]
     Line {
-        /// Its name.
+        /// Name of the line.
         name: String,
         /// The system's error.
         source: std::io::Error,
     },
-    /// The identifiers are no three of the same kind.
-    #[error("identifier {0:#x}: has too many bits, or is there twice")]
+    /// An identifier has too many bits, or is given twice.
+    #[error("identifier {0:#x}: has too many bits, or is given twice")]
     Identifier(u32),
-    /// No response came.
+    /// No response arrived.
     #[error("{name}: no response to three requests; is this the board's line, and is the board running?")]
     Silence {
-        /// The line.
+        /// Name of the line.
         name: String,
     },
     /// The board refused the request, for this reason.
     #[error("the board refuses: {0}")]
     Refused(Refusal),
-    /// The board refused the request, and has a code for it alone.
+    /// The board refused the request, and gave only a code.
     #[error("the board refuses service {service:#04x}: {code}")]
     Negative {
-        /// The service.
+        /// Identifier of the service.
         service: u8,
         /// The negative response code (ISO 14229-1 A.1).
         code: Code,
     },
-    /// The response is not one that this program knows.
-    #[error("the response is not one of this version ({} of gyronet); is the board's firmware another one?", env!("CARGO_PKG_VERSION"))]
+    /// The response does not have the layout that this program expects.
+    #[error("the response does not fit this version ({} of gyronet); does the board have another firmware version?", env!("CARGO_PKG_VERSION"))]
     Mismatch,
-    /// A request that is longer than the board takes.
+    /// The request is longer than the board accepts.
     #[error("the request is too long for the board")]
     TooLong,
 }
 
-/// A negative response code, with its name.
+/// A negative response code, which prints with its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Code(pub u8);
 

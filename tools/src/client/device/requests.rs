@@ -1,4 +1,4 @@
-//! The requests that a person has, each in diagnostic services and data identifiers (tables in [`gyronet::uds`]).
+//! The requests of a user, made of diagnostic services and data identifiers (tables in [`gyronet::uds`]).
 
 use super::{Device, DeviceError};
 use crate::client::bus::Bus;
@@ -14,9 +14,9 @@ use gyronet::uds::Session;
 use serde::de::value::{Error, SeqAccessDeserializer};
 use serde::de::{DeserializeOwned, DeserializeSeed, IntoDeserializer, SeqAccess};
 
-/// The configuration behind the version of its layout.
+/// Data identifier of the configuration, which follows the version of its layout.
 pub const CONFIGURATION: u16 = 0x0100;
-/// The wheel frames.
+/// Data identifier of the wheel frames.
 pub const WHEELS: u16 = 0x0101;
 const CALIBRATION: u16 = 0x0102;
 const PIPELINE_COUNTERS: u16 = 0x0105;
@@ -24,13 +24,13 @@ const INPUT_COUNTERS: u16 = 0x0106;
 const FOG_COUNTERS: u16 = 0x0109;
 const INFO: u16 = 0x010A;
 const CALIBRATION_STATE: u16 = 0x010C;
-/// The map of the unit's gyro.
+/// Data identifier of the map of the unit's gyro.
 pub const UNIT: u16 = 0x010D;
-/// The public key of those who may write.
+/// Data identifier of the public key that controls who may write.
 pub const KEY: u16 = 0x0110;
-/// Messages of the fibre-optic gyro.
+/// Data identifier of the number of received messages of the fibre-optic gyro.
 pub const FOG_MESSAGES: u16 = 0x0112;
-/// Who may write.
+/// Data identifier of the state of the access control.
 pub const ACCESS: u16 = 0x0111;
 const ACCESS_COUNTERS: u16 = 0x0113;
 const LEARNED: u16 = 0x0115;
@@ -42,27 +42,27 @@ pub const COUNTERS: [u8; 7] = {
     let [e, f] = FOG_COUNTERS.to_be_bytes();
     [0x22, a, b, c, d, e, f]
 };
-/// The routine that has a download used.
+/// The routine that puts a download into use.
 pub const USE_DOWNLOAD: u16 = 0xFF01;
-/// Other routines.
+/// The other routines.
 const STATIC: u16 = 0x0200;
 const MOUNTING: u16 = 0x0201;
 const STORE_CALIBRATION: u16 = 0x0202;
 const LOG: u16 = 0x0203;
 const FORGET: u16 = 0x0205;
-/// These sub-functions start and stop a routine.
+/// The sub-functions that start and stop a routine.
 const START: u8 = 1;
 const STOP: u8 = 2;
 
 type Result<T> = std::result::Result<T, DeviceError>;
 
 impl<B: Bus> Device<B> {
-    /// Addresses the board by the default identifiers; `name` stands in errors.
+    /// Creates a device with the default identifiers; `name` is the line's name in errors.
     pub fn new(bus: B, name: &str) -> Self {
         Self::with_ids(bus, name, &DiagnosisIds::DEFAULT).expect("three of 11 bits")
     }
 
-    /// Returns the identity and state.
+    /// Returns the board's identity and state.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -82,7 +82,7 @@ impl<B: Bus> Device<B> {
         versioned::<Configuration>(&self.read(CONFIGURATION)?)
     }
 
-    /// Stores a configuration, which is used from the next start on.
+    /// Stores a configuration, which takes effect after a restart.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -90,7 +90,7 @@ impl<B: Bus> Device<B> {
         self.write(CONFIGURATION, &configuration_content(configuration)?)
     }
 
-    /// Returns the wheel frames that the board receives.
+    /// Returns the settings of the wheel frames that the board receives.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -98,7 +98,7 @@ impl<B: Bus> Device<B> {
         decode(&self.read(WHEELS)?)
     }
 
-    /// Stores wheel frames, which are received from the next start on.
+    /// Stores the settings of the wheel frames, which take effect after a restart.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -114,7 +114,7 @@ impl<B: Bus> Device<B> {
         versioned::<Calibration>(&self.read(CALIBRATION)?)
     }
 
-    /// Returns what standstills have shown the board about its sensor.
+    /// Returns what the board has learnt about its sensor at standstills.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -122,7 +122,8 @@ impl<B: Bus> Device<B> {
         decode(&self.read(LEARNED)?)
     }
 
-    /// Returns where forward is in the configured axes, deg to the left of x, and its sigma, once drives have shown it.
+    /// Returns the forward direction in the configured axes, deg to the left of x, and its sigma; `None` until drives
+    /// have shown it.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -137,7 +138,7 @@ impl<B: Bus> Device<B> {
         }
     }
 
-    /// Has the board forget what standstills and drives have shown about its sensor.
+    /// Makes the board forget what it has learnt about its sensor.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -145,7 +146,7 @@ impl<B: Bus> Device<B> {
         self.routine(START, FORGET)
     }
 
-    /// Stores the map of this unit's gyro, or none, which is used from the next start on.
+    /// Stores the map of this unit's gyro, or removes it; this takes effect after a restart.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -169,7 +170,7 @@ impl<B: Bus> Device<B> {
         self.routine(STOP, STATIC)
     }
 
-    /// Returns how a calibration goes.
+    /// Returns the state of the calibration.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -177,7 +178,7 @@ impl<B: Bus> Device<B> {
         decode(&self.read(CALIBRATION_STATE)?)
     }
 
-    /// Stores what a calibration has found.
+    /// Stores the result of a calibration.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -185,7 +186,7 @@ impl<B: Bus> Device<B> {
         self.routine(START, STORE_CALIBRATION)
     }
 
-    /// Returns the events after a number, a page at most.
+    /// Returns the events after an event number, at most one page.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -203,7 +204,7 @@ impl<B: Bus> Device<B> {
         counters(&self.ask(&COUNTERS)?)
     }
 
-    /// Returns the numbers of requests that were refused for want of access since the start.
+    /// Returns the counts of requests that were refused for lack of access since the board started.
     ///
     /// # Errors
     /// [`DeviceError`].
@@ -232,7 +233,7 @@ impl<B: Bus> Device<B> {
         response.strip_prefix(&id).map(<[u8]>::to_vec).ok_or(DeviceError::Mismatch)
     }
 
-    /// Writes a data identifier, signed where the board has a key.
+    /// Writes a data identifier, with a signature if the board has a key.
     pub(super) fn write(&mut self, id: u16, content: &[u8]) -> Result<()> {
         self.enter(Session::Extended)?;
         let trailer = self.trailer(id, content)?;
@@ -246,7 +247,7 @@ impl<B: Bus> Device<B> {
     }
 }
 
-/// Returns a record as it is written, and signed.
+/// Encodes a record as it is written to a board, and signed.
 ///
 /// # Errors
 /// [`DeviceError::TooLong`].
@@ -254,7 +255,7 @@ pub fn content(record: &impl serde::Serialize) -> Result<Vec<u8>> {
     postcard::to_stdvec(record).map_err(|_| DeviceError::TooLong)
 }
 
-/// Returns a configuration as it is written, and signed: behind the version of its layout.
+/// Encodes a configuration as it is written to a board, and signed: the version of its layout, then the record.
 ///
 /// # Errors
 /// [`DeviceError::TooLong`].
@@ -273,7 +274,7 @@ fn decode<T: DeserializeOwned>(record: &[u8]) -> Result<T> {
     postcard::from_bytes(record).map_err(|_| DeviceError::Mismatch)
 }
 
-/// Decodes a record behind the version of its layout.
+/// Decodes a record that follows the version of its layout.
 fn versioned<R: Record>(bytes: &[u8]) -> Result<R> {
     match bytes.split_first() {
         Some((version, record)) if *version == R::VERSION => decode(record),
@@ -281,7 +282,7 @@ fn versioned<R: Record>(bytes: &[u8]) -> Result<R> {
     }
 }
 
-/// Reads all counters in a response to [`COUNTERS`] without its first byte.
+/// Decodes all counters from a response to [`COUNTERS`] without its first byte.
 ///
 /// # Errors
 /// [`DeviceError::Mismatch`].
@@ -301,7 +302,7 @@ pub fn counters(response: &[u8]) -> Result<AllCounters> {
     }
 }
 
-/// The words that are left of a response.
+/// The words of a response that are not decoded yet.
 struct Words<'a>(&'a [u8]);
 
 impl Words<'_> {
@@ -310,7 +311,7 @@ impl Words<'_> {
         Ok(())
     }
 
-    /// Takes as many words as a type has fields, in the order in which it declares them.
+    /// Decodes a type from as many words as it has fields, in the order of their declaration.
     fn fields<T: DeserializeOwned>(&mut self) -> Result<T> {
         T::deserialize(SeqAccessDeserializer::new(self)).map_err(|_| DeviceError::Mismatch)
     }

@@ -1,44 +1,44 @@
-//! The configuration as readable names and values.
+//! Converts the configuration to readable names and values, and back.
 //!
-//! Names are the fields', dots between the parts; rates are in rad/s, which the board holds as
-//! whole codes. The table of them is in `tools/README.md`.
+//! A name is the path of a field, with dots. Rates are in rad/s; the board stores them as integer codes.
+//! `tools/README.md` has a table of all names.
 
 use gyronet::store::Configuration;
 use gyronet::units::AngularRate;
 use serde::Serialize;
 use serde_json::Value;
 
-/// Rates that a record holds as codes: names inside `compensate`.
+/// Names inside `compensate` of the rates that a record stores as codes.
 const RATES: [&str; 3] = ["max_mean", "max_single", "max_carry"];
-/// Decimals that distinguish every two codes, rad/s.
+/// Decimals, in rad/s, that distinguish any two codes.
 const RATE_DECIMALS: usize = 9;
 
-/// The error of names and values that are no configuration.
+/// The error of a setting or of a configuration that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingError {
-    /// Text that gives no value a name.
+    /// The text is not `NAME=VALUE`.
     #[error("{0}: not NAME=VALUE")]
     NoAssignment(String),
-    /// A name that nothing has.
+    /// No setting has this name.
     #[error("{0}: there is no such setting; see `device get`")]
     Name(String),
-    /// A value that is no rate, or one that no code stands for.
+    /// The value is not a rate, or out of range.
     #[error("compensate.{name}: {value} is not a rate in rad/s")]
     Rate {
-        /// Whose.
+        /// Name of the rate inside `compensate`.
         name: &'static str,
-        /// Its value.
+        /// The refused value.
         value: Value,
     },
-    /// A part is missing, or is something else.
+    /// A part of the configuration is missing or has the wrong type.
     #[error("no configuration: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// A configuration by names, rates in rad/s.
+/// Converts a configuration to names and values, with rates in rad/s.
 ///
 /// # Errors
-/// [`SettingError::Json`], which no configuration gives.
+/// [`SettingError::Json`], which does not occur for a configuration.
 pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
     let mut value = value(configuration)?;
     for name in RATES {
@@ -51,13 +51,13 @@ pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
     Ok(value)
 }
 
-/// The configuration that names and values stand for; ranges are not checked.
+/// Converts names and values to a configuration; ranges are not checked.
 ///
 /// # Errors
 /// [`SettingError::Rate`], [`SettingError::Json`].
 pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
     for name in RATES {
-        // What is not there is missed below.
+        // `serde_json` reports a missing rate below.
         let Some(rate) = value.pointer_mut(&format!("/compensate/{name}")) else { continue };
         let refused = SettingError::Rate { name, value: rate.clone() };
         *rate = rate.as_f64().and_then(code).ok_or(refused)?.into();
@@ -65,7 +65,7 @@ pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
     Ok(serde_json::from_value(value)?)
 }
 
-/// Sets one value, `name=value`; values as in JSON.
+/// Sets one value from `name=value`, where the value is JSON.
 ///
 /// # Errors
 /// [`SettingError::NoAssignment`], [`SettingError::Name`].
@@ -75,16 +75,16 @@ pub fn assign(configuration: &mut Value, setting: &str) -> Result<(), SettingErr
         Ok(index) => value.get_mut(index),
         Err(_) => value.get_mut(key),
     });
-    // Names of parts need no quotes.
+    // A string, such as the name of a part, needs no quotes.
     *place.ok_or_else(|| SettingError::Name(name.into()))? =
         serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()));
     Ok(())
 }
 
-/// Converts a value by way of text, so that numbers are as short as they are written.
+/// Converts a value to JSON by way of text, so that floats have no more digits than they need.
 ///
 /// # Errors
-/// [`serde_json::Error`], where it is nothing that JSON knows.
+/// [`serde_json::Error`] if JSON cannot represent the value.
 pub fn value(of: &impl Serialize) -> serde_json::Result<Value> {
     serde_json::from_str(&serde_json::to_string(of)?)
 }
@@ -114,14 +114,14 @@ fn walk(name: &str, value: &Value, lines: &mut Vec<(String, String)>) {
     }
 }
 
-/// Returns a rate with as few decimals as lead back to its code.
+/// Returns a rate in rad/s with the fewest decimals that convert back to its code.
 pub(super) fn shortest(rate: AngularRate) -> f64 {
     let exact = rate.rad_per_sec();
     let mut rounded = (1..=RATE_DECIMALS).filter_map(|decimals| format!("{exact:.decimals$}").parse().ok());
     rounded.find(|rounded| code(*rounded) == Some(rate.0)).unwrap_or(exact)
 }
 
-/// Nearest code, in f64: an f32 does not hold every one.
+/// Returns the nearest code of a rate; in f64, because an f32 cannot represent every code.
 fn code(rad_per_sec: f64) -> Option<i32> {
     let code = (rad_per_sec * f64::from(AngularRate::PER_RAD_PER_SEC)).round();
     (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&code).then_some(code as i32)

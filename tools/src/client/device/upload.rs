@@ -1,4 +1,4 @@
-//! The upload of a weight file.
+//! Uploads a weight file.
 
 use super::requests::USE_DOWNLOAD;
 use super::{Device, DeviceError};
@@ -10,17 +10,17 @@ use gyronet::uds::Session;
 /// A file that the board has accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Uploaded {
-    /// The place that holds it.
+    /// The place in flash that holds the file.
     pub place: Place,
     /// The checksum that the board computed.
     pub crc: u32,
 }
 
-/// Downloads a file of a network into the board, has the board check it, and has it used from the next start on. `progress` is called
-/// with the bytes that are there.
+/// Transfers a network's weight file to the board, which checks it and uses it after a restart. `progress` is called
+/// with the number of bytes transferred so far.
 ///
 /// # Errors
-/// [`DeviceError`]; GyroNet's weights in use have not been touched then, FoGNet's may be gone.
+/// [`DeviceError`]. GyroNet's weights in use are then unchanged; FoGNet's may be erased.
 pub fn upload<B: Bus>(
     device: &mut Device<B>,
     network: Network,

@@ -1,18 +1,17 @@
-//! CAN frames in text: SLCAN lines, with time stamps or without, and `candump -L` logs.
+//! Parses CAN frames from text: SLCAN lines, with or without time stamps, and `candump -L` logs.
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::{DataFrame, slcan};
 
-/// Longest line that is read; a log's line of eight bytes has about 50 characters.
+/// Longest line that is read; a log's line with eight data bytes has about 50 characters.
 const MAX_LINE: usize = 128;
 
-/// A line that holds no frame.
+/// The error of a line without a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("neither an SLCAN line nor a line of a candump log")]
 pub struct NoFrame;
 
-/// Reads one line. The time stamp is in seconds: a log's own, or SLCAN's, which wraps every
-/// minute.
+/// Parses one line. The time stamp is in seconds: a log's own, or SLCAN's, which wraps every minute.
 ///
 /// # Errors
 /// [`NoFrame`], also for answers to commands and empty lines.
@@ -29,7 +28,7 @@ pub fn parse_line(line: &str) -> Result<(Option<f64>, DataFrame), NoFrame> {
     Ok((Some(f64::from(ms) / 1000.0), frame))
 }
 
-/// `seconds) interface ID#DATA`; eight digits of identifier are an extended one.
+/// Parses `seconds) interface ID#DATA`; an identifier with eight digits is extended.
 fn candump(rest: &str) -> Option<(Option<f64>, DataFrame)> {
     let (time, rest) = rest.split_once(')')?;
     let (id, digits) = rest.split_whitespace().nth(1)?.split_once('#')?;
@@ -47,7 +46,7 @@ fn candump(rest: &str) -> Option<(Option<f64>, DataFrame)> {
     Some((Some(time.parse().ok()?), DataFrame::new(id, &data)?))
 }
 
-/// Lines out of bytes. CR, LF and BEL (SLCAN's "no") end one; what is too long is passed over.
+/// Splits bytes into lines. CR, LF and BEL (SLCAN's "no") end a line; a line that is too long is cut off.
 #[derive(Debug, Clone, Default)]
 pub struct Splitter {
     line: Vec<u8>,
@@ -55,7 +54,7 @@ pub struct Splitter {
 }
 
 impl Splitter {
-    /// Takes a byte and returns the line that it ends, unless the line is empty.
+    /// Accepts a byte and returns the line that it ends, unless that line is empty.
     pub fn feed(&mut self, byte: u8) -> Option<String> {
         if !matches!(byte, b'\r' | b'\n' | 7) {
             self.too_long |= self.line.len() == MAX_LINE;
@@ -65,7 +64,7 @@ impl Splitter {
             return None;
         }
         let line = std::mem::take(&mut self.line);
-        // Its beginning is enough to see that it is no frame.
+        // The beginning of a line that is too long is enough to see that it is not a frame.
         self.too_long = false;
         (!line.is_empty()).then(|| String::from_utf8_lossy(&line).into_owned())
     }

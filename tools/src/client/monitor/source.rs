@@ -1,7 +1,6 @@
-//! The source of frames: a serial port, a TCP socket, or a log.
+//! A source of frames is a serial port, a TCP socket, or a log.
 //!
-//! No read lasts longer than [`WAIT`], so that whoever waits can look at the clock, redraw, or
-//! end.
+//! No read lasts longer than [`WAIT`], so that the caller can check the time, redraw, or end.
 
 use super::line::Splitter;
 use crate::client::connection::{ConnectError, Connection, is_silence};
@@ -12,7 +11,7 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 use std::time::Duration;
 
-/// Longest wait for bytes.
+/// Timeout of a read.
 pub const WAIT: Duration = Duration::from_millis(100);
 
 /// The error of a source that cannot be opened or read.
@@ -22,7 +21,7 @@ pub enum SourceError {
     /// The line cannot be opened.
     #[error(transparent)]
     Connect(#[from] ConnectError),
-    /// A file that cannot be opened.
+    /// The file cannot be opened.
     #[error("{name}: {source}")]
     Open {
         /// The name as given.
@@ -30,7 +29,7 @@ pub enum SourceError {
         /// The system's error.
         source: io::Error,
     },
-    /// The source broke while it was read.
+    /// Reading from or writing to the source failed.
     #[error("{name}: {source}")]
     Read {
         /// The name as given.
@@ -43,9 +42,9 @@ pub enum SourceError {
 /// The result of a read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Lines {
-    /// These came; none, when nothing did for [`WAIT`].
+    /// The received lines; empty if none arrived within [`WAIT`].
     Some(Vec<String>),
-    /// The log is over, or the other end has closed.
+    /// The log is at its end, or the other end has closed the connection.
     End,
 }
 
@@ -68,8 +67,8 @@ impl fmt::Debug for Source {
 }
 
 impl Source {
-    /// A file is a log, `host:port` a socket, all else a serial port, with `baud` bit/s. A line
-    /// is asked to open, as SLCAN adapters want it; ours does not need it.
+    /// Opens a source: a file is a log, `host:port` a socket, anything else a serial port at `baud` bit/s. A line
+    /// gets SLCAN's commands to set the bit rate and open, which adapters need; a board does not.
     ///
     /// # Errors
     /// [`SourceError`].
@@ -83,18 +82,18 @@ impl Source {
         let mut source = Self { name: name.into(), kind, splitter: Splitter::default() };
         let rate = bit_rate_digit(bus_bits_per_second).map(char::from);
         let rate = rate.map(|digit| format!("S{digit}\r")).unwrap_or_default();
-        // The first CR ends what may be left in the adapter's buffer.
+        // The first CR ends a line that may be left in the adapter's buffer.
         source.say(&format!("\rC\r{rate}O\r")).map_err(|error| source.broken(error))?;
         Ok(source)
     }
 
-    /// Returns whether it is a log, whose time stamps are the only clock.
+    /// Returns whether the source is a log, whose time stamps are the only clock.
     #[must_use]
     pub fn is_log(&self) -> bool {
         matches!(self.kind, Kind::Log(_))
     }
 
-    /// Returns the lines that came, after [`WAIT`] at the latest.
+    /// Returns the received lines, after at most [`WAIT`].
     ///
     /// # Errors
     /// [`SourceError::Read`].
@@ -110,7 +109,7 @@ impl Source {
         Ok(Lines::Some(lines.collect()))
     }
 
-    /// A log may end without an end of line.
+    /// Returns the last line of a log that ends without a line end.
     fn last(&mut self) -> Lines {
         self.splitter.feed(b'\n').map_or(Lines::End, |line| Lines::Some(vec![line]))
     }
@@ -129,7 +128,7 @@ impl Source {
 
 impl Drop for Source {
     fn drop(&mut self) {
-        // An adapter is closed as it was found; one that is gone needs nothing.
+        // Close the adapter, as it was found. An error means that the adapter is unavailable, so it is ignored.
         let _ = self.say("C\r");
     }
 }

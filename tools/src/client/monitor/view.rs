@@ -1,10 +1,10 @@
-//! The newest values as text, as a table row and as JSON.
+//! Formats the newest values as text, as a table row and as JSON.
 
 use super::{Counts, Monitor, State};
 use gyronet::can::yaw::Faults;
 use std::fmt;
 
-/// Fault bits by name.
+/// The fault bits and their names.
 const FAULTS: [(Faults, &str); 8] = [
     (Faults::GAP, "gap"),
     (Faults::CLIPPED, "clipped"),
@@ -24,17 +24,17 @@ pub fn fault_names(faults: Faults) -> String {
     if names.is_empty() { "none".into() } else { names.join("+") }
 }
 
-/// A number of a fixed width, or a dash.
+/// Formats a number with fixed decimals, or a dash.
 fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".into(), |value| format!("{value:.decimals$}"))
 }
 
-/// Rounds by way of text: the product of a code and its scale would print all its binary digits.
+/// Rounds a value by way of text: the product of a code and its scale would print with all binary digits.
 fn rounded(value: Option<f64>, decimals: usize) -> Option<f64> {
     value.and_then(|value| format!("{value:.decimals$}").parse().ok())
 }
 
-/// A set of messages as JSON.
+/// Returns the values of a set of messages as JSON.
 fn values(state: &State) -> serde_json::Value {
     let (source, quality) = judgement(state);
     serde_json::json!({
@@ -51,12 +51,12 @@ fn judgement(state: &State) -> (String, String) {
 }
 
 impl Monitor {
-    /// Heading of the table that [`Monitor::row`] gives a line of.
+    /// Header of the CSV file whose lines [`Monitor::row`] returns.
     pub const HEADING: &str = "time_s,rate_deg_per_s,yaw_deg,source,quality,faults,correction_deg_per_s,\
                                sigma_deg_per_s,latency_ms,drop_in_deg_per_s,lost,repeated,out_of_sequence,damaged,\
                                unreadable";
 
-    /// The newest values as one line of a CSV file; empty where not known.
+    /// Returns the newest values as one line of a CSV file; unknown values are empty.
     #[must_use]
     pub fn row(&self, time: f64) -> String {
         let known = |value: Option<f64>, decimals: usize| {
@@ -77,8 +77,8 @@ impl Monitor {
         )
     }
 
-    /// The newest values, a fibre-optic gyro's too, and all counts as one line of JSON; names, units and decimals as in
-    /// [`Monitor::row`], null where not known.
+    /// Returns the newest values, those of a fibre-optic gyro too, and all counts as JSON. Names, units and decimals
+    /// are those of [`Monitor::row`]; unknown values are null.
     #[must_use]
     pub fn json(&self, time: f64) -> serde_json::Value {
         let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
@@ -101,7 +101,7 @@ impl Monitor {
         all
     }
 
-    /// The newest values as one line for people.
+    /// Returns the newest values as one line of readable text.
     #[must_use]
     pub fn line(&self, time: f64) -> String {
         let (source, quality) = judgement(&self.state);
@@ -117,7 +117,7 @@ impl Monitor {
     }
 }
 
-/// A line for a terminal: what it is, its value, and what is to be said of that.
+/// Writes a line for a terminal: name, value, and unit or remark.
 fn row(
     f: &mut fmt::Formatter<'_>,
     name: &str,
@@ -136,7 +136,7 @@ fn rows(f: &mut fmt::Formatter<'_>, state: &State) -> fmt::Result {
     row(f, "faults", fault_names(state.faults), "")
 }
 
-/// A few lines for a terminal.
+/// Writes the newest values and all counts as lines for a terminal.
 impl fmt::Display for Monitor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let State { correction, sigma, latency, .. } = self.state;

@@ -1,4 +1,4 @@
-//! A set of yaw messages (rate, angle, detail), checked and decoded.
+//! Checks and decodes a set of yaw messages: rate, angle, detail.
 
 use super::MAX_DELTA;
 use embedded_can::{Id, StandardId};
@@ -6,16 +6,16 @@ use gyronet::can::e2e::{Checker, Fault, Profile, Verdict};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, Faults, Quality, RateMessage};
 use gyronet::can::yaw::{SIGMA_UNKNOWN, Source};
 
-/// The newest values of a set.
+/// The newest values of a set of yaw messages.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct State {
-    /// Corrected rate, deg/s, where available.
+    /// Corrected rate, deg/s; `None` if not available.
     pub rate: Option<f64>,
     /// The source of the rate, and its quality.
     pub judgement: Option<(Source, Quality)>,
     /// Yaw turned since the first angle message, deg, not wrapped.
     pub yaw: Option<f64>,
-    /// The present faults.
+    /// The faults of the newest angle message.
     pub faults: Faults,
     /// The correction that was subtracted, deg/s.
     pub correction: Option<f64>,
@@ -25,16 +25,16 @@ pub struct State {
     pub latency: Option<f64>,
 }
 
-/// The message of a set.
+/// Names a message of the set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Rate,
     Angle,
-    /// The last one of a sample.
+    /// The detail message, which is the last one of a sample.
     Detail,
 }
 
-/// Three messages, and what they have said.
+/// The three messages of a set, and their newest values.
 #[derive(Debug, Clone)]
 pub(super) struct YawSet {
     messages: Vec<(Id, Part, Checker)>,
@@ -44,7 +44,7 @@ pub(super) struct YawSet {
 }
 
 impl YawSet {
-    /// Identifiers and protection of rate, angle, detail.
+    /// Creates a set from the identifiers and E2E profiles of rate, angle and detail.
     pub(super) fn new(ids: [u16; 3], profiles: [Profile; 3]) -> Self {
         let checkers = profiles.map(|profile| Checker::new(profile, MAX_DELTA));
         let parts = [Part::Rate, Part::Angle, Part::Detail].into_iter().zip(checkers);
@@ -58,7 +58,7 @@ impl YawSet {
         self.state
     }
 
-    /// Checks a message, and reads it where it may be used; `None` where it is none of the set.
+    /// Checks a message, and decodes it if it may be used; returns `None` if it is not in the set.
     pub(super) fn take(&mut self, id: Id, data: &[u8]) -> Option<(Part, Result<Verdict, Fault>)> {
         let (_, part, checker) = self.messages.iter_mut().find(|(own, ..)| *own == id)?;
         let (part, verdict) = (*part, checker.check(data));
@@ -81,7 +81,7 @@ impl YawSet {
 
     fn take_angle(&mut self, data: &[u8]) {
         if let Ok(message) = AngleMessage::parse(data) {
-            // The difference in 32 bits is the angle turned, lost messages included.
+            // The difference modulo 2^32 is the angle turned, also across lost messages.
             if let Some(last) = self.last_yaw.replace(message.yaw) {
                 self.turned += i64::from(message.yaw.wrapping_sub(last));
             }

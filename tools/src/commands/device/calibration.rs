@@ -1,4 +1,4 @@
-//! The calibration of a board that stands still.
+//! Calibrates a board that stands still, and reads and changes its calibration.
 
 use super::{Board, print_value};
 use clap::ValueEnum;
@@ -14,19 +14,19 @@ pub enum What {
     Static,
     /// Measure roll and pitch of the sensor at rest on level ground.
     Mounting,
-    /// Store the gain and mounting that `gyronet calibrate` found; wants --file.
+    /// Store the gain and mounting that `gyronet calibrate` found; needs --file.
     Unit,
     /// Remove the stored gain and mounting.
     NoUnit,
-    /// Forget what the board has learnt, after another sensor was fitted or the sensor was moved.
+    /// Erase what the board has learnt, after another sensor was fitted or the sensor was moved.
     Forget,
-    /// Print the calibration, and what the board has learnt: the bias by temperature, and where forward is.
+    /// Print the calibration, and what the board has learnt: the bias curve and the forward direction.
     Show,
-    /// Stop without a result.
+    /// Cancel the running calibration without a result.
     Cancel,
 }
 
-/// Three seconds at rest, and as many again for a slow line.
+/// Longest time for the 3 s at rest, with a margin for a slow line.
 const LIMIT: Duration = Duration::from_secs(10);
 const POLL: Duration = Duration::from_millis(200);
 
@@ -68,12 +68,12 @@ pub fn run(
             State::Running(_) if task.is_some() => {
                 if Instant::now() > until {
                     device.cancel_calibration()?;
-                    return Err("no three seconds of samples have come from the sensor".into());
+                    return Err("the sensor has not sent 3 s of samples".into());
                 }
                 std::thread::sleep(POLL);
             }
             State::Failed(_, fault) if task.is_some() => {
-                return Err(format!("nothing was found: {fault}").into());
+                return Err(format!("the calibration failed: {fault}").into());
             }
             _ => {
                 if store {

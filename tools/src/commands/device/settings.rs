@@ -1,4 +1,4 @@
-//! The configuration of a board, read and changed.
+//! Reads and changes the configuration of a board.
 
 use super::{Board, done};
 use gyronet::store::{Configuration, Record};
@@ -12,14 +12,17 @@ pub fn print(configuration: &Configuration, json: bool) -> Result<()> {
     super::print_value(&to_value(configuration)?, json)
 }
 
-/// Changes what the board has now, value by value, or replaces it.
+/// Changes single values of the board's configuration, replaces it by a file, or writes wheel frames.
 pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: bool) -> Result<()> {
     if settings.is_empty() && file.is_none() {
         return Err("nothing to set: give NAME=VALUE, or --file".into());
     }
     if let Some(path) = file.filter(|path| path.extension().is_some_and(|end| end == "toml")) {
         if !settings.is_empty() {
-            return Err("NAME=VALUE beside a file of wheel frames: set one, then the other".into());
+            return Err(
+                "NAME=VALUE and a file of wheel frames cannot be set together: set one, then the other"
+                    .into(),
+            );
         }
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| format!("{name}: {e}"))?;
@@ -43,7 +46,7 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
     Ok(done(json, "stored; it takes effect after a restart")?)
 }
 
-/// Prints the wheel frames as the file that sets them.
+/// Prints the settings of the wheel frames as a file for `set --file`.
 pub fn print_wheels(device: &mut Board, json: bool) -> Result<()> {
     let file = WheelFile::of(&device.wheels()?);
     if json {

@@ -1,4 +1,4 @@
-//! This module reads the rows of a recording one at a time, so that a long drive needs no more memory than a short one.
+//! This module reads a recording row by row, so that a long drive needs no more memory than a short one.
 
 use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault, ValueError};
@@ -16,14 +16,14 @@ const REFERENCE: &str = "ref_gyr_z";
 const COURSE: &str = "ref_yaw";
 const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
 
-/// The sensor's time on the wire counts at 10 kHz.
+/// Rate of the sensor's time counter, Hz.
 const TICKS_PER_SECOND: f64 = 1e4;
 const MICROS_PER_TICK: u64 = 100;
 
-/// Holds the name of a column and its index.
+/// Name and index of a column.
 type Column = (&'static str, usize);
 
-/// Holds the places of the columns.
+/// The columns of a recording.
 #[derive(Debug, Clone)]
 struct Columns {
     time: Column,
@@ -37,7 +37,7 @@ struct Columns {
 impl Columns {
     fn find(path: &str, header: &StringRecord) -> Result<Self, DataError> {
         let optional = |name: &'static str| {
-            // Spreadsheets begin a file with a byte order mark.
+            // Spreadsheet programs write a byte order mark at the start of a file.
             let at = header.iter().position(|field| field.trim_start_matches('\u{feff}') == name)?;
             Some((name, at))
         };
@@ -58,8 +58,8 @@ impl Columns {
     }
 }
 
-/// Reads the rows of a recording, each checked by itself and against the time of the one before. [`super::Recording`]
-/// checks the drive as a whole.
+/// An iterator over the rows of a recording. It checks each row, and that time increases; [`super::Recording`] checks
+/// the drive as a whole.
 pub struct Reader<R> {
     path: String,
     columns: Columns,
@@ -73,7 +73,7 @@ impl<R: std::io::Read> Reader<R> {
     /// Reads the header; `path` is for messages.
     ///
     /// # Errors
-    /// [`DataError`]: no header, or not the columns that are needed.
+    /// [`DataError`]: there is no header, or a required column is missing.
     pub fn new(path: &str, input: R) -> Result<Self, DataError> {
         let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
         let header = csv.headers().map_err(|error| csv_error(path, error))?;
@@ -92,7 +92,7 @@ impl<R: std::io::Read> Reader<R> {
         })
     }
 
-    /// Turns the rows into the vehicle's axes.
+    /// Rotates the rows into the vehicle's axes.
     #[must_use]
     pub fn mounted(self, vehicle: &Vehicle) -> Self {
         Self { rotation: vehicle.mounting.rotation(), ..self }
@@ -147,7 +147,7 @@ impl<R: std::io::Read> Iterator for Reader<R> {
     }
 }
 
-/// Gives access to the fields of one row.
+/// The fields of one row.
 struct Fields<'a> {
     path: &'a str,
     line: u64,
@@ -186,7 +186,7 @@ impl Fields<'_> {
     fn time(&self, column: Column) -> Result<Micros, DataError> {
         let seconds = self.optional(column)?.ok_or_else(|| self.error(column, ValueError::Empty))?;
         let ticks = (seconds * TICKS_PER_SECOND).round();
-        // Up to 2^53 a tick is exact.
+        // An f64 holds every integer up to 2^53.
         if !(0.0..9.0e15).contains(&ticks) {
             return Err(self.error(column, ValueError::OutOfRange));
         }

@@ -1,4 +1,4 @@
-//! These tests provoke each typed error with a recording made for it.
+//! These tests provoke each typed error with a suitable recording.
 
 use super::*;
 use std::fmt::Write;

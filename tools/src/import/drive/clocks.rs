@@ -1,4 +1,4 @@
-//! This module lays the clocks of several files on that of the IMU's, by the yaw rates that they have in common.
+//! This module aligns the clocks of several files with the clock of the IMU's file, by the yaw rates that both have.
 
 use super::{Request, channels};
 use crate::drive::DT;
@@ -9,7 +9,7 @@ use crate::import::error::ImportError;
 use crate::import::grid::{Grid, Stream};
 use crate::import::select::{Channel, File, Selection};
 
-/// Returns what is added to the times of each file.
+/// Returns the offset to add to the times of each file, s.
 pub(super) fn offsets(
     files: &[File],
     selection: &Selection<'_>,
@@ -30,7 +30,10 @@ pub(super) fn offsets(
         let clock =
             |reason| ImportError::Clock { path: path.clone(), first: files[main].path.clone(), reason };
         let (rate, of) = rate_of(file, selection, &request.vehicle).ok_or_else(|| {
-            clock("it has no yaw rate to compare: name one, or give --same-clock".to_owned())
+            clock(
+                "the file has no yaw rate to compare: name a channel with one, or pass --same-clock"
+                    .to_owned(),
+            )
         })?;
         let Offset { seconds, coefficient } = align::offset(&turning, &rate).map_err(clock)?;
         report.push(format!(
@@ -41,7 +44,7 @@ pub(super) fn offsets(
     Ok(offsets)
 }
 
-/// Returns a yaw rate of a file: the vehicle's own, that of its odometry, its wheels' difference, or its course's change.
+/// Returns a yaw rate of a file and its name: the reference, odometry, wheel difference, or change of course.
 fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<(Vec<(f64, f64)>, String)> {
     let here = |channel: &Option<Channel<'_>>| channel.as_ref().is_some_and(|channel| channel.file == file);
     let own = [&selection.reference_rate, &selection.odometry].into_iter().find(|channel| here(channel));
@@ -78,12 +81,12 @@ fn rate_of(file: usize, selection: &Selection<'_>, vehicle: &Vehicle) -> Option<
     Some((courses.windows(2).filter_map(change).collect(), "the change of the course".to_owned()))
 }
 
-/// Returns a rate as far as it is compared, with at most one value in 10 ms.
+/// Returns the part of a rate that is compared; values that are closer than 5 ms are averaged.
 fn thinned<'a>(stream: impl Fn() -> Stream<'a, 1>) -> Vec<(f64, f64)> {
     let start = stream().next().map_or(0.0, |(seconds, _)| seconds);
     let near = stream().take_while(|(seconds, _)| seconds - start < align::LONGEST);
     let mut thin: Vec<(f64, f64)> = Vec::new();
-    // The values that are in the last mean.
+    // Number of values in the last mean.
     let mut count = 0.0;
     for (seconds, [rate]) in near {
         match thin.last_mut() {

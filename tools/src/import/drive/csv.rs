@@ -1,13 +1,13 @@
-//! This module writes a drive as the CSV that every command reads.
+//! This module writes an imported drive as the CSV that every command reads.
 
 use super::{Drive, Seen, channels};
 use std::io::{self, Write};
 
 impl Drive<'_> {
-    /// Writes the drive as the CSV that every command reads; columns that are empty throughout are left out.
+    /// Writes the drive as CSV; columns that are empty in every row are left out.
     ///
     /// # Errors
-    /// The writer's.
+    /// The writer's error, or that of a temporary file.
     pub fn write_csv(&self, mut out: impl Write) -> io::Result<()> {
         let Seen { reference, course, wheels, .. } = self.seen;
         write!(out, "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z")?;

@@ -1,5 +1,5 @@
-//! This module makes FoGNet's weight file. The part that is linear in the gyro's increments is multiplied out in f64
-//! and stays exact ([`gyronet::model::fognet`]); the LSTMs and their rows are quantised as GyroNet's.
+//! This module writes FoGNet's weight file. The part that is linear in the gyro's increments is multiplied out in f64
+//! and not quantised to int8 ([`gyronet::model::fognet`]); the LSTMs are quantised as GyroNet's.
 
 use super::{QuantizeError, Report, fixed, header, provenance, rows, seal};
 use crate::network::checkpoint::{Checkpoint, FogNet};
@@ -9,11 +9,11 @@ use gyronet::model::fognet_blob::{self, CORRECTION_SHIFT, FogBlob, Gyro, INPUTS,
 use gyronet::nn::{HIDDEN_MAX, dense::Dense};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 
-/// Network inputs are clamped to this many standard deviations: means over a second leave fewer
-/// outliers than single samples do, and smaller limits leave more room in the accumulators.
+/// Standard deviations to which network inputs are clamped. Means over a second have fewer outliers than single
+/// samples, and a lower limit leaves more room in the accumulators.
 pub const INPUT_CLAMP_STD: f64 = 16.0;
 
-/// Makes FoGNet's weight file.
+/// Quantises a checkpoint of FoGNet; returns the weight file and its figures.
 ///
 /// # Errors
 /// [`QuantizeError`].
@@ -39,7 +39,7 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     let f1 = (tensors.tensor("fc1.weight"), tensors.tensor("fc1.bias")[0]);
     rows::dense(&mut body, "FC1", f1, (f64::from(HIDDEN_MAX), Dense::SHIFT))?;
     lstm(&mut body, "lstm2", 3)?;
-    // The bias of FC2 is in the offset.
+    // The bias of FC2 is part of the offset.
     let f2 = (tensors.tensor("fc2.weight"), 0.0);
     rows::dense(&mut body, "FC2", f2, (of_f2 * f64::from(Angle::PER_RAD), CORRECTION_SHIFT))?;
 
@@ -49,7 +49,7 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     let force = f64::from(SpecificForce::PER_METRE_PER_SEC2);
     let rate = f64::from(AngularRate::PER_RAD_PER_SEC);
     let way = f64::from(1u32 << WheelSpeed::FRACTION_BITS);
-    // The gyro's increment is a turn in one second.
+    // The last input is the gyro's increment over one second, so it has the unit of a rate.
     let codes: [f64; INPUTS] = [force, force, force, rate, rate, rate, way, way, rate];
     let mut file = header(tensors, fognet_blob::TOPOLOGY, lengths, clamp, &codes)?;
 
@@ -77,7 +77,7 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     Ok((file, report))
 }
 
-/// Returns what the network was trained on, by the provenance.
+/// Returns the gyro that the network was trained for, from the provenance.
 fn training(tensors: &Tensors) -> Result<Training, QuantizeError> {
     #[derive(serde::Deserialize)]
     struct Found {

@@ -5,7 +5,7 @@ use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::reference::LstmWeights;
 use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, pack};
 
-/// Holds a quantised gate row.
+/// A quantised gate row.
 #[derive(Debug, Clone)]
 struct Row {
     bias: i32,
@@ -73,7 +73,7 @@ fn quantize_row(
         }
         let scale = multiplier / f64::from(1 << 20);
         let int8 = |values: &[f64]| values.iter().map(|w| (w / scale).round() as i8).collect::<Vec<i8>>();
-        // Half an LSB of the gate input makes the kernel's shift round to nearest.
+        // Adding half an LSB of the gate input makes the kernel's shift round to nearest.
         let half = f64::from(1 << 15) / multiplier;
         let bias = bias / scale * f64::from(1 << HIDDEN_FRACTION_BITS) + half;
         let candidate = Row {
@@ -108,8 +108,7 @@ fn pack_columns(out: &mut Vec<u8>, [i, f, g, o]: [&[i8]; GATES]) {
     }
 }
 
-/// Writes a row of an output layer; `codes` of its output, with that many fraction bits in the multiplier, make one
-/// unit.
+/// Writes a row of an output layer. An output unit is `codes` codes; the multiplier has `shift` fraction bits.
 pub(super) fn dense(
     out: &mut Vec<u8>,
     what: &str,
@@ -118,7 +117,7 @@ pub(super) fn dense(
 ) -> Result<(), QuantizeError> {
     let largest = weights.iter().fold(0.0f64, |max, w| max.max(f64::from(w.abs())));
     let sum: f64 = weights.iter().chain([&bias]).map(|w| f64::from(w.abs())).sum();
-    // Weights have 14 bits, unless the sum, in units of scale x 2^-10, would exceed 31.
+    // Weights have 14 bits, unless the sum, in units of scale x 2^-10, would need more than 31.
     let scale = (largest / f64::from(1 << 14)).max(1.001 * sum / f64::from(1 << 21)).max(f64::MIN_POSITIVE);
     for weight in weights {
         out.extend(((f64::from(*weight) / scale).round() as i16).to_le_bytes());

@@ -1,5 +1,5 @@
-//! This module keeps a marker for each finished step: a file that says from what it was made, so that a step is run again
-//! when its command or one of its inputs has changed, and only then.
+//! This module keeps a marker file for each finished step. The marker records the step's command and inputs, so that
+//! a step is run again only if one of these has changed.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -7,36 +7,36 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 use std::{fs, io};
 
-/// Says from what a step was made.
+/// Holds the command and the inputs of a finished step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
     /// The command and its arguments.
     pub command: Vec<String>,
-    /// The files that it read, each with its length and the time of its last change.
+    /// The files that the step read, each with its length and modification time.
     pub inputs: Vec<String>,
-    /// The steps whose results it read, with the hashes of their markers.
+    /// The steps whose results the step read, with the hashes of their markers.
     pub steps: Vec<String>,
-    /// The time that it took, s.
+    /// Run time of the step, s.
     pub seconds: f64,
 }
 
 impl Marker {
-    /// Returns the marker of a step that would be run now.
+    /// Returns the marker that a step would get if it were run now.
     ///
     /// # Errors
-    /// The file system's error, of a file that cannot be read.
+    /// The file system's error if a file cannot be read.
     pub fn of(command: Vec<String>, inputs: &[PathBuf], steps: Vec<String>) -> io::Result<Self> {
         let inputs = inputs.iter().map(|path| stamp(path)).collect::<io::Result<_>>()?;
         Ok(Self { command, inputs, steps, seconds: 0.0 })
     }
 
-    /// Reads the marker of a finished step; `None` where there is none that can be read.
+    /// Reads the marker of a finished step; `None` if there is no readable marker.
     #[must_use]
     pub fn read(path: &Path) -> Option<Self> {
         serde_json::from_slice(&fs::read(path).ok()?).ok()
     }
 
-    /// Writes the marker, whole or not at all.
+    /// Writes the marker atomically.
     ///
     /// # Errors
     /// The file system's error.
@@ -46,13 +46,13 @@ impl Marker {
         fs::rename(unfinished, path)
     }
 
-    /// Says whether two markers are of the same command on the same inputs.
+    /// Returns whether two markers have the same command and inputs.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.hash() == other.hash()
     }
 
-    /// Returns the hash of all but the time.
+    /// Returns the hash of everything except the run time.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hash = Sha256::new();

@@ -5,61 +5,62 @@ use crate::simulate::layout::Layout;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Names the program of a step.
+/// Names the program that runs a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
-    /// This command itself.
+    /// This command, gyronet.
     Gyronet,
     /// A Python with PyTorch, and `tools/train` on its path.
     Python,
 }
 
-/// Holds an argument, or some that belong together.
+/// An argument of a step, or several that belong together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Argument {
-    /// It is always given.
+    /// An argument that is always given.
     Always(String),
-    /// They are given if another step has been finished.
+    /// Arguments that are given only if another step, named first, is finished.
     If(String, Vec<String>),
 }
 
-/// Holds a step.
+/// A step of the plan: one command.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
-    /// Its name.
+    /// Name of the step.
     pub name: String,
     /// The program.
     pub program: Program,
     /// The arguments.
     pub arguments: Vec<Argument>,
-    /// The files that it reads, beside what other steps have made.
+    /// The files that the step reads, other than the output of other steps.
     pub inputs: Vec<PathBuf>,
-    /// The step without which this one cannot be run.
+    /// The step that must be finished before this one.
     pub needs: Option<String>,
-    /// The file that it makes, if it makes one.
+    /// The file that the step writes, if any.
     pub output: Option<PathBuf>,
 }
 
-/// Says how to train.
+/// Describes how much to train.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Effort {
     /// Epochs of GyroNet, for each of its seeds.
     pub gyronet_epochs: u32,
-    /// Seeds of GyroNet, from 1 on; the best is kept.
+    /// Number of seeds of GyroNet, starting from 1; the best is kept.
     pub gyronet_seeds: u32,
     /// Epochs of FoGNet.
     pub fognet_epochs: u32,
-    /// Steps of lwoi's two processes.
+    /// Training steps of lwoi's two Gaussian processes.
     pub lwoi_steps: u32,
-    /// The processes see one in so many windows: their memory and time grow with the square of the windows and more.
+    /// The Gaussian processes are trained on every Nth window, because memory and time grow at least with the square
+    /// of the number of windows.
     pub lwoi_every: u32,
-    /// Steps of each of RINS-W's detectors.
+    /// Training steps of each of RINS-W's detectors.
     pub rinsw_steps: u32,
 }
 
 impl Effort {
-    /// The numbers of `tools/PAPER.md` were made with this plan.
+    /// The effort with which the numbers of `tools/PAPER.md` were computed.
     pub const FULL: Self = Self {
         gyronet_epochs: 20,
         gyronet_seeds: 3,
@@ -68,7 +69,7 @@ impl Effort {
         lwoi_every: 2,
         rinsw_steps: 1200,
     };
-    /// This plan is for a trial: every step is run, and nothing is trained well.
+    /// The effort of a trial: every step is run, and nothing is trained well.
     pub const TRIAL: Self = Self {
         gyronet_epochs: 1,
         gyronet_seeds: 1,
@@ -79,13 +80,13 @@ impl Effort {
     };
 }
 
-/// Ends the name of the step that makes the rates of a drive.
+/// Suffix of the name of the step that computes the rates of a drive.
 const RATES: &str = "-rates";
 
-/// Chooses the uses of sequences.
+/// Selects sequences by their role.
 type Choice = fn(Role) -> bool;
 
-/// Builds a step.
+/// A builder of a [`Step`].
 struct Builder(Step);
 
 impl Builder {
@@ -114,7 +115,7 @@ impl Builder {
     }
 }
 
-/// Returns the steps for a data set; all that they make goes below `out`. `inputs` lists the files of a sequence.
+/// Returns the steps for a data set, which write below `out`. `inputs` lists the files of a sequence.
 #[must_use]
 pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) -> Vec<PathBuf>) -> Vec<Step> {
     let set = match split.layout {
@@ -127,7 +128,7 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
     let csv = |name: &str| format!("{name}.csv");
     let show = |path: &Path| path.display().to_string();
     let used = |role: Choice| split.members.iter().filter(move |member| role(member.role));
-    // What a sequence's step leaves, one argument for each sequence that could be read; `suffix` names a later step of it.
+    // Returns one argument for each selected sequence whose step, named with `suffix`, is finished.
     let left =
         |suffix: &str, role: Choice, before: Option<&str>, text: &dyn Fn(&super::split::Member) -> String| {
             let arguments = used(role).map(|member| {
@@ -169,7 +170,8 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
         .text(&[&"--validate"])
         .given(of(validate, None, &|member| csv(&member.name)));
     steps.push(gyronet.makes(networks.join("gyronet.safetensors")));
-    // The sequences of a data set have one gyro; of simulated ones a network is for the device that it was trained on.
+    // All sequences of a data set have one gyro. If they are simulated, a network is for the device that it was
+    // trained on.
     let device = used(train).find_map(|member| member.device);
     let part = match split.layout {
         Layout::Kaist => "DSP-1760",
@@ -206,7 +208,7 @@ pub fn plan(split: &Split, effort: Effort, out: &Path, inputs: impl Fn(&Path) ->
         quantize("fognet"),
     ]);
 
-    // The pseudo-FoG: a FoGNet on the rate that GyroNet makes of the inertial sensor.
+    // The pseudo-FoG is a FoGNet that corrects GyroNet's rate of the inertial sensor.
     let rates = out.join("rates");
     for member in used(|role| role != Role::Test) {
         let file = rates.join(csv(&member.name));

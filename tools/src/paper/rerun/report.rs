@@ -1,5 +1,5 @@
-//! This module writes the report of a run: what was made and kept, what is missing, what was left out and why, what each
-//! sequence's files hold, and the tables.
+//! This module writes the report of a run: the result of each step, the missing and omitted sequences with the
+//! reasons, a summary of each sequence's files, and the tables.
 
 use super::plan::Effort;
 use super::run::{Outcome, Outcomes, log};
@@ -10,17 +10,17 @@ use std::fmt::{self, Write};
 use std::fs;
 use std::path::Path;
 
-/// Holds what there is to say of a data set.
+/// Holds the results of a data set.
 #[derive(Debug, Serialize)]
 pub struct Set {
-    /// The sequences.
+    /// The sequences and their roles.
     #[serde(flatten)]
     pub split: Split,
-    /// The steps.
+    /// The steps and their outcomes.
     pub steps: Outcomes,
 }
 
-/// Holds what there is to say of a run.
+/// Holds the results of a run.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// Says how the networks were trained.
@@ -37,7 +37,7 @@ impl Set {
         }
     }
 
-    /// Returns the steps that have no result, and why.
+    /// Returns the steps without a result, each with the reason.
     pub fn left_out(&self) -> impl Iterator<Item = (&str, &str)> {
         self.steps.iter().filter_map(|(name, outcome)| match outcome {
             Outcome::Failed(why) | Outcome::LeftOut(why) => Some((name.as_str(), why.as_str())),
@@ -47,7 +47,7 @@ impl Set {
 }
 
 impl Report {
-    /// Returns what is not in the tables: what is missing, unused and left out, a line each.
+    /// Returns one line for each missing, unused and omitted item, which the tables do not contain.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let mut lines = Vec::new();
@@ -62,7 +62,7 @@ impl Report {
         lines
     }
 
-    /// Says whether every step has its result.
+    /// Returns whether every step has a result.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.sets.iter().all(|set| set.left_out().next().is_none())
@@ -71,11 +71,11 @@ impl Report {
     /// Returns the report in Markdown; the logs of the steps are below `out`.
     ///
     /// # Errors
-    /// None but the formatter's.
+    /// Only the formatter's error.
     pub fn markdown(&self, out: &Path) -> Result<String, fmt::Error> {
         let mut text = String::from("# The paper's tables, run again\n\n");
         if self.sets.iter().any(|set| set.split.members.iter().any(|member| member.device.is_some())) {
-            writeln!(text, "**Some sequences are simulated: none of their figures is one of a road.**\n")?;
+            writeln!(text, "**Some sequences are simulated: their figures are not from a real drive.**\n")?;
         }
         if self.effort != Effort::FULL {
             writeln!(text, "**Not trained as by default:** {:?}\n", self.effort)?;
@@ -87,8 +87,8 @@ impl Report {
             text += "Nothing.\n";
         }
         text += "\nTrained on the paper's training sequences; its validation sequences, which the tables have too, chose epochs \
-                 and seeds. The paper names none of NCLT: here these are the last two of its 18. The rivals read the layout of \
-                 KAIST Urban alone. Sequences with gaps are trained on in pieces; in tests a gap is bridged.\n";
+                 and seeds. The paper names none for NCLT: here they are the last two of its 18. The rivals read only the layout \
+                 of KAIST Urban. Training cuts sequences at gaps; tests bridge gaps.\n";
         for set in &self.sets {
             self.set(set, out, &mut text)?;
         }
@@ -101,7 +101,7 @@ impl Report {
         for (name, outcome) in &set.steps {
             let (result, seconds) = match outcome {
                 Outcome::Made(seconds) => ("made", *seconds),
-                Outcome::Kept(seconds) => ("kept from before", *seconds),
+                Outcome::Kept(seconds) => ("kept from an earlier run", *seconds),
                 Outcome::Failed(_) => ("failed", 0.0),
                 Outcome::LeftOut(_) => ("left out", 0.0),
             };

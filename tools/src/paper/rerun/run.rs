@@ -1,4 +1,4 @@
-//! This module runs the steps of a plan, but for those that are finished already.
+//! This module runs the steps of a plan, except those that are already finished.
 
 use super::marker::Marker;
 use super::plan::{Argument, Program, Step};
@@ -10,37 +10,37 @@ use std::{fs, io};
 
 /// Runs the command of a step.
 pub trait Runner {
-    /// Returns the program's file.
+    /// Returns the path or name of the program.
     fn program(&self, program: Program) -> String;
 
-    /// Returns the files of the program itself; when one changes, its steps are run again.
+    /// Returns the files of the program's code; when one changes, the program's steps are run again.
     fn files(&self, program: Program) -> Vec<PathBuf>;
 
-    /// Runs a command, its program first, and writes what it prints to a file. The error is one line.
+    /// Runs a command, whose first element is the program, and writes its output to the file `log`.
     ///
     /// # Errors
-    /// The reason why it failed.
+    /// The reason of the failure, in one line.
     fn run(&mut self, program: Program, command: &[String], log: &Path) -> Result<(), String>;
 }
 
-/// Says what became of a step.
+/// The outcome of a step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// It was run, in this time, s.
+    /// The step was run, in this time, s.
     Made(f64),
-    /// It was finished before; then it took this time, s.
+    /// The step was finished in an earlier run, which took this time, s.
     Kept(f64),
-    /// It failed.
+    /// The step failed, for this reason.
     Failed(String),
-    /// It was not run, because the step that it needs failed.
+    /// The step was not run, because a step that it needs failed.
     LeftOut(String),
 }
 
-/// Holds a step that was run or not, by its name.
+/// The names and outcomes of the steps, in order.
 pub type Outcomes = Vec<(String, Outcome)>;
 
-/// Returns the file of what a step printed.
+/// Returns the path of a step's log.
 #[must_use]
 pub fn log(out: &Path, step: &str) -> PathBuf {
     out.join("logs").join(step.replace('/', "-") + ".log")
@@ -50,11 +50,11 @@ fn marker(out: &Path, step: &str) -> PathBuf {
     out.join("steps").join(step.replace('/', "-") + ".json")
 }
 
-/// Runs the steps in their order. A step that fails stops none but those that need it. `tell` is called with the number
-/// and the name of each step that is run.
+/// Runs the steps in order. A failed step stops only the steps that need it. `tell` is called with the index and the
+/// name of each step that is run.
 ///
 /// # Errors
-/// The file system's error, of a folder or a marker that cannot be written.
+/// The file system's error if a folder or a marker cannot be written.
 pub fn run(
     steps: &[Step],
     out: &Path,
@@ -103,7 +103,7 @@ pub fn run(
     Ok(outcomes)
 }
 
-/// Returns the command of a step, and the steps whose results it reads.
+/// Returns the command of a step, and the finished steps whose results the command reads.
 fn resolve(step: &Step, program: String, done: &BTreeMap<&str, String>) -> (Vec<String>, Vec<String>) {
     let (mut command, mut read) = (vec![program], Vec::new());
     let used = |name: &str| done.get(name).map(|hash| format!("{name} {hash}"));

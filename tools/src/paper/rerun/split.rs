@@ -1,6 +1,7 @@
-//! This module finds the sequences that the paper used in a folder, by their names, and splits them as the paper does:
-//! KAIST Urban 06 to 13 to train, 14 to 17 to validate, 18 to 37 to test; of NCLT's 27 dates the first 18 to train and 9
-//! to test. The paper names no sequences of NCLT to validate with; here these are the last two of the 18.
+//! This module finds the paper's sequences in a folder by their names, and splits them as the paper does. Of KAIST
+//! Urban, 06 to 13 are for training, 14 to 17 for validation and 18 to 37 for testing. Of NCLT's 27 dates, the first
+//! 18 are for training and 9 for testing. The paper names no validation sequences of NCLT; here they are the last two
+//! of the 18.
 
 use crate::drive::error::{DataError, DataFault};
 use crate::paper::sequence;
@@ -39,61 +40,61 @@ const DATES: [&str; 27] = [
     "2013-02-23",
     "2013-04-05",
 ];
-/// The first of [`DATES`] to validate with, and the first to test with.
+/// Indices in [`DATES`] of the first validation sequence, and of the first test sequence.
 const DATES_SPLIT: [usize; 2] = [16, 18];
 
-/// Names what a sequence is used for.
+/// Names the use of a sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
-    /// Its truth trains the networks and the rivals.
+    /// The sequence's truth trains the networks and the rivals.
     Train,
-    /// Its truth chooses among epochs and seeds.
+    /// The sequence's truth chooses among epochs and seeds.
     Validate,
-    /// It is used for the tables alone.
+    /// The sequence is used only for the tables.
     Test,
 }
 
 /// Holds a sequence that was found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Member {
-    /// Its folder's name, which may go on after the paper's: urban28-pankyo.
+    /// Name of its folder, which may be longer than the paper's name: urban28-pankyo.
     pub name: String,
-    /// Its folder.
+    /// Path of its folder.
     pub folder: PathBuf,
-    /// Its use.
+    /// Use of the sequence.
     pub role: Role,
     /// The number of the simulated device; `None` for a recorded one.
     pub device: Option<u64>,
 }
 
-/// Holds what was found of a data set.
+/// Holds the sequences of a data set that were found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Split {
     /// The data set.
     pub layout: Layout,
     /// The sequences found, in the paper's order.
     pub members: Vec<Member>,
-    /// The names of those that the paper used and that are not there.
+    /// Names of the paper's sequences that are missing.
     pub missing: Vec<String>,
-    /// The folders and files that are not used, and why.
+    /// Folders and files that are not used, each with the reason.
     pub unused: Vec<String>,
 }
 
-/// Says why nothing can be trained.
+/// The error of a folder that training is impossible with.
 #[derive(Debug, thiserror::Error)]
 pub enum SplitError {
     /// The folder cannot be read.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// There is no sequence for a purpose that is needed.
-    #[error("{root}: no sequence to {purpose} with, of {names}")]
+    /// There is no sequence for a required purpose.
+    #[error("{root}: no sequence to {purpose} with; needed is one of {names}")]
     None {
         /// The folder.
         root: String,
-        /// The purpose.
+        /// The purpose: `train` or `validate`.
         purpose: &'static str,
-        /// The names of the sequences that serve it.
+        /// The names of the sequences for this purpose.
         names: String,
     },
 }
@@ -113,7 +114,7 @@ fn expected(layout: Layout) -> Vec<(String, Role)> {
     }
 }
 
-/// Says whether a folder's name is that of a sequence: the same, or the same and more that is no digit.
+/// Returns whether a folder's name is that of a sequence: the same name, or followed by something other than a digit.
 fn is_named(folder: &str, name: &str) -> bool {
     folder.strip_prefix(name).is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_digit()))
 }
@@ -122,7 +123,7 @@ impl Split {
     /// Finds the sequences directly below a folder.
     ///
     /// # Errors
-    /// [`SplitError`] if the folder cannot be read, or nothing is there to train or to validate with.
+    /// [`SplitError`] if the folder cannot be read, or has no sequence to train or to validate with.
     pub fn find(layout: Layout, root: &Path) -> Result<Self, SplitError> {
         let error = |source: std::io::Error| DataError::of(root.display(), DataFault::Io(source));
         let entries = fs::read_dir(root).map_err(error)?;

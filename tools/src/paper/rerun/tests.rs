@@ -1,4 +1,4 @@
-//! Split, plan and resumption, with a runner that makes empty files: no PyTorch is needed.
+//! Tests split, plan and resumption with a runner that writes empty files: no PyTorch is needed.
 
 use super::plan::{Effort, Program, Step, plan};
 use super::report::{Report, Set};
@@ -11,7 +11,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::{TempDir, tempdir};
 
-/// Makes folders that look like sequences of KAIST Urban.
+/// Creates folders that look like sequences of KAIST Urban.
 fn tree(folder: &TempDir, names: &[&str]) -> PathBuf {
     let root = folder.path().join("kaist");
     for name in names {
@@ -21,7 +21,7 @@ fn tree(folder: &TempDir, names: &[&str]) -> PathBuf {
     root
 }
 
-/// Makes the output of each step, but for those that are to fail, and remembers their commands.
+/// A runner that writes the output of each step, except of those that are to fail, and records the commands.
 struct Fake {
     outputs: BTreeMap<PathBuf, Option<PathBuf>>,
     failing: &'static str,
@@ -57,7 +57,7 @@ fn go(steps: &[Step], out: &Path, failing: &'static str) -> (Outcomes, Vec<Vec<S
     (outcomes, fake.ran)
 }
 
-/// Names of the steps that were run now.
+/// Returns the names of the steps that were run now.
 fn made(outcomes: &Outcomes) -> Vec<&str> {
     let now = outcomes.iter().filter(|(_, outcome)| matches!(outcome, Outcome::Made(_)));
     now.map(|(name, _)| name.as_str()).collect()
@@ -108,7 +108,7 @@ fn a_tree_without_a_validation_sequence_is_refused_with_their_names() {
     let scratch = tempdir().unwrap();
     let error = Split::find(Layout::Kaist, &tree(&scratch, &["urban06", "urban18"])).unwrap_err().to_string();
     assert!(
-        error.ends_with("no sequence to validate with, of urban14, urban15, urban16, urban17"),
+        error.ends_with("no sequence to validate with; needed is one of urban14, urban15, urban16, urban17"),
         "{error}"
     );
     let error = Split::find(Layout::Kaist, Path::new("/nowhere")).unwrap_err().to_string();
@@ -143,7 +143,7 @@ fn a_second_run_repeats_what_has_changed_and_nothing_else() {
     assert_eq!(made(&fourth), fognets);
     let (fifth, _) = go(&steps, &out, "");
     assert_eq!(made(&fifth), made(&fourth));
-    // A result that is gone.
+    // A result is deleted.
     fs::remove_file(out.join("kaist/lwoi/lwoi.json")).unwrap();
     let (sixth, _) = go(&steps, &out, "");
     assert_eq!(made(&sixth), ["kaist/lwoi"]);
@@ -201,7 +201,7 @@ fn a_training_drive_has_no_step_in_a_gap_and_no_start_on_the_move() {
     let rows: Vec<String> = fs::read_to_string(&path).unwrap().lines().map(str::to_owned).collect();
     let (stamp, _) = rows[1000].split_once(',').unwrap();
     let odd = format!("{stamp},nan,nan");
-    // Half a second without wheels, a row that is no number, and one that is there twice.
+    // Half a second without wheels, a row that is not a number, and a repeated row.
     let cut = [&rows[..1000], &[odd], &rows[1001..2000], &rows[1999..2000], &rows[2050..]].concat();
     fs::write(&path, cut.join("\n")).unwrap();
     let sequence = Sequence::read(&folder, |_| {}).unwrap();
@@ -214,7 +214,7 @@ fn a_training_drive_has_no_step_in_a_gap_and_no_start_on_the_move() {
     assert!((steps - 53..=steps - 48).contains(&whole), "{whole} of {steps}");
     assert_eq!(sequence::write_csv(&sequence, std::io::sink()).unwrap() as usize, steps);
     let count = |row: &str| row.split(',').nth(1).unwrap().parse::<f64>().unwrap();
-    // Ten turns of the wheel from where it stands, it drives.
+    // The file now begins where the wheel has turned ten times: the vehicle is driving.
     let driving = rows.iter().position(|row| (count(row) - count(&rows[0])).abs() > 40_960.0).unwrap();
     fs::write(&path, rows[driving..].join("\n")).unwrap();
     let error = Sequence::read(&folder, |_| {}).unwrap().needs_standstill().unwrap_err().to_string();

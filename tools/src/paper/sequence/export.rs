@@ -1,16 +1,16 @@
-//! This module writes a sequence as one CSV: the columns of [`crate::drive::recording`], and further columns that only
-//! a sequence has.
+//! This module writes a sequence as one CSV file, with the columns of [`crate::drive::recording`] and further columns
+//! that only a sequence has.
 
 use super::{Sequence, Step};
 use crate::drive::DT;
 use std::io::{self, Write};
 
-/// The file begins with this header. Wheels are rear right and rear left; `fog_rad`, `left_m` and `right_m` are since
-/// the row before.
+/// Header of the file. Wheels are rear right and rear left; `fog_rad`, `left_m` and `right_m` count from the previous
+/// row.
 pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel2_rate,wheel4_rate,\
                           fog_rad,left_m,right_m,ref_x_m,ref_y_m,ref_yaw_rad,vendor_yaw_rad";
 
-/// Writes all steps; those in a gap of the inertial sensor are left out.
+/// Writes all steps except those in a gap of the inertial sensor; returns the number of rows.
 ///
 /// # Errors
 /// The writer's error.
@@ -18,7 +18,7 @@ pub fn write_csv(sequence: &Sequence, out: impl Write) -> io::Result<u64> {
     write(sequence, out, |step| !step.imu_gap)
 }
 
-/// Writes the steps that no file has a gap around.
+/// Writes the steps that are not in a gap of any file; returns the number of rows.
 ///
 /// # Errors
 /// The writer's error.

@@ -33,12 +33,12 @@ const ENCODER: Format<2> = Format { columns: 3, used: [1, 2], stamps_per_second:
 /// The used columns are r11, r21, x and y of three rows of rotation and position.
 const POSE: Format<4> =
     Format { columns: 13, used: [1, 5, 4, 8], stamps_per_second: NANOS, nominal_hz: 100.0 };
-/// A faster wheel than this means that its counter was reset, m/s.
+/// A wheel speed above this means that the wheel's counter was reset, m/s.
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
-/// The calibration of the encoders.
+/// Path of the calibration of the encoders.
 pub(super) const CALIBRATION: &str = "calibration/EncoderParameter.txt";
-/// These files are read beside it.
+/// Paths of the other files.
 pub(super) const PATHS: [&str; 4] =
     ["sensor_data/xsens_imu.csv", "sensor_data/fog.csv", "sensor_data/encoder.csv", "global_pose.csv"];
 
@@ -75,7 +75,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
         epoch,
         Box::new(move |row: &Row<4>, _, _| {
             let [r11, r21, x, y] = row.fields;
-            // The two have the same quotient in the nearest true rotation, however few digits they were printed with.
+            // The nearest proper rotation has the same quotient of the two, however few digits are printed.
             [x, y, heading.angle(libm::atan2(r21, r11))]
         }),
     )?;
@@ -91,7 +91,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
     })
 }
 
-/// Holds the inertial sensor and its first stamp.
+/// The stream of the inertial sensor, and its first stamp.
 type Imu = (Box<dyn Stream<7>>, i64);
 
 fn whole(path: &Path, progress: &Progress) -> Result<Imu, DataError> {
@@ -125,7 +125,7 @@ fn columns(path: &Path) -> Result<usize, DataError> {
     let name = path.display().to_string();
     let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
     let mut line = String::new();
-    // A row of this file is some 200 bytes long.
+    // A row of this file is about 200 bytes long.
     let mut reader = BufReader::new(file).take(4096);
     reader.read_line(&mut line).map_err(|source| DataError::of(&name, source.into()))?;
     Ok(line.split(',').count())
@@ -134,7 +134,7 @@ fn columns(path: &Path) -> Result<usize, DataError> {
 /// Holds the parameters of the calibration file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct EncoderParameters {
-    /// Counts of a revolution.
+    /// Counts per revolution.
     resolution: f64,
     /// Diameter of the left and the right wheel, m.
     diameter: [f64; 2],
@@ -166,11 +166,11 @@ impl EncoderParameters {
     }
 }
 
-/// Converts counts to metres since the first row, across resets.
+/// Converts counts to distances since the first row, in metres, across resets.
 struct Encoder {
     parameters: EncoderParameters,
     last: Option<(f64, [f64; 2])>,
-    /// Way and speed of both wheels, m and m/s.
+    /// Distance and speed of both wheels, m and m/s.
     metres: [f64; 2],
     speed: [f64; 2],
 }
@@ -180,15 +180,15 @@ impl Encoder {
         Self { parameters, last: None, metres: [0.0; 2], speed: [0.0; 2] }
     }
 
-    /// Returns metres, and whether a counter was reset since the row before: then both wheels are assumed to have kept
-    /// their speed.
+    /// Returns the distances, m, and whether a counter was reset since the previous row. After a reset both wheels
+    /// are assumed to have kept their speed.
     fn metres(&mut self, counts: [f64; 2], time: f64) -> ([f64; 2], bool) {
         let (last_time, last) = self.last.replace((time, counts)).unwrap_or((time, counts));
         let EncoderParameters { resolution, diameter, .. } = self.parameters;
         let seconds = time - last_time;
         let way = |wheel: usize| (counts[wheel] - last[wheel]) / resolution * diameter[wheel] * PI;
         let moved = [way(0), way(1)];
-        // Counts are whole numbers, so one count in 1 us says nothing about the speed.
+        // Counts are integers, so one count in 1 us does not measure the speed.
         let reset = moved.iter().any(|way| way.abs() > IMPOSSIBLE_SPEED * seconds.max(0.01));
         if !reset && seconds > 0.0 {
             self.speed = moved.map(|way| way / seconds);

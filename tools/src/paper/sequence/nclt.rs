@@ -2,8 +2,8 @@
 //! are microseconds since 1970; axes are x forward, y right, z down, heading clockwise from north. The output is x
 //! forward, y left, z up, heading counter-clockwise from east, as in KAIST.
 //!
-//! The gyro sends its integral, so that a lost message loses no angle. Source: the readers bierschi/nclt2ros and
-//! ethz-asl/nclt_tools.
+//! The gyro's file holds its integrated angle, so that a lost message loses no angle. Source: the readers
+//! bierschi/nclt2ros and ethz-asl/nclt_tools.
 
 use super::Files;
 use super::rows::{Format, Progress, Row, Rows};
@@ -35,7 +35,7 @@ pub(super) fn truth(folder: &Path) -> Result<PathBuf, DataError> {
     names.into_iter().find(is_truth).ok_or_else(missing)
 }
 
-/// These files are read beside the truth.
+/// Names of the files other than the truth.
 pub(super) const PATHS: [&str; 3] = ["ms25.csv", "kvh.csv", "wheels.csv"];
 
 pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataError> {
@@ -61,7 +61,7 @@ pub(super) fn open(folder: &Path, progress: &Progress) -> Result<Files, DataErro
         Rows::open(&wheels, WHEELS, progress.clone())?,
         epoch,
         Box::new(move |row: &Row<2>, time, _| {
-            // A speed applies to the time since the row before.
+            // A speed applies to the time since the previous row.
             let seconds = time - last.replace(time).unwrap_or(time);
             for (metres, speed) in metres.iter_mut().zip(row.fields) {
                 *metres += speed * seconds;

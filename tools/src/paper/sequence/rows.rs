@@ -1,4 +1,4 @@
-//! This module reads rows of numbers without a header: a stamp and fields, one row in memory at a time.
+//! This module reads rows of numbers from a file without a header, one row at a time. A row is a stamp and fields.
 
 use super::summary::StreamSummary;
 use crate::drive::error::{DataError, DataFault, ValueError};
@@ -8,7 +8,7 @@ use std::fs::File;
 use std::path::Path;
 use std::rc::Rc;
 
-/// A value beyond this is refused: no part or map has one; metres of UTM are some 4e6.
+/// A value beyond this is refused: UTM coordinates are about 4e6 m, and no sensor reads as much.
 const MAX_VALUE: f64 = 1e12;
 /// A file with a longer gap is not a single drive, s.
 const MAX_SILENCE: f64 = 600.0;
@@ -19,17 +19,17 @@ pub(super) type Progress = Rc<Cell<u64>>;
 /// Describes the format of a file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Format<const N: usize> {
-    /// The number of columns, the stamp's included.
+    /// Number of columns, including that of the stamp.
     pub columns: usize,
-    /// The columns that are used; the stamp's is 0.
+    /// Indices of the used columns; the stamp is column 0.
     pub used: [usize; N],
-    /// Stamps per second.
+    /// Stamp units per second.
     pub stamps_per_second: f64,
     /// The nominal number of samples per second.
     pub nominal_hz: f64,
 }
 
-/// Holds a row: its stamp, and the fields that are used.
+/// Holds a row: its stamp, and the used fields.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<const N: usize> {
     pub line: u64,

@@ -1,4 +1,4 @@
-//! This module summarises a sequence's files; every skipped row is counted here.
+//! This module summarises a sequence's files and counts the skipped rows.
 
 use serde::Serialize;
 use std::fmt;
@@ -10,9 +10,9 @@ const GAP_PERIODS: f64 = 2.5;
 /// Holds a count, and the line of its first occurrence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Seen {
-    /// Times.
+    /// Number of occurrences.
     pub count: u64,
-    /// Line of the first one.
+    /// Line number of the first occurrence.
     pub first_line: Option<u64>,
 }
 
@@ -23,35 +23,35 @@ impl Seen {
     }
 }
 
-/// Holds the smallest and largest time between two stamps in a second, ms.
+/// Holds the smallest and largest time between two stamps in one second of a file, ms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// Smallest.
+    /// Smallest time.
     pub least_ms: f64,
-    /// Largest.
+    /// Largest time.
     pub most_ms: f64,
 }
 
 /// Holds the summary of one file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StreamSummary {
-    /// Its name.
+    /// Name of the file.
     pub file: String,
-    /// Rows that were used.
+    /// Number of used rows.
     pub rows: u64,
     /// Mean rate, Hz.
     pub rate_hz: f64,
-    /// Times that two stamps are more than 2.5 nominal periods apart.
+    /// Number of times that two stamps are more than 2.5 nominal periods apart.
     pub gaps: u64,
     /// The longest time between two stamps, s.
     pub longest_gap_s: f64,
-    /// Rows skipped because their stamp is that of the row before.
+    /// Rows skipped because they repeat the stamp of the previous row.
     pub duplicates: Seen,
     /// Rows skipped because a field is NaN or infinite.
     pub not_finite: Seen,
-    /// Times that the counts jumped; the wheels were assumed to keep their speed.
+    /// Encoder resets; the wheels were assumed to keep their speed.
     pub resets: Seen,
-    /// Times between stamps, for each second of the file.
+    /// Spread of the time between stamps, for each second of the file.
     #[serde(skip)]
     pub spreads: Vec<Spread>,
     #[serde(skip)]
@@ -97,7 +97,7 @@ impl StreamSummary {
         self.gaps += u64::from(seconds * clock.nominal_hz > GAP_PERIODS);
         self.longest_gap_s = self.longest_gap_s.max(seconds);
         let ms = seconds * 1e3;
-        // A stamp far ahead makes no more seconds than there are rows.
+        // Limits the number of seconds to that of rows, in case of a stamp far ahead.
         let second = (since as usize).min(self.rows as usize);
         if self.spreads.len() <= second {
             self.spreads.resize(second + 1, Spread { least_ms: ms, most_ms: ms });
@@ -113,8 +113,8 @@ impl fmt::Display for StreamSummary {
         write!(f, "{:<24}{:>9} rows {:>8.2} Hz", self.file, self.rows, self.rate_hz)?;
         write!(f, "  {} gaps, longest {:.1} ms", self.gaps, self.longest_gap_s * 1e3)?;
         for (seen, what) in [
-            (self.duplicates, "duplicate stamps passed over"),
-            (self.not_finite, "rows with NaN passed over"),
+            (self.duplicates, "duplicate stamps skipped"),
+            (self.not_finite, "rows with NaN skipped"),
             (self.resets, "encoder resets bridged"),
         ] {
             if let Some(line) = seen.first_line {

@@ -2,7 +2,7 @@ use super::*;
 use crate::simulate::layout;
 use tempfile::{TempDir, tempdir};
 
-/// Holds a sequence in a folder of its own.
+/// A sequence in its own folder.
 struct Scratch(TempDir);
 
 impl Scratch {
@@ -55,7 +55,7 @@ fn kaist_is_read_whole() {
     let all: f64 = text.lines().map(|l| l.rsplit(',').next().unwrap().parse::<f64>().unwrap()).sum();
     let steps: f64 = sequence.steps.iter().map(|step| step.fog).sum();
     assert!((all - steps).abs() < 2e-4, "but for both ends: {all} {steps}");
-    // And the truth turns as much as the inertial sensor's gyro, bias and noise apart.
+    // The truth turns as much as the inertial sensor's gyro, except for bias and noise.
     let truth = sequence.steps[5_900].yaw - sequence.steps[0].yaw;
     let fog: f64 = sequence.steps[1..=5_900].iter().map(|step| step.fog).sum();
     assert!((truth - fog).abs() < 0.01, "{truth} {fog}");
@@ -230,10 +230,10 @@ fn nan_and_duplicates_are_counted_and_bridged() {
     assert_eq!((pose.duplicates.count, pose.duplicates.first_line), (1, Some(302)));
     assert_eq!(pose.gaps, 1, "30 ms");
     let text = pose.to_string();
-    assert!(text.contains("2 rows with NaN passed over (first: line 100)"), "{text}");
-    assert!(text.contains("1 duplicate stamps passed over (first: line 302)"), "{text}");
+    assert!(text.contains("2 rows with NaN skipped (first: line 100)"), "{text}");
+    assert!(text.contains("1 duplicate stamps skipped (first: line 302)"), "{text}");
     assert_eq!(sequence.steps.len(), whole.steps.len());
-    // The gyro's NaN loses no angle that its neighbours do not have.
+    // The NaN of the gyro loses no angle: the neighbouring rows contain it.
     scratch.edit(FOG, |lines| set(&mut lines[0], 3, "NaN"));
     assert_eq!(scratch.read().unwrap().files[1].not_finite.count, 1);
 }

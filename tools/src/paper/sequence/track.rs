@@ -1,26 +1,26 @@
-//! This module interpolates streams: a stream returns its value at any time, in ascending order, on the straight line
-//! between the rows before and after.
+//! This module interpolates streams. A stream returns its value at any time, in ascending order, by linear
+//! interpolation between the rows before and after.
 //!
-//! Quantities that add up (angle of a gyro, way of a wheel) are streams of their sums, so that no part is lost or
-//! counted twice, whatever the stamps are.
+//! Increments (angle of a gyro, distance of a wheel) are streams of their sums, so that nothing is lost or counted
+//! twice, whatever the stamps are.
 
 use super::rows::{Row, Rows};
 use super::summary::StreamSummary;
 use crate::drive::error::{DataError, DataFault};
 
-/// Converts a row's fields, at a time in s, to the values that are interpolated; it may keep state from row to row.
+/// Converts a row's fields, at a time in s, to the interpolated values; the function may keep state between rows.
 pub(super) type Convert<const N: usize, const M: usize> =
     Box<dyn FnMut(&Row<N>, f64, &mut StreamSummary) -> [f64; M]>;
 
-/// Gives M values of a file at ascending times.
+/// A stream of M values of a file, read at ascending times.
 pub(super) trait Stream<const M: usize> {
     /// Returns the time of the first row, s since the epoch.
     fn first(&self) -> f64;
-    /// Returns the value at a time, s since the epoch; `None` at the end of the file.
+    /// Returns the value at a time, s since the epoch; `None` beyond the end of the file.
     fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError>;
     /// Returns the time of the newest row that was read.
     fn reached(&self) -> f64;
-    /// Reads the rest, so that the summary covers the whole file.
+    /// Reads the rest of the file and returns its summary.
     fn finish(self: Box<Self>) -> Result<StreamSummary, DataError>;
 }
 
@@ -95,7 +95,7 @@ impl<const N: usize, const M: usize> Stream<M> for Track<N, M> {
     }
 }
 
-/// Unwraps an angle beyond pi: each step is taken the short way.
+/// Unwraps an angle beyond pi, assuming that no step turns by more than pi.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Unwrap {
     last: Option<f64>,

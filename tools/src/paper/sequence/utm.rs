@@ -1,8 +1,9 @@
-//! The latitude of a place in UTM, in which KAIST Urban gives its poses: the Earth's rate there is 300 times a
-//! fibre-optic gyro's bias, and the data set's drives are up to a degree apart.
+//! This module computes the latitude of a position in UTM, the coordinates of KAIST Urban's poses. The latitude
+//! matters because the Earth's rate is 300 times a fibre-optic gyro's bias, and the data set's drives are up to a
+//! degree apart.
 //!
 //! The series are those of Snyder, Map Projections: A Working Manual (USGS Professional Paper 1395), equations 3-24,
-//! 7-19 and 8-17, on the ellipsoid WGS 84, north of the equator. What is left out is below 1e-4 degrees.
+//! 7-19 and 8-17, on the ellipsoid WGS 84, north of the equator. The omitted terms are below 1e-4 degrees.
 
 /// Semi-major axis, m, and square of the eccentricity.
 const AXIS: f64 = 6_378_137.0;
@@ -10,11 +11,11 @@ const ECCENTRICITY: f64 = 0.006_694_379_990_14;
 /// Scale on the central meridian, and its easting, m.
 const SCALE: f64 = 0.9996;
 const MERIDIAN: f64 = 500_000.0;
-/// Coordinates of a place on land, m; others are no UTM, but a frame of the data's own.
+/// Ranges of UTM coordinates on land, m; coordinates outside are in a frame of the data's own.
 const EASTINGS: std::ops::Range<f64> = 1e5..9e5;
 const NORTHINGS: std::ops::Range<f64> = 1e5..9.4e6;
 
-/// Returns the latitude of an easting and a northing, degrees; `None` for what is no UTM.
+/// Returns the latitude of an easting and a northing, degrees; `None` if they are not in UTM.
 pub fn latitude_deg([easting, northing]: [f64; 2]) -> Option<f64> {
     if !EASTINGS.contains(&easting) || !NORTHINGS.contains(&northing) {
         return None;

@@ -1,34 +1,34 @@
-//! This module holds the estimate of a method on a sequence: turns, and where the places come from.
+//! This module defines the estimate of a method on a sequence: the turns, and the source of the positions.
 
 use crate::evaluate::methods::Method;
 use crate::evaluate::trajectory_error::Point;
 
-/// Holds the estimate of a method on a sequence.
+/// The estimate of a method on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// The method.
     pub method: Method,
-    /// The angle turned in each step, from the first that is compared, rad.
+    /// Angle turned in each step, from the first compared step on, rad.
     pub turns: Vec<f64>,
-    /// The places after them.
+    /// Source of the positions after these turns.
     pub places: Places,
-    /// The run time on this machine, s, where it was measured.
+    /// Run time on this machine, s, if it was measured.
     pub run_time: Option<f64>,
 }
 
-/// Says where the places of an estimate come from.
+/// The source of an estimate's positions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Places {
-    /// Dead reckoning with the wheels' ways, times a scale.
+    /// Dead reckoning with the wheels' distances times a scale.
     Reckoned {
         /// The scale.
         scale: f64,
     },
-    /// A trajectory that is given: the place after each turn, m from the first step's.
+    /// A given trajectory: the position after each turn, relative to that of the first step, m.
     Given(Vec<Point>),
 }
 
 impl Places {
-    /// Dead reckoning with the ways as they are.
+    /// Dead reckoning with the unscaled distances.
     pub const RECKONED: Self = Self::Reckoned { scale: 1.0 };
 }

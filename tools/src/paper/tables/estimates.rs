@@ -1,10 +1,11 @@
 //! This module runs the methods that the paper's tables compare: each computes from a sequence the angle turned in
 //! every 10 ms.
 //!
-//! The paper's vendor filter runs inside the sensor and is not available. [`Method::VQF`] stands in for it where the
-//! data have no vendor's heading: an orientation filter of the same kind (gyro integrated, levelled by the
-//! accelerometer, bias learnt at rest; Laidig and Seel, VQF, Information Fusion 91, 2023), without a magnetometer, once
-//! with its published defaults and once with limits of rest that a vehicle with its engine running keeps.
+//! The paper's vendor filter runs inside the sensor and is not available. If the data have no vendor's heading,
+//! [`Method::VQF`] replaces it: an orientation filter of the same kind (gyro integrated, levelled by the
+//! accelerometer, bias learnt at rest; Laidig and Seel, VQF, Information Fusion 91, 2023), without a magnetometer. It
+//! runs once with its published defaults, and once with rest thresholds that a standing vehicle with its engine
+//! running stays below.
 
 use super::estimate::{Estimate, Places};
 use super::given::Given;
@@ -33,20 +34,19 @@ use std::time::Instant;
 /// Holds the estimates of all methods on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {
-    /// The first step that is compared: static initialisation is over.
+    /// Index of the first compared step, after static initialisation.
     pub start: usize,
     /// The estimates of the methods that could be run.
     pub methods: Vec<Estimate>,
-    /// The methods whose given trajectory cannot be compared, and the reasons.
+    /// The methods whose given trajectory cannot be compared, with the reason.
     pub left_out: Vec<(Method, String)>,
-    /// The numbers of [`Method::FOG_WHEELS`] and what they were fitted to.
+    /// Text with the numbers of [`Method::FOG_WHEELS`] and the sequences that they were fitted to.
     pub fitted: Option<String>,
-    /// The reason why some methods could not be run.
+    /// The reasons why some methods could not be run.
     pub refused: Option<String>,
 }
 
-/// Runs every method; `tick` is called twice for each sample: for the network alone, and with the
-/// bias loop.
+/// Runs every method; `tick` is called twice for each sample: for the network alone, and with zero-rate updates.
 pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl FnMut()) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
     let mut estimates =
@@ -74,8 +74,8 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork, mut tick: impl
 }
 
 impl Estimates {
-    /// Adds the rates that the board sends with FoGNet, padded and not, where there is an inertial sensor. Where the
-    /// weights are for another gyro the board does not run them.
+    /// Adds the rates that the board sends with FoGNet, with and without padding, if there is an inertial sensor. The
+    /// board does not run weights for another gyro.
     pub fn add_fognet(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, trained: Training) {
         if !sequence.has_gyro {
             return;
@@ -97,7 +97,7 @@ impl Estimates {
         }
     }
 
-    /// Adds FoGNet on GyroNet's rate, if there is one; `tick` is called for each step.
+    /// Adds FoGNet on GyroNet's rate, if GyroNet was run; `tick` is called once per step.
     pub fn add_pseudo_fog(
         &mut self,
         sequence: &Sequence,
@@ -146,7 +146,7 @@ impl Estimates {
                         alone_s,
                         corrected(&drive, &gyro, |step| step.vehicle.prompt.rate),
                     ),
-                    // The last steps of the drive have not gone out yet.
+                    // The navigation rates of the drive's last steps have not been sent yet.
                     (
                         Method::GYRONET_LOOP,
                         looped_s,
@@ -169,7 +169,8 @@ impl Estimates {
         self.add(Method::VQF, || vqf::rates(vqf::published(), samples()));
         self.add(Method::VQF_VEHICLE, || {
             let mut filter = vqf::published();
-            // The limits are three times the spread that static initialisation allows, because VQF checks each sample.
+            // The thresholds are three times the spread that static initialisation allows, because VQF checks each
+            // sample.
             let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
             let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
             filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
@@ -183,7 +184,7 @@ impl Estimates {
         self.push(method, self.turns(&rates), run_time);
     }
 
-    /// Returns the turns of the steps that are compared.
+    /// Returns the turns of the compared steps, from the rates of all steps.
     fn turns(&self, rates: &[f64]) -> Vec<f64> {
         rates[self.start..].iter().map(|rate| rate * DT).collect()
     }
@@ -192,7 +193,7 @@ impl Estimates {
         self.methods.push(Estimate { method, turns, places: Places::RECKONED, run_time: Some(run_time) });
     }
 
-    /// Adds wheels and fibre-optic gyro, fitted.
+    /// Adds the fit of wheels and fibre-optic gyro.
     pub fn add_joint(&mut self, sequence: &Sequence, joint: &Joint) {
         self.methods.push(joint.estimate(sequence, self.start));
         self.fitted = Some(joint.to_string());
@@ -214,13 +215,13 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (result, started.elapsed().as_secs_f64())
 }
 
-/// Returns one of the rates of each step; where the board got no sample, the interpolated gyro less the last
+/// Returns one of the rates of each step. For a step without a sample this is the interpolated gyro minus the last
 /// correction.
 fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
     let mut steps = drive.steps.iter().peekable();
     let mut taken_off = 0.0;
     let rate = |(k, gyro): (usize, &f64)| {
-        // A sample's time is that of its step.
+        // A sample has the time of its step.
         while let Some(step) = steps.next_if(|step| step.time.0 <= k as u64 * PERIOD_US) {
             taken_off = gyro - which(step).rad_per_sec();
         }

@@ -1,10 +1,11 @@
-//! This module puts another program's trajectories beside our methods: those of a folder, one file for each sequence,
-//! named `SEQUENCE.txt`.
+//! This module compares another program's trajectories with our methods: those of a folder, one file for each
+//! sequence, named `SEQUENCE.txt`.
 //!
-//! A trajectory is compared as it lies, so it must be in the truth's frame (KAIST: that of `global_pose.csv`; NCLT: x
-//! east, y north, heading counter-clockwise from east) and on the clock of the sequence's files. It covers the sequence
-//! from where our methods start, which is the end of static initialisation, to within [`MISSING_END`] of its end. Poses
-//! at the sequence's steps are interpolated. A trajectory that cannot be compared is an error, and never a number.
+//! A trajectory is compared without alignment, so it must be in the truth's frame (KAIST: that of `global_pose.csv`;
+//! NCLT: x east, y north, heading counter-clockwise from east) and on the clock of the sequence's files. It must
+//! cover the sequence from the end of static initialisation, where our methods start, to within [`MISSING_END`] of
+//! the end. Poses at the sequence's steps are interpolated. A trajectory that cannot be compared is an error and
+//! gives no numbers.
 
 use super::estimate::{Estimate, Places};
 use crate::drive::DT;
@@ -17,32 +18,32 @@ use crate::paper::trajectory::{Pose, Trajectory};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// A trajectory may end this much before the sequence, s: some programs write whole seconds.
+/// A trajectory may end this much before the sequence, s, because some programs write only whole seconds.
 pub const MISSING_END: f64 = 1.0;
-/// Poses are at most this far apart, s: between them a car in a sharp turn (3 m/s^2) is 15 mm from the straight line.
+/// Largest time between two poses, s: a car in a sharp turn (3 m/s^2) then deviates 15 mm from the straight line.
 pub const MAX_STEP: f64 = 0.2;
-/// Where our methods start from the true pose, a trajectory lies at most this far from it, m and rad.
+/// Largest distance, m, and angle, rad, of a trajectory from the true pose where our methods start.
 pub const START_TOLERANCE: (f64, f64) = (1.0, 0.1);
-/// A pose that is further from the truth than twice the way driven and this, m, has diverged: no path of the vehicle's
-/// length reaches it.
+/// A pose has diverged if its distance from the truth exceeds twice the distance driven plus this, m: no path of the
+/// vehicle's length reaches it.
 pub const DIVERGED: f64 = 100.0;
 
 /// Holds the folder of another program's trajectories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Given {
-    /// Its name in tables and in JSON.
+    /// The method's name in tables and in JSON.
     pub method: Method,
-    /// The folder.
+    /// Folder of the trajectories.
     pub folder: PathBuf,
 }
 
-/// Says why `NAME=FOLDER` is none.
+/// The error of a `NAME=FOLDER` that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
-    /// There is no name, or no folder.
+    /// The name or the folder is missing.
     #[error("expected NAME=FOLDER")]
     Form,
-    /// The name is one of the tables' own.
+    /// The name is that of one of our own methods.
     #[error("{0:?} is a method of our own")]
     Taken(String),
 }
@@ -61,7 +62,7 @@ impl FromStr for Given {
 }
 
 impl Given {
-    /// Reads the trajectory of a sequence that is compared from the step `start`.
+    /// Reads the trajectory of a sequence and returns the estimate from the step `start` on.
     ///
     /// # Errors
     /// [`DataError`], which names the file and, where there is one, the line.
@@ -72,8 +73,8 @@ impl Given {
     }
 }
 
-/// Returns the turn of each compared step and the place after it, in the frame of the sequence's steps. The first turn
-/// begins from the true heading, as that of every method.
+/// Returns the turn of each compared step and the position after it, in the frame of the sequence's steps. The first
+/// turn begins from the true heading, as for every method.
 fn compared(
     trajectory: &Trajectory,
     sequence: &Sequence,
@@ -89,7 +90,7 @@ fn compared(
     let mut poses = trajectory.poses.windows(2).peekable();
     for (number, truth) in sequence.steps.iter().enumerate().skip(first) {
         let now = time(number);
-        // Poses before the comparison do not matter.
+        // Skip the poses before this step.
         while poses.next_if(|pair| pair[1].time < now).is_some() {}
         let Some([before, after]) = poses.peek() else { break };
         if before.time > now {
@@ -129,7 +130,7 @@ fn compared(
     Ok((turns, places))
 }
 
-/// Returns the pose at a time on the straight line between two.
+/// Returns the pose at a time, interpolated linearly between two poses.
 fn between(before: &Pose, after: &Pose, time: f64) -> Pose {
     let part = (time - before.time) / (after.time - before.time);
     let on = |from: f64, to: f64| from + (to - from) * part;

@@ -1,4 +1,4 @@
-//! This module says with which other sequences one is averaged.
+//! This module groups the sequences that are averaged together.
 
 use crate::paper::sequence::Sequence;
 use crate::simulate::layout::Layout;
@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum Group {
     /// The paper's first sequences, and simulated ones of the first device.
     First,
-    /// Urban18 and later: the paper calls them newly released, and nothing says that their sensors are others.
+    /// Urban18 and later, which the paper calls newly released. No source says that their sensors differ.
     NewlyReleased,
     /// Simulated sequences of other devices.
     OtherDevices,

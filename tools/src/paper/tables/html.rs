@@ -1,11 +1,11 @@
-//! This module writes one HTML page with all tables and pictures; nothing is loaded from elsewhere.
+//! This module writes one self-contained HTML page with all tables and pictures.
 
 use super::pictures::Picture;
 use super::table::{Row, Table};
 use crate::plot::page::{self, document, escaped};
 use std::fmt::Write;
 
-/// Returns the page. Pictures come with the name of their sequence.
+/// Returns the page; `pictures` holds the pictures of each sequence with its name.
 #[must_use]
 pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
     let mut html = String::from("<h1>The paper's tables</h1>\n");
@@ -13,7 +13,7 @@ pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
              Vehicle Localization</i>; written by <code>gyronet tables</code>.</p>\n";
     for table in tables {
         let simulated = if table.simulated { " <span class=\"simulated\">simulated</span>" } else { "" };
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(html, "<h2>{}{simulated}</h2>", escaped(&table.title));
         let ours = if table.simulated { "here, simulated" } else { "here" };
         html += &block(ours, &table.columns, &table.rows, table.decimals);

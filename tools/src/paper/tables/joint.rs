@@ -1,9 +1,10 @@
-//! This module compensates wheels and fibre-optic gyro together, which the paper names as future work: four numbers, fitted
-//! to the truth of training sequences by least squares over spans of 10 s.
+//! This module compensates wheels and fibre-optic gyro together, which the paper names as future work. It fits four
+//! numbers to the truth of training sequences by least squares over spans of 10 s.
 //!
-//! The turn is a share of the gyro's, a share of the difference of the wheels' ways (which holds their distance and their
-//! diameters), and a constant (which holds the Earth's rate and the gyro's bias); the way is that of the wheels times a
-//! scale. It shows how much of a network's gain four numbers have.
+//! The turn is the sum of a share of the gyro's turn, a share of the difference of the wheels' distances (which
+//! contains the wheel base and the diameters), and a constant rate (which contains the Earth's rate and the gyro's
+//! bias). The distance is that of the wheels times a scale. The fit shows how much of a network's gain four numbers
+//! achieve.
 
 use super::estimate::{Estimate, Places};
 use crate::drive::DT;
@@ -12,10 +13,10 @@ use crate::paper::sequence::{Sequence, Step};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
-/// A span of the fit has this many steps: 10 s, in which what adds up outweighs the counts of an encoder.
+/// Number of steps in a span of the fit: 10 s, in which the accumulated errors exceed an encoder's resolution.
 const SPAN: usize = 1_000;
 
-/// Holds the sums of a fit.
+/// Holds the sums of a least-squares fit.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Fit {
     normal: Matrix3<f64>,
@@ -34,7 +35,7 @@ impl Fit {
             let turned: f64 = turns[k * SPAN..][..SPAN].iter().sum();
             self.normal += inputs * inputs.transpose();
             self.turned += inputs * turned;
-            // The first step of a span begins in the span before.
+            // The first step of a span begins in the previous span.
             let way = steps[1..].iter().map(way).sum::<f64>();
             let along: f64 = steps.windows(2).map(|pair| along(&pair[0], &pair[1])).sum();
             self.way_squared += way * way;
@@ -43,7 +44,7 @@ impl Fit {
         self.names.push(sequence.name.clone());
     }
 
-    /// Returns the numbers with the least squared errors; `None` where the sequences do not turn or move enough to tell.
+    /// Returns the numbers with the least squared errors; `None` if the sequences turn or move too little for a fit.
     #[must_use]
     pub fn solve(&self) -> Option<Joint> {
         let inverse = self.normal.try_inverse()?;
@@ -59,13 +60,13 @@ impl Fit {
 pub struct Joint {
     /// Share of the gyro's turn.
     pub gyro: f64,
-    /// Turn for each metre that the right wheel goes further than the left, rad/m.
+    /// Turn for each metre that the right wheel goes farther than the left, rad/m.
     pub difference: f64,
-    /// The constant rate, rad/s.
+    /// Constant rate, rad/s.
     pub constant: f64,
-    /// Scale of the wheels' way.
+    /// Scale of the wheels' distance.
     pub way: f64,
-    /// The sequences that it was fitted to.
+    /// Names of the sequences that the numbers were fitted to.
     pub names: Vec<String>,
 }
 
@@ -85,7 +86,7 @@ impl fmt::Display for Joint {
         write!(
             f,
             "FoG and wheels are fitted on {}: {:.6} of the FoG's turn, {:.4} mrad for each metre of the wheels' difference, \
-             {:.6} mrad/s, {:.6} of the way.",
+             {:.6} mrad/s, {:.6} of the distance.",
             self.names.join(", "),
             self.gyro,
             1e3 * self.difference,
@@ -95,7 +96,7 @@ impl fmt::Display for Joint {
     }
 }
 
-/// Returns what a step's turn is made of: the gyro's turn, the difference of the ways, and time.
+/// Returns the inputs of the fit for a step: the gyro's turn, the difference of the wheels' distances, and the time.
 fn inputs(step: &Step) -> Vector3<f64> {
     Vector3::new(step.fog, step.wheels[1] - step.wheels[0], DT)
 }
@@ -104,7 +105,7 @@ fn way(step: &Step) -> f64 {
     (step.wheels[0] + step.wheels[1]) / 2.0
 }
 
-/// Returns the true way of a step along its heading: the noise of true places does not make it longer.
+/// Returns the true distance of a step along its heading, which the noise of the true positions does not lengthen.
 fn along(before: &Step, after: &Step) -> f64 {
     let (sin, cos) = libm::sincos((before.yaw + after.yaw) / 2.0);
     let [x, y] = [0, 1].map(|axis| after.position[axis] - before.position[axis]);

@@ -1,4 +1,4 @@
-//! This module holds the remarks below the tables: what differs from the paper, and which trajectories were left out.
+//! This module writes the remarks below the tables: the differences from the paper, and the omitted trajectories.
 
 use super::paper;
 use super::results::{ByMethod, SequenceErrors};
@@ -13,14 +13,14 @@ pub const BUNDLED: [&str; 2] = [
 
 /// The remarks on every table with FoGNet in it.
 const FOGNET: [&str; 3] = [
-    "FoGNet corrects what the Earth's rate and the bias leave, and runs on the gyro that its weights were trained for alone; \
-     elsewhere its row is the default's.",
-    "Our FoGNet gives what the gyro has erred by, which is taken off; the paper's gives the prediction less the \
+    "FoGNet corrects the error that remains after the Earth's rate and the bias. It runs only on the gyro that its weights \
+     were trained for; elsewhere its row equals the default's.",
+    "Our FoGNet estimates the gyro's error, which is subtracted; the paper's estimates the prediction minus the \
      measurement, which is added.",
     BUNDLED[1],
 ];
 
-/// Adds the remarks on FoGNet, on what was fitted and on the trajectories left out.
+/// Returns `notes` with the remarks on FoGNet, on the fit and on the omitted trajectories added.
 pub fn with_fognet(set: &[&SequenceErrors], notes: &[&str]) -> Vec<String> {
     let mut fitted: Vec<String> = set.iter().filter_map(|sequence| sequence.fitted.clone()).collect();
     fitted.dedup();
@@ -29,11 +29,11 @@ pub fn with_fognet(set: &[&SequenceErrors], notes: &[&str]) -> Vec<String> {
     notes.chain(fitted).chain(refused).chain(left_out(set)).collect()
 }
 
-/// Makes the remarks on Table I.
+/// Returns the remarks on Table I.
 pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
     let mut notes: Vec<String> = [
         "The paper's figures are for KAIST Urban. Its errors are against the FoG, ours against the data set's truth.",
-        "Unlike the paper's, our GyroNet and our FIR get readings less the mean of static initialisation.",
+        "Unlike the paper's, our GyroNet and our FIR get readings with the mean of static initialisation subtracted.",
         BUNDLED[0],
     ]
     .map(String::from)
@@ -49,31 +49,32 @@ pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
         ));
     }
     if set.iter().any(|sequence| !sequence.methods.contains_key(Method::VENDOR.key)) {
-        notes.push("VQF stands in for the vendor's filter, whose heading these data do not have.".into());
+        notes.push("VQF replaces the vendor's filter, whose heading these data do not have.".into());
     }
     notes.extend(with_fognet(set, &[]));
     notes
 }
 
-/// Makes the remarks on Table IV.
+/// Returns the remarks on Table IV.
 pub fn rivals(set: &[&SequenceErrors]) -> Vec<String> {
     let own = paper::average(&paper::RINS_W);
     let printed = paper::RINS_W_AVERAGE.figures;
     let averages = format!(
-        "The paper's averages of RINS-W do not follow from its rows: they have {:.1} and {:.1}, printed are {} and {}.",
+        "The paper's averages of RINS-W do not follow from its rows: those give {:.1} and {:.1}, printed are {} and {}.",
         own[0], own[1], printed[0], printed[1]
     );
-    let other = "The paper's FoGNet is its Table II's, rounded, but for urban16: 18.08 there, 19 here.";
-    let mean = "The paper speaks of the mean ATE here; ours is the rmse, and the JSON has both.";
+    let other =
+        "The paper's FoGNet is that of its Table II, rounded, except for urban16: 18.08 there, 19 here.";
+    let mean = "The paper gives the mean ATE here; ours is the rmse, and the JSON has both.";
     let mut notes = with_fognet(set, &[&averages, other, mean]);
     if !set.iter().flat_map(|sequence| &sequence.order).any(|method| method.gyro == Gyro::Given) {
-        notes.push("Other methods stand beside ours with --method NAME=FOLDER; python -m gyronet_train.rinsw and .lwoi train those rivals."
+        notes.push("--method NAME=FOLDER adds other methods; python -m gyronet_train.rinsw and .lwoi train the paper's rivals."
                 .into());
     }
     notes
 }
 
-/// Says for each given method on how many sequences it was left out, and why.
+/// Returns for each given method on how many sequences it was left out, and the reasons.
 fn left_out(set: &[&SequenceErrors]) -> Vec<String> {
     let methods: BTreeSet<&str> = set.iter().flat_map(|s| s.left_out.keys().copied()).collect();
     let mut notes = Vec::new();

@@ -1,12 +1,12 @@
-//! This module holds the paper's printed results, and the means of its own rows (X. Zhao et al., Learning to Compensate
-//! for the Drift and Error of Gyroscope in Vehicle Localization).
+//! This module holds the results that the paper prints, and computes the means of its rows (X. Zhao et al., Learning
+//! to Compensate for the Drift and Error of Gyroscope in Vehicle Localization).
 
-/// Holds a line of figures.
+/// Holds a line of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// The name of the line in the paper.
+    /// Name of the line in the paper.
     pub name: &'static str,
-    /// The figures.
+    /// Numbers of the line, one for each column.
     pub figures: &'static [f64],
 }
 
@@ -23,7 +23,7 @@ pub const ORIENTATION: [Line; 5] = [
     line("FoG", &[0.000347, 0.06448]),
 ];
 
-/// GyroNet's error in 1 s over that of static initialisation, from [`ORIENTATION`].
+/// GyroNet's error in 1 s relative to that of static initialisation, from [`ORIENTATION`].
 pub const GYRONET_TO_STATIC: f64 = 0.0003854 / 0.001535;
 
 /// Table II: ATE and aligned ATE, m, of FoG, lwoi and FoGNet, each with odometry. Trained on 06 to
@@ -74,7 +74,7 @@ pub const RUN_TIME: [Line; 3] =
 pub const NCLT: [Line; 2] =
     [line("FoG + odometry", &[41.98, 18.15]), line("FoGNet + odometry", &[38.64, 16.66])];
 
-/// Returns the average of some lines, figure by figure.
+/// Returns the average of lines, column by column.
 #[must_use]
 pub fn average(lines: &[Line]) -> Vec<f64> {
     let columns = lines.first().map_or(0, |line| line.figures.len());

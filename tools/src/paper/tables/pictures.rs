@@ -8,12 +8,12 @@ use crate::plot::curve::range;
 use crate::plot::svg::{Axis, COLORS, Figure, Marks, Panel, PlotError, Stroke};
 use crate::simulate::layout::Layout;
 
-/// A picture has this width and height, pixels.
+/// Width and height of a picture, pixels.
 const SIZE: (u32, u32) = (1000, 640);
-/// The margin around the lines is this share of their extent.
+/// Margin around the lines, as a share of their extent.
 const AIR: f64 = 0.05;
 
-/// Holds a line with its name; `None` for the truth.
+/// A curve: the method's name (`None` for the truth) and the points.
 type Curve<'a> = (Option<&'a str>, Vec<(f64, f64)>);
 
 /// Holds the labels of a figure with one panel.
@@ -28,22 +28,22 @@ struct Labels<'a> {
 /// Holds a picture of a sequence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// The part of its file's name that says what it shows.
+    /// Suffix of the file's name, which tells the content.
     pub kind: &'static str,
-    /// The caption, and which of the paper's figures it corresponds to.
+    /// Caption, with the corresponding figure of the paper.
     pub caption: String,
-    /// The picture.
+    /// SVG text of the picture.
     pub svg: String,
 }
 
 /// Draws all pictures of a sequence.
 ///
 /// # Errors
-/// [`PlotError`], when the library refuses.
+/// [`PlotError`] if the plotting library fails.
 pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Result<Vec<Picture>, PlotError> {
     let simulated = if errors.simulated { " (simulated)" } else { "" };
     let name = format!("{}{simulated}", errors.name);
-    // A gyro with its bias and the wheels' turn do not fit a scale that shows the others.
+    // The raw gyro with its bias and the wheels' turn need a scale on which the other curves would not be visible.
     let in_scale =
         |path: &&Path| path.method.is_none_or(|method| ![Method::RAW, Method::WHEELS].contains(&method));
     let of = |gyro: Gyro| {
@@ -118,10 +118,10 @@ fn draw_curves(labels: &Labels<'_>, curves: Vec<Curve<'_>>) -> Result<String, Pl
     figure.svg()
 }
 
-/// Draws the times between the stamps of each file over time: the least and the most of each second.
+/// Plots the time between the stamps of each file: the smallest and the largest of each second.
 ///
 /// # Errors
-/// [`PlotError`], when the library refuses.
+/// [`PlotError`] if the plotting library fails.
 pub fn stamps(sequence: &Sequence) -> Result<String, PlotError> {
     let simulated = if sequence.simulated.is_some() { " (simulated)" } else { "" };
     let title = format!("{}{simulated}: time between stamps, least and most of each second", sequence.name);
@@ -129,7 +129,7 @@ pub fn stamps(sequence: &Sequence) -> Result<String, PlotError> {
     let panels = sequence.files.iter().zip(&names).map(|(file, name)| {
         let top = 1.1 * file.spreads.iter().map(|spread| spread.most_ms).fold(0.0, f64::max).max(1e-3);
         let bars = file.spreads.iter().enumerate().map(|(second, spread)| {
-            // A second whose stamps are all the same time apart is a dot.
+            // A second with equally spaced stamps is drawn as a dot.
             (second as f64 + 0.5, spread.least_ms, spread.most_ms.max(spread.least_ms + 0.01 * top))
         });
         Panel {

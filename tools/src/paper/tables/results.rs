@@ -17,19 +17,19 @@ use std::collections::BTreeMap;
 pub struct Errors {
     /// Mean error of the yaw change in 1 s, rad.
     pub mean_1s_rad: f64,
-    /// Error of the yaw at the end, wrapped, rad.
+    /// Error of the final yaw, wrapped, rad.
     pub final_rad: f64,
-    /// The error of the yaw at the end, not wrapped, rad.
+    /// Error of the final yaw, not wrapped, rad.
     pub final_unwrapped_rad: f64,
-    /// Absolute trajectory error with odometry, rmse, m.
+    /// Absolute trajectory error with odometry, RMS, m.
     pub ate_m: f64,
-    /// The mean distance with odometry, m.
+    /// Mean distance from the true path with odometry, m.
     pub ate_mean_m: f64,
-    /// The absolute trajectory error after alignment, rmse, m.
+    /// Absolute trajectory error after alignment, RMS, m.
     pub aligned_ate_m: f64,
-    /// The mean distance after alignment, m.
+    /// Mean distance from the true path after alignment, m.
     pub aligned_ate_mean_m: f64,
-    /// The run time on this machine, s; `None` where a trajectory was given.
+    /// Run time on this machine, s; `None` for a given trajectory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_time_s: Option<f64>,
 }
@@ -37,10 +37,10 @@ pub struct Errors {
 /// Maps the key of a method to its errors.
 pub type ByMethod = BTreeMap<&'static str, Errors>;
 
-/// Holds the path of a method; the truth's method is `None`.
+/// Holds the path of a method, or the true path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
-    /// The method.
+    /// The method; `None` for the true path.
     pub method: Option<Method>,
     /// Heading at each step, not wrapped, rad.
     pub yaw: Vec<f64>,
@@ -57,21 +57,21 @@ pub struct SequenceErrors {
     pub layout: Layout,
     /// Says whether the sequence is simulated.
     pub simulated: bool,
-    /// The group that it is averaged with.
+    /// The group that the sequence is averaged with.
     pub group: Group,
-    /// The length of the comparison, s.
+    /// Length of the compared part, s.
     pub seconds: f64,
-    /// The distance by its wheels, m.
+    /// Distance measured by the wheels, m.
     pub metres: f64,
     /// The reason why some methods could not be run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<String>,
-    /// The errors.
+    /// The errors of each method.
     pub methods: ByMethod,
-    /// The reasons why given trajectories could not be compared, by the keys of their methods.
+    /// The reasons why given trajectories could not be compared, by the key of the method.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub left_out: BTreeMap<&'static str, String>,
-    /// The numbers that wheels and fibre-optic gyro were fitted with, and on which sequences.
+    /// Text with the fitted numbers of wheels and fibre-optic gyro, and the sequences they were fitted to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted: Option<String>,
     /// The methods in the order of the tables.
@@ -86,7 +86,7 @@ impl SequenceErrors {
         let steps = &sequence.steps[estimates.start..];
         let turns = &sequence.turns()[estimates.start..];
         let truth: Vec<Point> = steps.iter().map(|step| step.position).collect();
-        // The heading is that before the first compared turn.
+        // The heading before the first compared turn.
         let heading = steps.first().map_or(0.0, |step| step.yaw) - turns.first().copied().unwrap_or(0.0);
         let begin = estimates.start.checked_sub(1).map_or([0.0; 2], |k| sequence.steps[k].position);
         let (mut methods, mut order) = (ByMethod::new(), Vec::new());
@@ -131,7 +131,7 @@ impl SequenceErrors {
 
 impl Errors {
     fn new(turns: &[f64], estimate: &Estimate, points: &[Point], truth: &[Point]) -> Option<Self> {
-        // A trajectory that is given may end before the sequence.
+        // A given trajectory may end before the sequence.
         let (turns, truth) = (turns.get(..points.len())?, truth.get(..points.len())?);
         let rates = |turns: &[f64]| turns.iter().map(|turn| turn / crate::drive::DT).collect::<Vec<f64>>();
         let yaw = YawError::new(&rates(&estimate.turns), &rates(turns))?;
@@ -168,7 +168,7 @@ impl Errors {
     }
 }
 
-/// Returns the mean of each method that could be run on all the sequences.
+/// Returns the mean errors of each method that could be run on all sequences.
 #[must_use]
 pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod {
     let mut all: BTreeMap<&'static str, Vec<Errors>> = BTreeMap::new();
@@ -183,18 +183,18 @@ pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod
     all.into_iter().filter(|(_, e)| e.len() == count).map(|(key, e)| (key, Errors::mean(&e))).collect()
 }
 
-/// Holds the results in JSON.
+/// Holds all results, as in the JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
-    /// Says whether some sequence is simulated.
+    /// Says whether at least one sequence is simulated.
     pub simulated: bool,
     /// One entry for each sequence.
     pub sequences: Vec<SequenceErrors>,
-    /// The means over all sequences, of the methods that all of them have.
+    /// The means over all sequences, for the methods that were run on all of them.
     pub mean: ByMethod,
     /// The means over the sequences of each data set's layout.
     pub mean_of_layout: BTreeMap<&'static str, ByMethod>,
-    /// GyroNet's error in 1 s over that of static initialisation, of the means.
+    /// GyroNet's mean error in 1 s relative to that of static initialisation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyronet_to_static: Option<f64>,
     /// The same ratio in the paper's Table I.
@@ -202,7 +202,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// Adds the means.
+    /// Computes the means of the sequences' errors.
     #[must_use]
     pub fn new(sequences: Vec<SequenceErrors>) -> Self {
         let mean_all = mean(sequences.iter());

@@ -1,4 +1,4 @@
-//! This module makes the paper's tables with our figures: rows of words and numbers, which [`super::text`] and
+//! This module builds the paper's tables with our results, as rows of text and numbers that [`super::text`] and
 //! [`super::html`] print.
 
 use super::group::Group;
@@ -9,29 +9,29 @@ use crate::evaluate::methods::{Gyro, Method};
 use crate::simulate::layout::Layout;
 use std::path::Path;
 
-/// Holds a row: a name and figures; `None` for a missing one.
+/// Holds a row of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// The name of the row.
+    /// Name of the row.
     pub name: String,
-    /// One figure for each column.
+    /// One number for each column; `None` if it is missing.
     pub figures: Vec<Option<f64>>,
 }
 
 /// Holds a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Its number in the paper and its subject.
+    /// Number of the table in the paper, and its subject.
     pub title: String,
-    /// Says whether it holds figures of simulated drives.
+    /// Says whether it contains results of simulated drives.
     pub simulated: bool,
-    /// Names of the columns of figures.
+    /// Names of the columns of our rows.
     pub columns: Vec<String>,
-    /// Decimals of the figures.
+    /// Number of decimals.
     pub decimals: usize,
     /// Our rows.
     pub rows: Vec<Row>,
-    /// The columns of the paper's rows.
+    /// Names of the columns of the paper's rows.
     pub paper_columns: Vec<String>,
     /// The paper's rows.
     pub paper_rows: Vec<Row>,
@@ -40,7 +40,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Puts the names of the weight files of GyroNet and FoGNet into the remarks, which speak of the bundled ones.
+    /// Replaces the remarks on bundled weights by the names of the weight files of GyroNet and FoGNet, if given.
     #[must_use]
     pub fn with_weights(mut self, files: [Option<&Path>; 2]) -> Self {
         for ((bundled, network), file) in notes::BUNDLED.iter().zip(["GyroNet", "FoGNet"]).zip(files) {
@@ -53,7 +53,7 @@ impl Table {
     }
 }
 
-/// Returns all tables that the sequences have figures for.
+/// Returns all tables that the sequences have results for.
 #[must_use]
 pub fn tables(results: &Results) -> Vec<Table> {
     let kaist: Vec<&SequenceErrors> =
@@ -68,7 +68,7 @@ pub fn tables(results: &Results) -> Vec<Table> {
     }
     tables.extend(some(&first, urban));
     tables.extend(some(&kaist, padding).filter(|table| !table.rows.is_empty()));
-    // The paper has Table IV for three of its sequences; all simulated ones like its first stand for them.
+    // The paper has Table IV for three of its sequences; here it also has all simulated ones of the first group.
     let with_rivals: Vec<&SequenceErrors> = first
         .iter()
         .copied()
@@ -91,7 +91,7 @@ fn some(set: &[&SequenceErrors], table: impl FnOnce(&[&SequenceErrors]) -> Table
     (!set.is_empty()).then(|| table(set))
 }
 
-/// Returns the methods that some sequence has, in their order.
+/// Returns the wanted methods that at least one sequence has, in order of appearance.
 fn methods_of(set: &[&SequenceErrors], is_wanted: impl Fn(&Method) -> bool) -> Vec<Method> {
     let mut methods: Vec<Method> = Vec::new();
     for method in set.iter().flat_map(|sequence| &sequence.order) {
@@ -118,7 +118,7 @@ fn figures(errors: Option<&Errors>, of: &[fn(&Errors) -> f64]) -> Vec<Option<f64
     of.iter().map(|of| errors.map(of)).collect()
 }
 
-/// Makes Table I for either data set; the paper has it for KAIST alone.
+/// Builds Table I for a data set; the paper has it only for KAIST.
 fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
     let means: ByMethod = mean(set.iter().copied());
     let of: [fn(&Errors) -> f64; 3] = [|e| e.mean_1s_rad, |e| e.final_rad, |e| e.final_unwrapped_rad];
@@ -139,7 +139,7 @@ fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
 
 const ATE: [fn(&Errors) -> f64; 2] = [|e| e.ate_m, |e| e.aligned_ate_m];
 
-/// Returns a row for each sequence with both errors of some methods, and their average.
+/// Returns a row for each sequence with the ATE and aligned ATE of each method, and a row with their averages.
 fn by_sequence(
     set: &[&SequenceErrors],
     methods: &[Method],
@@ -153,7 +153,7 @@ fn by_sequence(
     set.iter().map(|s| row(name(s), &s.methods)).chain([average]).collect()
 }
 
-/// Makes Table II.
+/// Builds Table II.
 fn urban(set: &[&SequenceErrors]) -> Table {
     let is_wanted = |method: &Method| {
         method.gyro != Gyro::Mems || [Method::STATIC.key, Method::GYRONET.key].contains(&method.key)
@@ -180,14 +180,14 @@ fn urban(set: &[&SequenceErrors]) -> Table {
         notes: notes::with_fognet(
             set,
             &[
-                "The paper says neither rmse nor mean; ours is the rmse, and the JSON has both.",
+                "The paper does not say whether its ATE is the rmse or the mean; ours is the rmse, and the JSON has both.",
                 "Its printed averages include the sequences that it trained on.",
             ],
         ),
     }
 }
 
-/// Makes Table IV.
+/// Builds Table IV.
 fn rivals(set: &[&SequenceErrors]) -> Table {
     let methods = methods_of(set, |method| method.gyro == Gyro::Given || method.key == Method::FOGNET.key);
     let mut paper_rows = lines(&paper::RINS_W);
@@ -210,7 +210,7 @@ fn pairs<'a>(labels: impl Iterator<Item = &'a str>) -> Vec<String> {
     labels.flat_map(|label| [format!("{label}: ATE"), String::from("aligned")]).collect()
 }
 
-/// Makes Table III; it has no rows if no method of the list pads.
+/// Builds Table III; it has no rows if FoGNet was not run.
 fn padding(set: &[&SequenceErrors]) -> Table {
     let means = mean(set.iter().copied());
     let rows =
@@ -229,7 +229,7 @@ fn padding(set: &[&SequenceErrors]) -> Table {
     }
 }
 
-/// Makes Tables V and VII.
+/// Builds Table V or VII.
 fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
     let means = mean(set.iter().copied());
     let rows = methods_of(set, |_| true).into_iter().map(|method| Row {
@@ -251,7 +251,7 @@ fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
     }
 }
 
-/// Makes Table VI.
+/// Builds Table VI.
 fn run_time(set: &[&SequenceErrors]) -> Table {
     let hours = set.iter().map(|sequence| sequence.seconds).sum::<f64>() / 3600.0;
     let timed = |method: &Method| method.gyro != Gyro::Given && *method != Method::FOG_WHEELS;
@@ -269,7 +269,7 @@ fn run_time(set: &[&SequenceErrors]) -> Table {
         paper_rows: lines(&paper::RUN_TIME),
         notes: vec![
             "The paper's times are for urban06 to 17.".into(),
-            "Both rows of GyroNet alone have the time of one run; the one with the bias loop is a run of its own.".into(),
+            "Both rows of GyroNet alone have the time of the same run; the one with the bias loop has its own run.".into(),
         ],
     }
 }

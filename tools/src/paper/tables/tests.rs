@@ -13,7 +13,7 @@ use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
 use std::path::PathBuf;
 
-/// Never corrects anything.
+/// A network that never corrects anything.
 struct Nothing;
 
 impl WindowNetwork for Nothing {
@@ -38,7 +38,7 @@ fn exact() -> Sequence {
         let turned = if k < 400 { 0.0 } else { 0.003 * (k as f64 * 0.002).sin() };
         let way = if k < 400 { 0.0 } else { 0.1 };
         track.step([way; 2], turned);
-        // Every axis flickers as a sensor does, with mean zero over three steps: equal readings are stuck ones.
+        // Every axis has noise as a sensor has, with mean zero over three steps: equal readings would count as stuck.
         let noise = 1e-4 * ((k % 3) as f32 - 1.0);
         Step {
             specific_force: [10.0 * noise, 10.0 * noise, 9.8 + 10.0 * noise],
@@ -116,7 +116,7 @@ fn wheels_alone_turn_by_their_difference() {
     let (errors, _) = SequenceErrors::new(&sequence, &estimates);
     let wheels = errors.methods["wheels"];
     assert!(wheels.final_unwrapped_rad < 1e-9 && wheels.ate_m < 1e-6, "{wheels:?}");
-    // A base that is wrong by a tenth is a turn that is.
+    // A wheel base that is wrong by a tenth makes the turn wrong by a tenth.
     sequence.wheel_base = Some(1.5 / 1.1);
     let estimates = estimates::run(&sequence, &mut Nothing, || {});
     let (errors, _) = SequenceErrors::new(&sequence, &estimates);
@@ -138,7 +138,7 @@ fn wheels_and_gyro_are_fitted_together() {
     };
     let mut fit = Fit::default();
     fit.add(&worse(&training));
-    // Both wheels go the same way here, so nothing can be said of their difference.
+    // Both wheels cover the same distance here, so the share of their difference cannot be fitted.
     assert_eq!(fit.solve(), None);
     let mut turning = training.clone();
     for (k, step) in turning.steps.iter_mut().enumerate() {
@@ -201,7 +201,7 @@ fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
     assert_eq!(later.title, "Table V: average ATE on newly released sequences, 1 sequences, m");
     for table in [rivals, later] {
         assert!(table.notes.iter().any(|note| note.contains("trained on simulated")), "{:?}", table.notes);
-        assert!(table.notes.iter().any(|note| note.contains("prediction less")), "{:?}", table.notes);
+        assert!(table.notes.iter().any(|note| note.contains("prediction minus")), "{:?}", table.notes);
     }
 }
 

@@ -1,45 +1,44 @@
-//! This module writes charts that fill the width of the page: the picture stretches, its numbers do not.
+//! This module writes charts that fill the width of the page. The curves stretch; the text does not.
 //!
-//! The curves are an SVG without proportions of its own; axes and names are text of the page
-//! beside it. So the same chart can be read on a desk and on a phone, and the script can zoom by
-//! moving the SVG's window.
+//! The curves are an SVG without a fixed aspect ratio; axes and names are HTML text beside the SVG. So the chart is
+//! readable on a desktop and on a phone, and the script can zoom by changing the SVG's view box.
 
 use super::escaped;
 use crate::plot::curve::{range, thinned};
 use std::fmt::Write;
 
-/// The SVG has this width and height; coordinates are whole numbers.
+/// Width and height of the SVG; coordinates are integers.
 const SIDE: f64 = 10_000.0;
-/// A curve keeps about this many points, more than there are pixels, for zooming.
+/// Approximate number of points of a curve: more than pixels, for zooming.
 const POINTS: usize = 2_000;
-/// A chart with the same scale in both directions has a width over height within these limits.
+/// Limits of the width over the height of a chart with the same scale on both axes.
 const ASPECTS: (f64, f64) = (1.5, 2.6);
 
-/// Holds a line of a chart.
+/// A curve of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Its colour in the style sheet.
+    /// The class in the style sheet, which gives the colour.
     pub class: &'static str,
-    /// The name.
+    /// The name in the legend.
     pub label: String,
-    /// The result of the line, beside its name.
+    /// The text after the name in the legend.
     pub note: String,
     /// The points in the units of the axes.
     pub points: Vec<(f64, f64)>,
-    /// Says whether the axes must hold all of it; otherwise it may leave them.
+    /// Whether the axes must cover the whole curve; otherwise the curve may leave the chart.
     pub in_scale: bool,
 }
 
-/// Holds curves over common axes.
+/// A chart of curves with common axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart<'a> {
-    /// The title above it.
+    /// The title above the chart.
     pub title: &'a str,
-    /// The units to the right and upwards.
+    /// The text after the title: the quantities and units of the axes.
     pub axes: &'a str,
-    /// Says whether both axes have the same scale; otherwise the axis to the right is the time.
+    /// Whether both axes have the same scale; otherwise the horizontal axis is the time.
     pub same_scale: bool,
-    /// The lines from back to front.
+    /// The curves from back to front.
     pub curves: Vec<Curve>,
 }
 
@@ -50,7 +49,7 @@ impl Chart<'_> {
         self.draw(if self.same_scale { "map" } else { "time" })
     }
 
-    /// Returns a chart of decimal logarithms, whose axes show the numbers themselves.
+    /// Returns a chart whose points are decimal logarithms; the axes show the numbers themselves.
     #[must_use]
     pub fn log_html(&self) -> String {
         self.draw("map log")
@@ -119,7 +118,7 @@ impl Chart<'_> {
     }
 }
 
-/// Returns the place of a value between the ends of its axis.
+/// Returns the position of a value on its axis, 0 to 1.
 fn part(value: f64, (from, to): (f64, f64)) -> f64 {
     (value - from) / (to - from)
 }
@@ -132,13 +131,13 @@ fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64) {
     (around(x, metres * aspect / 2.0), around(y, metres / 2.0), aspect)
 }
 
-/// Holds a number on an axis.
+/// A labelled position on an axis.
 struct Tick {
     at: f64,
     label: String,
 }
 
-/// Returns round numbers, at most so many. The script has the same rule.
+/// Returns about `most` round numbers. The script has the same rule.
 fn ticks((from, to): (f64, f64), most: u32, is_log: bool) -> Vec<Tick> {
     let rough = (to - from) / f64::from(most);
     let power = 10f64.powf(rough.log10().floor());
@@ -152,7 +151,7 @@ fn ticks((from, to): (f64, f64), most: u32, is_log: bool) -> Vec<Tick> {
     at.map(|at| Tick { at, label: label(at) }).collect()
 }
 
-/// Returns a number with its first two digits: 0.032, 1, 320.
+/// Formats a number with two significant digits: 0.032, 1, 320.
 fn two_digits(value: f64) -> String {
     format!("{value:.1e}").parse::<f64>().unwrap_or(value).to_string()
 }

@@ -1,10 +1,10 @@
-// Drag over a chart to zoom in; a double click or "whole drive" goes back; a name in the legend
-// hides its curve. On the keyboard + and - zoom, arrows move, Escape goes back. The charts over
-// time move together.
+// Drag over a chart to zoom in; a double click or "whole drive" shows the whole chart again; a name in
+// the legend hides its curve. On the keyboard, + and - zoom, arrows move, Escape shows the whole chart.
+// Charts over time move together.
 'use strict';
 (() => {
   const SIDE = 10000, AIR = 0.06, LEAST = SIDE / 500;
-  // The width by which a key multiplies the view, and the shares of it to the right and down by which it moves.
+  // For each key: the factor of the view's width, and the shares of the width by which the view moves right and down.
   const KEYS = {
     '+': [0.5, 0, 0], '=': [0.5, 0, 0], '-': [2, 0, 0],
     ArrowLeft: [1, -0.25, 0], ArrowRight: [1, 0.25, 0], ArrowUp: [1, 0, -0.25], ArrowDown: [1, 0, 0.25],
@@ -38,7 +38,7 @@
     return line;
   }));
 
-  // Up and down, what is left of the curves shows whole.
+  // Fits the vertical range to the visible part of the curves.
   const fit = chart => {
     const [left, right] = chart.view;
     let top = Infinity, bottom = -Infinity;
@@ -133,7 +133,7 @@
       const [left, right, top, bottom] = chart.view, width = right - left, height = bottom - top;
       let view = [left + u0 * width, left + u1 * width, top + v0 * height, top + v1 * height];
       if (chart.isMap) {
-        // A metre stays as long either way.
+        // Both axes of a map keep the same scale.
         const half = Math.max(view[1] - view[0], view[3] - view[2], LEAST) / 2;
         const [x, y] = [(view[0] + view[1]) / 2, (view[2] + view[3]) / 2];
         view = [x - half, x + half, y - half, y + half];

@@ -1,4 +1,4 @@
-//! This module delays messages, because the stamp in a data set is the logger's, not the part's.
+//! This module delays messages, because the stamps in a data set are the logger's, not the sensor's.
 
 use crate::random::Random;
 use crate::simulate::purpose::Purpose;
@@ -10,11 +10,11 @@ pub(super) struct Delay {
     delays: Delays,
     random: Random,
     last: f64,
-    /// Begin and end of the current or next blockage.
+    /// Begin and end of the current or next blockage, s.
     blocked: [f64; 2],
 }
 
-/// Two messages of a part are at least this far apart, s: reading one takes so long.
+/// Shortest time between two messages of a part, s, because reading one takes as long.
 const APART: f64 = 10e-6;
 
 impl Delay {
@@ -25,7 +25,7 @@ impl Delay {
         delay
     }
 
-    /// Returns the arrival of a message of this time, later than the one before, s.
+    /// Returns the arrival time of a message, s, later than that of the previous message; `time` is when it is sent.
     pub fn arrival(&mut self, time: f64) -> f64 {
         while time > self.blocked[1] {
             self.block();

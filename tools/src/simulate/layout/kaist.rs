@@ -9,15 +9,15 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// A sequence starts at this time, somewhere in 2018.
+/// Start time of a sequence, in 2018.
 const START_NS: i64 = 1_524_000_000_000_000_000;
-/// A revolution has this many counts.
+/// Encoder counts per revolution.
 const RESOLUTION: f64 = 4096.0;
-/// The fibre-optic gyro sends this many increments in 10 ms.
+/// Number of increments that the fibre-optic gyro sends in 10 ms.
 const INCREMENTS: u32 = 10;
-/// A sequence starts at this place in UTM, m.
+/// Start position of a sequence in UTM, m.
 const ORIGIN: [f64; 3] = [355_000.0, 4_025_000.0, 60.0];
-/// The Earth's field, east, north, up, normalised, and the noise of its measurement.
+/// The Earth's magnetic field, east, north, up, normalised, and the noise of the magnetometer.
 const FIELD: ([f64; 3], f64) = ([0.0, 0.6, -0.8], 0.003);
 
 pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path, mut tick: impl FnMut()) -> io::Result<()> {
@@ -48,7 +48,7 @@ pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path, mut tick: impl
 
         let now = truth.seconds + DT;
         let (force, rate) = drive.imu(&truth);
-        // The vendor's filter is not known: this heading is the gyro's integral.
+        // The vendor's filter is unknown, so this heading is the integral of the gyro.
         let yaw = heading.get_or_insert(truth.yaw);
         *yaw += rate[2] * DT;
         let attitude = [motion.roll, motion.pitch, *yaw];

@@ -10,17 +10,17 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::io;
 use std::path::Path;
 
-/// A sequence starts at this time, somewhere in 2012.
+/// Start time of a sequence, in 2012.
 const START_US: i64 = 1_330_000_000_000_000;
-/// The rates are those measured on 2013-01-10, Hz.
+/// Message rates, Hz, as measured on 2013-01-10.
 const IMU_HZ: f64 = 47.1;
 const WHEELS_HZ: f64 = 41.2;
-/// The longest blockage of the wheels, s: gaps of up to 201 ms were measured on that day.
+/// Longest blockage of the wheels, s: gaps of up to 201 ms were measured on that day.
 const WHEELS_LONGEST: f64 = 0.175;
-/// The Earth's field, east, north, up, Gauss, and the noise of its measurement.
+/// The Earth's magnetic field, east, north, up, Gauss, and the noise of the magnetometer.
 const FIELD: ([f64; 3], f64) = ([0.0, 0.19, -0.5], 0.003);
 
-/// Times a part that is slower than the ticks and averages over them.
+/// Times the messages of a part that is slower than the 10 ms ticks and averages over them.
 struct Slow {
     period: f64,
     next: f64,
@@ -32,7 +32,7 @@ impl Slow {
         Self { period: 1.0 / hz, next: 1.0 / hz, ticks: 0 }
     }
 
-    /// Returns the number of ticks that the message that is now due averages over; `None` where none is due.
+    /// Returns the number of ticks that the message now due averages over; `None` if no message is due.
     fn due(&mut self, now: f64) -> Option<f64> {
         self.ticks += 1;
         if now < self.next {

@@ -6,7 +6,7 @@ fn spec(layout: Layout, seconds: u32) -> Spec {
     Spec { layout, name: "one".into(), seconds, device: 1, run: 7 }
 }
 
-/// Returns all rows of a file, with the stamp apart.
+/// Returns all rows of a file, each with its stamp separated.
 fn rows(path: &Path) -> Vec<(i64, Vec<f64>)> {
     let text = fs::read_to_string(path).unwrap();
     let row = |line: &str| {
@@ -43,8 +43,8 @@ fn kaist_has_its_columns_and_rates() {
     );
 }
 
-/// The sum of the increments is the turn of the pose, except for the Earth's rate and the gyro's errors, and the counts
-/// give its way.
+/// The increments sum to the turn of the pose, except for the Earth's rate and the gyro's errors, and the counts give
+/// the distance.
 #[test]
 fn kaist_sensors_agree_with_the_pose() {
     let folder = tempdir().unwrap();

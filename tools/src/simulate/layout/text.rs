@@ -1,10 +1,10 @@
-//! This module writes rows of numbers fast, since a sequence has one and a half million of them.
+//! This module writes rows of numbers fast, because a sequence has one and a half million rows.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes a file of rows.
+/// A writer of a file of comma-separated rows.
 pub(super) struct Rows {
     file: BufWriter<File>,
     line: Vec<u8>,

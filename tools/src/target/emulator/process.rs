@@ -1,5 +1,5 @@
-//! This module runs QEMU as a process: threads collect its output, so that it never blocks, and it is killed when its
-//! owner is dropped.
+//! This module runs QEMU as a process. Threads collect its output, so that QEMU never blocks, and QEMU is killed when
+//! its owner is dropped.
 
 use super::{EmulatorError, POLL, Result, START};
 use std::fmt::Display;
@@ -20,7 +20,8 @@ pub(super) struct Collected {
 }
 
 impl Collected {
-    /// Waits until `enough` accepts the bytes or time is up; returns the bytes and whether they were accepted.
+    /// Waits until `enough` accepts the bytes or the timeout expires; returns the bytes and whether they were
+    /// accepted.
     pub(super) fn wait(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> (Vec<u8>, bool) {
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let (bytes, timeout) = self
@@ -30,14 +31,14 @@ impl Collected {
         (bytes.clone(), !timeout.timed_out())
     }
 
-    /// Returns whether `enough` accepts the bytes before time is up, without a copy.
+    /// Waits as [`Self::wait`] does, without copying the bytes; returns whether they were accepted.
     pub(super) fn holds(&self, limit: Duration, mut enough: impl FnMut(&[u8]) -> bool) -> bool {
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let waited = self.more.wait_timeout_while(bytes, limit, |bytes| !enough(bytes));
         !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
     }
 
-    /// Copies the bytes to a sink until the source ends or the sink takes no more.
+    /// Copies the bytes to a sink until the source ends or the sink fails.
     pub(super) fn copy_to(&self, mut sink: impl Write) {
         let mut copied = 0;
         loop {
@@ -92,7 +93,7 @@ impl Process {
         collected
     }
 
-    /// Accepts QEMU's end of a line.
+    /// Accepts QEMU's connection for a line.
     pub(super) fn accept(&mut self, listener: &TcpListener) -> Result<Line> {
         let until = Instant::now() + START;
         listener.set_nonblocking(true)?;
@@ -111,7 +112,7 @@ impl Process {
         Ok(Line { stream, received })
     }
 
-    /// Sleeps for a moment, unless time is up.
+    /// Sleeps briefly; fails with `what` after the time `until`.
     pub(super) fn sleep(&self, until: Instant, what: impl Display) -> Result<()> {
         if Instant::now() > until {
             return Err(self.failed(what));
@@ -120,7 +121,7 @@ impl Process {
         Ok(())
     }
 
-    /// Ends QEMU cleanly, by its monitor, and returns everything that it has written to standard error.
+    /// Ends QEMU cleanly through its monitor, and returns everything that QEMU has written to standard error.
     pub(super) fn quit(&mut self) -> Result<String> {
         let asked = self.child.stdin.take().map(|mut monitor| monitor.write_all(b"quit\n"));
         if !matches!(asked, Some(Ok(()))) {
@@ -147,7 +148,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended by itself already. Its ends of all lines close with it.
+        // QEMU may have ended already, so errors are ignored. Its connections close when it ends.
         let _ = self.child.kill();
         let _ = self.child.wait();
         for thread in self.threads.drain(..) {

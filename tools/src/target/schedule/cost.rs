@@ -2,45 +2,45 @@
 
 use crate::target::tasks::{Activation, Cycles, Handler, Least};
 
-/// Entering and leaving a handler takes this many cycles: 12 and 10 (Cortex-M4 TRM, 3.9.1), and 17 words of
-/// floating-point registers each way.
+/// Cycles to enter and leave a handler: 12 and 10 (Cortex-M4 TRM, 3.9.1), and 17 words of floating-point registers
+/// each way.
 pub(super) const EXCEPTION: u64 = 12 + 10 + 2 * 17;
-/// Reading a line of flash takes this many cycles, five of them wait states.
+/// Cycles to read a line of flash, five of them wait states.
 pub(super) const LINE_READ: u64 = 6;
-/// Both caches have this many lines: no activation can cost a preempted task more of them.
+/// Number of lines in both caches: no activation can cost a preempted task more lines.
 pub(super) const LINES: u64 = 64 + 8;
-/// Taking the vector costs three lines: the vector itself, read from flash, its place in the cache, and the line that
-/// was in use before.
+/// Cycles to take the vector. It costs three lines: the vector itself, read from flash, its place in the cache, and
+/// the line that was in use before.
 pub(super) const VECTOR: u64 = 3 * LINE_READ;
-/// Copying a frame, with the code around it but without `can_frames` itself, takes at most this many cycles.
+/// Upper limit of the cycles to copy a frame, with the code around it but without `can_frames` itself.
 pub(super) const COPY: u64 = 150;
 
-/// Says how the cost of a task follows from its activations.
+/// The rule that computes a task's cost from its activations.
 pub(super) enum Cost {
     /// The task costs its worst activation.
     Worst,
-    /// The task costs the worst activation that moved no more than so many bytes, as on a real line: one in, and two
-    /// out if something is sent on it. The emulated line moves all bytes at once.
+    /// The task costs the worst activation that moved at most this many bytes, as on a real line: one received, and
+    /// two sent if the line is used for sending. The emulated line moves all bytes at once.
     Bytes(usize),
-    /// The task costs, in 10 ms, the worst activation with one sample, the worst without, the cheapest one for each
-    /// sent frame that pends it, and a check of all lines with every tick, because the emulated line delivers many
-    /// bytes at a time.
+    /// The task costs, in 10 ms, the worst activation with one sample, the worst without a sample, the cheapest one
+    /// for each sent frame that pends the task, and a check of all lines with every tick, because the emulated line
+    /// delivers many bytes at a time.
     Sample,
 }
 
-/// In 10 ms the output task is pended this many times without work: by ten sent frames and the end of a window.
+/// Number of times in 10 ms that the output task is pended without work: by ten sent frames and the end of a window.
 pub(super) const TURNS: u64 = 10 + 1;
-/// In 10 ms there are this many ticks; with each the output task checks every line.
+/// Number of ticks in 10 ms; at each tick the output task checks all lines.
 pub(super) const TICKS: u64 = 10;
 
-/// Returns the cycles of one activation with entry, exit, and its cost to the preempted task.
+/// Returns the cycles of one activation, including entry, exit, and its cost to the preempted task.
 fn whole(cycles: Cycles, fills: u64) -> Cycles {
     let five = cycles.five + EXCEPTION + VECTOR + fills.min(LINES) * LINE_READ;
     Cycles { zero: cycles.zero + EXCEPTION, five }
 }
 
 impl Cost {
-    /// Returns activations, instructions and modelled cycles in a period.
+    /// Returns the number of activations, the instructions, and the modelled cycles per period.
     pub(super) fn of(&self, handler: &Handler) -> (u64, u64, Cycles) {
         let kinds = if let Self::Bytes(most) = self { 1 + most } else { handler.activations.len() };
         let ran = || handler.activations.iter().take(kinds).flatten();
@@ -51,8 +51,8 @@ impl Cost {
             cycles: a.cycles.max(b.cycles),
             fills: a.fills.max(b.fills),
         });
-        // For code that never ran, each instruction counts once, at three cycles; there are half as many words as
-        // halfwords.
+        // For code that never ran, each halfword counts as an instruction of three cycles, and a flash line holds
+        // eight.
         let worst = worst.unwrap_or_else(|| {
             let (zero, lines) = (3 * handler.code + COPY, handler.code / 8 + 1);
             let cycles = Cycles { zero, five: zero + 2 * lines * LINE_READ };
@@ -63,7 +63,7 @@ impl Cost {
             Self::Worst | Self::Bytes(_) => whole(cycles, fills),
             Self::Sample => {
                 let kind = |kind: usize| handler.activations[kind].map(|ran| whole(ran.cycles, ran.fills));
-                // On a host that is too slow to send samples one by one, the worst of several is used.
+                // If the host is too slow to send samples one by one, use the worst activation of several samples.
                 let sample = kind(1).unwrap_or_else(|| whole(cycles, fills)) + kind(0).unwrap_or_default();
                 let least = |least: Least| whole(least.cycles, least.fills);
                 sample + least(handler.least) * TURNS + least(handler.looking) * TICKS
@@ -72,7 +72,7 @@ impl Cost {
         (runs, instructions, cycles)
     }
 
-    /// Returns the cycles of each of many activations: one that moves several bytes stands for as many activations.
+    /// Returns the cycles of each of many activations: an activation that moves several bytes counts as several.
     pub(super) fn each(&self, handler: &Handler) -> Option<Cycles> {
         let Self::Bytes(most) = self else { return None };
         let ran = handler.activations.iter().enumerate().take(1 + most);

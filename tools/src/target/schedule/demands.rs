@@ -1,17 +1,17 @@
-//! This module lists how often each task of the image can be activated, and when it must be done.
+//! This module lists how often each task of the image can be activated, and its deadline.
 
 use super::cost::Cost;
 
-/// A byte takes this long at 115200 and at 921600 bit/s, us: ten bits.
+/// Duration of a byte (ten bits) at 115200 and at 921600 bit/s, us.
 const BYTE_115200: f64 = 10e6 / 115_200.0;
 const BYTE_921600: f64 = 10e6 / 921_600.0;
-/// A sample's frames are delayed by at most this, us: the output task waits for a tick and takes no more than 3 ms; if
-/// it takes longer, no deadline counts as met.
+/// Largest delay of a sample's frames, us: the output task waits for a tick and runs for at most 3 ms. If it takes
+/// longer, the schedule counts as not met.
 pub(super) const FRAMES_LATE: f64 = 4e3;
-/// The shortest frame at 500 kbit/s takes this long, us: 47 bits.
+/// Duration of the shortest frame (47 bits) at 500 kbit/s, us.
 const FRAME: f64 = 47.0 / 0.5;
 
-/// Limits activations that come in bursts.
+/// A limit of activations in bursts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Burst {
     pub(super) count: f64,
@@ -27,14 +27,14 @@ impl Burst {
     }
 }
 
-/// Describes the demand on a task.
+/// The demand on a task: how often it is activated, and its deadline.
 pub(super) struct Demand {
     pub(super) name: &'static str,
     pub(super) handler: &'static str,
     pub(super) cost: Cost,
     /// The shortest time between two activations, us.
     pub(super) period: f64,
-    /// The limit of activations in bursts.
+    /// Limit of the activations in a burst.
     pub(super) burst: Option<Burst>,
     /// Time from the activation to the deadline, us.
     pub(super) deadline: f64,
@@ -42,11 +42,11 @@ pub(super) struct Demand {
 }
 
 const MAILBOXES: &str = "three mailboxes are empty";
-/// These handlers end a run: the supply falls, and the board restarts.
+/// Handlers that end a run: the supply voltage falls, and the board restarts.
 pub(super) const LAST: [&str; 1] = ["PVD"];
 
-/// Lists the demands on all tasks of `coprocessor` with everything configured and connected; an image without one of
-/// them lacks its row.
+/// The demands on all tasks of `coprocessor` with everything configured and connected. The row of a task that an
+/// image does not have is left out.
 pub(super) const DEMANDS: [Demand; 9] = [
     byte("imu_line", "USART1", BYTE_115200),
     // Messages of up to 47 bytes, 1000 a second.
@@ -67,7 +67,7 @@ pub(super) const DEMANDS: [Demand; 9] = [
             "three frames fill the controller",
         )
     },
-    // Six frames come with a sample, four with the sums of the fibre-optic gyro.
+    // Six frames are sent with a sample, four with the sums of the fibre-optic gyro.
     Demand {
         burst: Burst::new(10.0, 1e4, FRAMES_LATE),
         ..demand("can_sent", "CAN1_TX", Cost::Worst, FRAME, 3.0 * FRAME, MAILBOXES)
@@ -87,13 +87,12 @@ const fn demand(
     Demand { name, handler, cost, period, burst: None, deadline, why }
 }
 
-/// Returns the demand of a line at full speed on which nothing is sent: each byte must be taken before the next
-/// arrives.
+/// Returns the demand of a line at full speed that only receives: each byte must be read before the next one arrives.
 const fn byte(name: &'static str, handler: &'static str, period: f64) -> Demand {
     demand(name, handler, Cost::Bytes(1), period, period, "the next byte")
 }
 
-/// Returns the demand of a line at full speed on which something is sent.
+/// Returns the demand of a line at full speed that receives and sends.
 const fn both_ways(name: &'static str, handler: &'static str, period: f64) -> Demand {
     Demand { cost: Cost::Bytes(3), ..byte(name, handler, period) }
 }

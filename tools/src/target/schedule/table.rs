@@ -1,4 +1,4 @@
-//! This module prints the schedule as a table, a task a line.
+//! This module prints the schedule as a table with one line per task.
 
 use super::{Burst, SPARE, Schedule, Task};
 use crate::target::parser_load::CLOCK_HZ;

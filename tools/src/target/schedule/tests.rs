@@ -2,7 +2,7 @@ use super::cost::{COPY, EXCEPTION, LINE_READ, LINES, TICKS, TURNS, VECTOR};
 use super::*;
 use crate::target::tasks::{Activation, KINDS, Least};
 
-/// Makes a handler whose activation takes so many cycles in all, without wait states and with them.
+/// Creates a handler whose activation takes this many cycles in total, without and with wait states.
 fn handler(name: &str, priority: u8, cycles: Option<[u64; 2]>) -> Handler {
     let ran = cycles.map(|[zero, five]| Activation {
         runs: 1,
@@ -16,7 +16,7 @@ fn handler(name: &str, priority: u8, cycles: Option<[u64; 2]>) -> Handler {
         cycles: Cycles { zero: 1_000_000, five: 2_000_000 },
         fills: 0,
     };
-    // What fills the caches costs the preempted task as many lines.
+    // An activation that fills the caches costs the preempted task all lines.
     let full = EXCEPTION + VECTOR + LINES * LINE_READ;
     Handler {
         name: name.to_owned(),
@@ -39,7 +39,7 @@ fn tasks(window: u64) -> Tasks {
         handler("UART5", 1, Some([window, window])),
     ];
     for other in handlers.iter_mut().filter(|handler| !handler.name.starts_with("USART")) {
-        // A burst, as only lines have them.
+        // Only serial lines have activations that move many bytes.
         other.activations[KINDS - 1] = None;
     }
     // A sample.
@@ -64,17 +64,17 @@ fn responses_by_hand() {
             assert!((response - us).abs() < 1e-6, "{name}: {response}, not {us}\n{schedule}");
         }
     };
-    // Its own microsecond, the tick's, and what blocks it, all of them twice with wait states; and the
-    // other line's.
+    // The line's own microsecond, the tick's, and the blocking, all of them twice with wait states; and the other
+    // line's.
     close("imu_line", [4.0, 7.0]);
-    // A line's own, imu's, tick's, the other line's and what blocks it; and CAN, whose bound is from
-    // its code: 100 halfwords are 13 lines, each missed twice and once more by what is preempted. With
-    // wait states the other line's next byte comes in that time.
+    // The line's own cost, that of imu_line, the tick and the other line, and the blocking; and CAN, whose bound is
+    // from its code: 100 halfwords are 13 lines, each missed twice, and once more by the preempted task. With wait
+    // states the other line's next byte arrives in that time.
     let can = 300 + COPY + EXCEPTION;
     let can_5ws = can + 2 * 13 * LINE_READ + VECTOR + 13 * LINE_READ;
     close("service_line", [5.0 + can as f64 / 168.0, 9.0 + can_5ws as f64 / 168.0]);
     assert_eq!((task("can_frames").runs, task("can_frames").cycles), (0, can));
-    // 60 us of a sample, 40 us without one, 116 turns of a microsecond, and ten that look for two.
+    // 60 us with a sample, 40 us without, TURNS activations of 1 us, and TICKS that check all lines in 2 us.
     assert_eq!(task("output").cycles, 168 * (100 + TURNS + 2 * TICKS));
     assert_eq!(task("output").cycles_5ws, 168 * (130 + 5 * TURNS + 6 * TICKS));
     assert!(schedule.met(), "{schedule}");

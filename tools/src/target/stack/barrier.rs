@@ -1,23 +1,23 @@
-//! This module checks that no interrupt handler returns while a store of its own is still under way.
+//! This module checks that no interrupt handler returns before its own stores are complete.
 //!
-//! Otherwise a Cortex-M4 can take the wrong vector next (Arm erratum 838869). A `DSB` after the last store prevents it,
-//! so between each return and the `DSB` before it there may be only instructions that store nothing, and no branch may
-//! lead there past the `DSB`.
+//! Otherwise a Cortex-M4 can take the wrong vector next (Arm erratum 838869). A `DSB` after the last store prevents
+//! this. Between the `DSB` and the return there may be only instructions that do not store, and no branch may enter
+//! this range from elsewhere.
 
 use super::StackError;
 use super::code::Code;
 use super::thumb::{self, Effect};
 use std::collections::BTreeSet;
 
-/// Calls are followed to this depth: a handler, its task, and the calls at that one's end.
+/// Depth to which calls are followed: a handler, its task, and the calls at the task's end.
 const DEPTH: usize = 4;
 /// The encoding of `DSB SY`.
 const DSB: (u16, Option<u16>) = (0xF3BF, Some(0x8F4F));
 
-/// Returns the names of those handlers, by exception number, that can return after a store without a barrier.
+/// Returns the names of those of the given exceptions' handlers that can return after a store without a barrier.
 ///
 /// # Errors
-/// [`StackError::Format`], also where an exception has no handler.
+/// [`StackError::Format`], also if an exception has no handler.
 pub fn handlers_without_barrier(elf: &[u8], exceptions: &[usize]) -> Result<Vec<String>, StackError> {
     let code = Code::read(elf)?;
     let mut without = Vec::new();
@@ -39,7 +39,8 @@ fn ends_with_barrier(code: &Code, start: u32, depth: usize) -> bool {
         return false;
     };
     let end = start + function.size;
-    // These track the barrier since which nothing has been stored, and the stretches from a barrier to a return.
+    // `barrier`: the last barrier, if no store followed. `endings`: the ranges from a barrier to a return. `targets`:
+    // the targets of branches.
     let (mut barrier, mut endings, mut targets) = (None, Vec::new(), BTreeSet::new());
     for (at, first, second) in function.instructions.iter().copied() {
         match thumb::effect(first, second, at) {
@@ -75,8 +76,8 @@ fn returns(first: u16, second: Option<u16>) -> bool {
     }
 }
 
-/// Returns whether an instruction is one of those that compilers put between a barrier and a return and that store
-/// nothing; any other counts as a store.
+/// Returns whether an instruction is known not to store. Only those are known that compilers emit between a barrier
+/// and a return; any other counts as a store.
 fn stores_nothing(first: u16, second: Option<u16>) -> bool {
     match second {
         // NOP; POP; ADD sp, #imm; MOVS Rd, #imm; MOV Rd, Rm; LDR Rt, [sp, #imm]

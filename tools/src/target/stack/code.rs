@@ -1,4 +1,4 @@
-//! This module reads the functions of an image: the stack that each needs, and its calls.
+//! This module reads the functions of an image, with the stack use and the calls of each.
 
 use super::priority::{self, Vectors};
 use super::thumb::{self, Effect, Instruction};
@@ -20,7 +20,7 @@ pub struct Function {
 pub struct Code {
     /// The functions by address.
     pub functions: BTreeMap<u32, Function>,
-    /// Functions whose address is a value somewhere.
+    /// Functions whose address is taken somewhere.
     taken: BTreeSet<u32>,
     pub vectors: Vectors,
 }
@@ -40,13 +40,13 @@ impl Code {
                 let name = format!("{:#}", rustc_demangle::demangle(name));
                 let range = (symbol.size() as u32, name);
                 let known = ranges.entry(address & !1).or_insert_with(|| range.clone());
-                // Of two names for one place the one with a size counts.
+                // If an address has two names, the one with a size counts.
                 if known.0 == 0 {
                     *known = range;
                 }
             }
         }
-        // An assembler's function without a size ends where the next one begins.
+        // An assembly function without a size ends where the next function begins.
         let begins: Vec<u32> = ranges.keys().copied().collect();
         for pair in begins.windows(2) {
             if let [address, next] = *pair
@@ -87,7 +87,7 @@ impl Code {
         Ok(code)
     }
 
-    /// Reads one function's instructions, one after the other.
+    /// Reads the instructions of one function.
     fn function(
         &mut self,
         name: &str,
@@ -106,8 +106,8 @@ impl Code {
         };
         let end = address + function.size;
         let (mut low, mut aligned) = ([0u32; 16], [0u32; 16]);
-        // Holds a function's address that the instruction before has completed. The linker's veneers from flash to RAM
-        // jump there at once, which is a call. Any other use takes the address.
+        // Register and function address that the previous instruction has completed. The linker's veneers from flash
+        // to RAM jump to it immediately, which is a call. Any other use takes the address.
         let mut made: Option<(u8, u32)> = None;
         for (at, first, second) in function.instructions.iter().copied() {
             let effect = thumb::effect(first, second, at);
@@ -125,13 +125,13 @@ impl Code {
                 Effect::None => {}
                 Effect::Push(bytes) => function.own += bytes,
                 Effect::Align { register, bytes } => aligned[usize::from(register)] = bytes,
-                // A rounded register makes a frame on a larger boundary; any other restores the stack.
+                // A rounded register aligns the frame on a larger boundary; any other register restores the stack.
                 Effect::MoveSp { register } => {
                     function.own += std::mem::take(&mut aligned[usize::from(register)]);
                 }
                 Effect::Dynamic => return Err(StackError::Dynamic { function: function.name, address: at }),
                 Effect::Indirect { .. } | Effect::Loaded => function.indirect += 1,
-                // Inside the function a branch is a loop or a condition; to the outside it is a tail call.
+                // A branch inside the function is a loop or a condition; a branch to the outside is a tail call.
                 Effect::Branch(target) if (address..end).contains(&target) => {}
                 Effect::Call(target) | Effect::Branch(target) => {
                     function.calls.insert(target);
@@ -151,7 +151,8 @@ impl Code {
         self.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
     }
 
-    /// Returns, for the function that runs with interrupts off, the frame that is left when they come on.
+    /// Returns, for the function that runs with interrupts off, the frame that remains when interrupts are switched
+    /// on.
     pub fn masked(&self) -> HashMap<u32, u32> {
         let masked = |function: &Function| function.name.ends_with(MASKED);
         self.functions.iter().filter(|(_, f)| masked(f)).map(|(address, f)| (*address, f.own)).collect()

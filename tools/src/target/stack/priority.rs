@@ -1,32 +1,32 @@
-//! This module reads the priorities of handlers, which determine which of them can interrupt each other.
+//! This module reads the priorities of handlers, which determine which handlers can interrupt each other.
 //!
-//! Handlers of one priority cannot (ARMv7-M Architecture Reference Manual, B1.5.4). An image lists its priorities in a
-//! section that is not loaded: for each task the number of its vector and its priority, a byte each, higher is more
-//! urgent. A handler that it does not list may interrupt everything.
+//! Handlers of one priority cannot (ARMv7-M Architecture Reference Manual, B1.5.4). An image lists its priorities in
+//! a section that is not loaded: for each task the vector number and the priority, one byte each, higher is more
+//! urgent. A handler that is not listed may interrupt everything.
 
 use super::StackError;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An image's priorities are in this section.
+/// Name of the section with an image's priorities.
 pub const SECTION: &str = ".priorities";
 
 /// Holds a vector table, and the priorities of its handlers.
 #[derive(Debug, Default)]
 pub struct Vectors {
-    /// Address of the handler of each exception number, where it is a function's.
+    /// Address of the handler of each exception number, if the vector points to a function.
     pub handlers: Vec<Option<u32>>,
-    /// Priority of some exception numbers.
+    /// Priority of each listed exception number.
     pub priorities: BTreeMap<usize, u8>,
 }
 
-/// Holds handlers of which only one at a time can run, and their priority if it is known.
+/// Handlers that cannot interrupt each other, with their priority if it is known.
 pub type Group = (Option<u8>, BTreeSet<u32>);
 
 impl Vectors {
     /// Reads the priorities of an image.
     ///
     /// # Errors
-    /// [`StackError::Format`]: a byte is left over, or a vector is listed twice.
+    /// [`StackError::Format`] if a byte is left over, or a vector is listed twice.
     pub fn prioritise(&mut self, section: &[u8]) -> Result<(), StackError> {
         let refused = || StackError::Format(format!("{SECTION} is no list of vectors and priorities"));
         let (entries, []) = section.as_chunks::<2>() else { return Err(refused()) };
@@ -38,7 +38,7 @@ impl Vectors {
         Ok(())
     }
 
-    /// Returns the groups, most urgent first: one for each priority, and one for each handler without one.
+    /// Returns the groups, most urgent first: one for each handler without a priority, then one for each priority.
     pub fn groups(&self, reset: u32) -> Vec<Group> {
         let (mut known, mut unknown) = (BTreeMap::<u8, BTreeSet<u32>>::new(), BTreeSet::new());
         for (number, handler) in self.handlers.iter().enumerate() {

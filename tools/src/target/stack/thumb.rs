@@ -1,18 +1,18 @@
-//! This module decodes the effect of a Thumb-2 instruction on the stack pointer and on the flow of control.
+//! This module decodes the effect of a Thumb-2 instruction on the stack pointer and on the control flow.
 //!
-//! Only those that do something to either are known (ARMv7-M Architecture Reference Manual,
-//! A7.7); all others are [`Effect::None`].
+//! Only instructions that affect one of them are decoded (ARMv7-M Architecture Reference Manual, A7.7); all others
+//! are [`Effect::None`].
 
-/// Describes the effect of an instruction.
+/// The effect of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
-    /// The instruction does not touch the stack pointer or the flow.
+    /// The instruction affects neither the stack pointer nor the control flow.
     None,
-    /// The stack grows by so many bytes.
+    /// The stack grows by this many bytes.
     Push(u32),
     /// The stack grows by a register's value.
     Dynamic,
-    /// A register is rounded down, by less than so many bytes; it may become the stack pointer.
+    /// A register is rounded down by less than this many bytes; it may become the stack pointer.
     Align { register: u8, bytes: u32 },
     /// A register becomes the stack pointer.
     MoveSp { register: u8 },
@@ -22,26 +22,26 @@ pub enum Effect {
     Branch(u32),
     /// A call or jump to a register's value.
     Indirect { register: u8 },
-    /// A jump to an address that lies in memory.
+    /// A jump to an address that is loaded from memory.
     Loaded,
     /// The lower half of a register is set.
     MoveLow { register: u8, value: u32 },
-    /// The upper half of a register is set; the lower one stays.
+    /// The upper half of a register is set; the lower half is unchanged.
     MoveHigh { register: u8, value: u32 },
 }
 
 const SP: u16 = 13;
 const PC: u16 = 15;
 
-/// Returns whether a second halfword belongs to the instruction.
+/// Returns whether an instruction that begins with this halfword has a second one.
 pub const fn is_wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }
 
-/// Holds an instruction: its address, its first halfword and, if it is wide, its second one.
+/// An instruction: its address, its first halfword and, if it is wide, its second one.
 pub type Instruction = (u32, u16, Option<u16>);
 
-/// Returns the instructions of a function that begins at an address, without the data between them.
+/// Returns the instructions of a function that begins at `start`, without the data between them.
 pub fn instructions(body: &[u8], start: u32, is_data: impl Fn(u32) -> bool) -> Vec<Instruction> {
     let halfword = |at: u32| {
         let bytes = body.get((at - start) as usize..)?.first_chunk()?;
@@ -83,7 +83,7 @@ fn narrow(code: u16, address: u32) -> Effect {
         _ if code & 0xFF87 == 0x4700 && code != 0x4770 => {
             Effect::Indirect { register: (code >> 3 & 0xF) as u8 }
         }
-        // B; the condition of BLX, UDF and SVC is none.
+        // B; UDF and SVC have the condition codes 0xE and 0xF.
         _ if code & 0xF800 == 0xE000 => branch(sign(u32::from(code & 0x7FF) << 1, 12)),
         _ if code & 0xF000 == 0xD000 && code >> 8 & 0xF < 0xE => branch(sign(u32::from(code & 0xFF) << 1, 9)),
         _ => Effect::None,
@@ -142,7 +142,7 @@ fn wide(first: u16, second: u16, address: u32) -> Effect {
     }
 }
 
-/// Extends the sign of a value of so many bits.
+/// Sign-extends a value with this many bits.
 fn sign(value: u32, bits: u32) -> i32 {
     (value << (32 - bits)) as i32 >> (32 - bits)
 }
@@ -184,7 +184,7 @@ fn expand(first: u16, second: u16) -> u32 {
 mod tests {
     use super::*;
 
-    /// The instructions are those that llvm-objdump 14 prints.
+    /// The expected instructions are those that llvm-objdump 14 prints.
     #[test]
     fn disassembled() {
         let wide = |first, second| effect(first, Some(second), 0x0801_0000);

@@ -1,4 +1,4 @@
-//! This module feeds the emulated image while it is counted.
+//! This module sends input to the emulated image while its handlers are counted.
 
 use crate::client::bus::SlcanBus;
 use crate::client::connection::Connection;
@@ -15,29 +15,28 @@ use gyronet::sensor::xsens::MtData2;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// The image gets this many samples: for static initialisation, and forty windows.
+/// Number of samples for the image: for static initialisation and forty windows.
 const SAMPLES: usize = 500;
-/// A sample may take at most this long.
+/// Timeout of sending and processing a sample.
 const TURN: Duration = Duration::from_secs(10);
-/// At least this many windows of the network must have run for its cost to be known.
+/// Least number of windows of the network that must run for a reliable cost.
 const WINDOWS: u32 = 20;
-/// An instruction takes 8 ns: the board's clock and its instructions keep the ratio of about 125 million instructions a
-/// second.
+/// One instruction takes 8 ns of the board's clock, so the board runs about 125 million instructions a second.
 const ICOUNT: &str = "shift=3";
-/// The fibre-optic gyro sends this many messages a sample.
+/// Number of the fibre-optic gyro's messages per sample.
 const GYRO_MESSAGES: usize = 10;
 /// Identifier of the inertial sensor's rate.
 const IMU_RATE: u16 = 0x1A0;
-/// Times that the image is fed where the host is too slow.
+/// Largest number of attempts if the host is too slow.
 const ATTEMPTS: u32 = 3;
-/// USARTs of the board.
+/// Numbers of the board's USARTs.
 const IMU: usize = 1;
 const SLCAN: usize = 2;
 const GYRO: usize = 3;
 const SERVICE: usize = 6;
 
-/// Feeds the image, whose flash `loaded` fills, again where the host was so slow that the image found its sensor silent, which is another load;
-/// returns the plugin's output.
+/// Runs the image with input and returns the plugin's output. `loaded` are the arguments that load the flash. The run
+/// is repeated if the host was so slow that the image found its sensor silent, because that changes the load.
 pub fn run(image: &Path, plugin: &str, loaded: &[String]) -> Result<String, EmulatorError> {
     let (mut silences, mut output) = attempt(image, plugin, loaded)?;
     for _ in 1..ATTEMPTS {
@@ -48,32 +47,32 @@ pub fn run(image: &Path, plugin: &str, loaded: &[String]) -> Result<String, Emul
     Ok(output)
 }
 
-/// Sends everything, one sample after the other, and ends the emulator; returns how often the sensor was found silent,
-/// and the plugin's output.
+/// Sends all input, sample by sample, and ends the emulator; returns the number of times that the sensor was found
+/// silent, and the plugin's output.
 fn attempt(image: &Path, plugin: &str, loaded: &[String]) -> Result<(u32, String), EmulatorError> {
     let mut arguments = vec!["-icount", ICOUNT, "-plugin", plugin];
     arguments.extend(loaded.iter().map(String::as_str));
     let mut board = Board::boot(image, SERVICE, &arguments)?;
-    // The end of a line, once the image listens.
+    // Sends a line end once the image listens.
     board.send(SERVICE, b"\r", TURN)?;
     let address = board.serve(SERVICE)?.to_string();
     let line = SlcanBus::open(&address, 0).map_err(|error| board.failed(error.to_string()))?;
     let mut device = Device::new(line, &address);
     for (k, sample) in Simulation::new(&Config::DEFAULT).take(SAMPLES).enumerate() {
-        // Toyota's frame says that the vehicle stands; from time to time a host sends a request.
+        // The wheel frame (Toyota's) says that the vehicle stands. A host sends commands every 50 samples.
         board.send(SLCAN, b"t0AA81A6F1A6F1A6F1A6F\r", TURN)?;
         if k % 50 == 0 {
             board.send(SLCAN, b"V\rN\rF\r", TURN)?;
         }
         let numbers = GYRO_MESSAGES * k..GYRO_MESSAGES * (k + 1);
         let messages: Vec<u8> = numbers.flat_map(|number| increment(number, &sample).emit()).collect();
-        // The gyro's messages of ten milliseconds come first, then the sample: the schedule adds up the activations
-        // that process them.
+        // The gyro's messages of 10 ms arrive before the sample, so that no activation processes both: the schedule
+        // adds them up.
         board.send(GYRO, &messages, TURN)?;
         await_messages(&mut board, &mut device, GYRO_MESSAGES * (k + 1))?;
         board.send(IMU, &message(k, &sample).emit(), TURN)?;
         if k % 10 == 0 {
-            // Its answers go out while the request comes in.
+            // The answers to these commands are sent while the request arrives.
             board.send(SERVICE, b"V\rN\rV\rN\r", TURN)?;
             ask(&mut device, k / 10).map_err(|error| board.failed(error.to_string()))?;
         }
@@ -87,7 +86,7 @@ fn attempt(image: &Path, plugin: &str, loaded: &[String]) -> Result<(u32, String
     Ok((counters.watch.silences, board.quit()?))
 }
 
-/// Has one of the longer responses sent.
+/// Requests one of the longer responses.
 fn ask(device: &mut Device<SlcanBus<Connection>>, number: usize) -> Result<(), DeviceError> {
     match number % 3 {
         0 => device.info().map(drop),
@@ -96,8 +95,8 @@ fn ask(device: &mut Device<SlcanBus<Connection>>, number: usize) -> Result<(), D
     }
 }
 
-/// Waits until the image has taken so many messages of the gyro. The response fits a frame, so the host's pace matters
-/// little.
+/// Waits until the image has received `least` messages of the gyro. The response fits in one frame, so the host's
+/// speed has little effect.
 fn await_messages(
     board: &mut Board,
     device: &mut Device<SlcanBus<Connection>>,
@@ -116,7 +115,7 @@ fn await_messages(
     }
 }
 
-/// Returns the number of samples whose rate is out; a silent sensor's message carries none.
+/// Returns the number of samples whose rate was sent; a silent sensor's message has no rate.
 fn sets(sent: &[u8]) -> usize {
     let lines = sent.split(|byte| *byte == b'\r').filter_map(|line| slcan::parse::<DataFrame>(line).ok());
     let own = lines.filter(|frame| matches!(frame.id(), Id::Standard(found) if found.as_raw() == IMU_RATE));

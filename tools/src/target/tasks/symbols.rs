@@ -5,12 +5,12 @@ use crate::target::stack;
 use object::{Object, ObjectSymbol};
 use std::path::Path;
 
-/// The output task runs this function for each sample.
+/// Function that the output task runs for each sample.
 const WATCHED: &str = "gyronet::coprocessor::Coprocessor::imu";
-/// The output task runs this function to check every line.
+/// Function that the output task runs to check all lines.
 const LOOKING: &str = "output::Output::look";
-/// Lists the exception numbers of the handlers (RM0090, table 62), and the data register that a serial line's handler
-/// reads and writes (RM0090, table 1 and 30.6.2).
+/// The exception numbers and names of the handlers (RM0090, table 62), and the data register that a serial line's
+/// handler reads and writes (RM0090, table 1 and 30.6.2).
 const VECTORS: [(usize, &str, u32); 10] = [
     (15, "SysTick", 0),
     (16 + 1, "PVD", 0),
@@ -32,7 +32,7 @@ pub struct Symbols {
 }
 
 impl Symbols {
-    /// Reads the symbols of an image; the error says what it lacks.
+    /// Reads the symbols of an image; the error names the missing symbol.
     pub fn read(image: &Path) -> Result<Self, String> {
         let bad = |what: &dyn std::fmt::Display| format!("{}: {what}", image.display());
         let bytes = std::fs::read(image).map_err(|error| bad(&error))?;
